@@ -26,19 +26,28 @@ from roboirg.tasks.splits.fingerprint import NOT_COUNTED, fingerprint, plain
 from roboirg.tasks.splits.splits import get_episode
 
 TASKS = tuple(sorted(every_task()))
-SAMPLE = [("test", index) for index in range(12)] + [("train", index) for index in range(4)]
+PLACES_OF_EPISODES = [("test", index) for index in range(12)] + [
+    ("train", index) for index in range(4)
+]
 """Six easy, four medium and four hard episodes, at least."""
-MADE = read_courses(confusion.HALVES["development"])
-NAMES = sorted({str(made.failure) for made in MADE if made.kind not in ("success", "unscored")})
-classes = functools.cache(lambda: confusion.classes(MADE))
+CAUSED_FAILURES = read_courses(confusion.HALVES["development"])
+NAMES = sorted(
+    {str(made.failure) for made in CAUSED_FAILURES if made.kind not in ("success", "unscored")}
+)
+classes = functools.cache(lambda: confusion.classes(CAUSED_FAILURES))
 
 
 # Failures whose cause is known
 
 
-def test_kinds_are_right_where_the_cause_is_known():
-    """More than of causes that the rules did not know."""
-    found = confusion.scores(MADE)
+def test_failures_with_a_known_cause_are_attributed_to_the_right_kind():
+    """Made failures: an oracle with one planted mistake. Kinds are such as grounding or execution.
+
+    Bounds are higher than for causes that the rules had not been written for.
+    """
+    found = confusion.scores(CAUSED_FAILURES)
+    # Right among the decided ones, and by cause; undecided though acts show the cause, and
+    # undecided where they show none.
     assert found.of_decided >= 0.95
     assert found.of_causes >= 0.9
     assert found.undecided <= 0.05
@@ -46,14 +55,15 @@ def test_kinds_are_right_where_the_cause_is_known():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_names_are_right_where_the_cause_is_known(name):
+def test_failures_with_a_known_cause_get_its_name_in_most_cases(name):
+    """A name is finer than its kind: *wrong_object* is one of the kind *grounding*."""
     many, kinds, names = classes()[name]
     assert kinds >= 0.8 * many
     assert names >= 0.6 * many
 
 
 @pytest.mark.parametrize("half", [half for half, path in confusion.HALVES.items() if path.exists()])
-def test_the_document_has_the_tables(half):
+def test_the_documentation_has_the_current_tables_of_attribution(half):
     text = confusion.DOCUMENT.read_text()
     assert confusion.put_in(text, "failures", confusion.failures_table()) == text
 
@@ -66,12 +76,10 @@ def test_the_document_has_the_tables(half):
     "name",
     ["takes_the_nearest_of_another_kind", "presses_beside_in_time", "opens_half_way", "trembles"],
 )
-def test_what_is_stored_is_what_the_simulator_does(name):
-    """Facts and attempts come from motion, not from the file.
-
-    On another family of processors the motion, and so the step, may be another.
-    """
-    stored = next(made for made in MADE if made.cause == name)
+def test_playing_a_planted_mistake_again_gives_the_stored_facts_and_finding(name):
+    """Facts and attempts come from motion, not from the file. On another
+    family of processors the motion, and so the step, may be another."""
+    stored = next(made for made in CAUSED_FAILURES if made.cause == name)
     cause = next(cause for cause in CAUSES if cause.name == name)
     played = play_cause(cause, stored.episode)
     assert played is not None
@@ -85,53 +93,61 @@ def test_what_is_stored_is_what_the_simulator_does(name):
     assert {event.fact for event in played.events} == {event.fact for event in stored.events}
 
 
-def test_every_failure_is_of_a_kind_and_is_shown_to_users():
+def test_every_name_of_a_failure_has_an_entry_in_the_table_of_failures():
     assert get_args(FailureName) == tuple(FAILURES)
 
 
 # The smallest inputs
 
 
-def staged(task: str, index: int) -> Staged:
+def played_without_simulator(task: str, index: int) -> Staged:
     return Staged(get_episode(task, "test", index))
 
 
-def says(play: Staged, failure: str) -> None:
+def check_failure(play: Staged, failure: str) -> None:
     found = play.finding()
     assert found is not None
-    check(play, found)
+    check_finding(play, found)
     assert found.failure == failure
 
 
-def test_a_miss_that_was_noticed_excuses_no_count():
-    play = staged("PickXtimes", 18)  # the blue cube, twice
+def test_a_failed_grasp_that_was_repeated_does_not_excuse_a_wrong_count():
+    """The goal is the blue cube, twice; it is missed
+    once, then placed once, then the button pressed."""
+    play = played_without_simulator("PickXtimes", 18)  # the blue cube, twice
     play.miss("cube_blue").play(play.episode.stages[:2]).press()
-    says(play, "wrong_count")
+    check_failure(play, "wrong_count")
 
 
-def test_a_wrong_container_put_back_before_the_press_is_no_wrong_one():
-    play = staged("ButtonUnmask", 0)  # container_0 is meant
-    says(play.lift("container_1").put("container_1").rest(), "stopped")
+def test_a_wrong_container_lifted_before_the_press_is_not_blamed_for_a_timeout():
+    """Until the button is pressed, lifting containers is allowed; then nothing happens any more."""
+    play = played_without_simulator("ButtonUnmask", 0)  # container_0 is meant
+    check_failure(play.lift("container_1").put("container_1").rest(), "stopped")
 
 
-def test_fingers_that_close_between_two_things_decide_nothing():
+def test_a_failed_grasp_next_to_two_cubes_is_an_ambiguous_act():
+    """The fact "clutched" says that the fingers closed on nothing next to a thing."""
     both = (Fact("clutched", "cube_blue"), Fact("clutched", "cube_red"))
-    says(staged("PickXtimes", 2).attempt(*both).rest(), "ambiguous_act")
+    check_failure(played_without_simulator("PickXtimes", 2).attempt(*both).rest(), "ambiguous_act")
 
 
-def test_a_wrong_thing_only_touched_is_no_attempt():
-    play = staged("PickXtimes", 2)  # the blue cube is meant
-    says(play.reach("cube_red").set(off=(Fact("reached", "cube_red"),)).rest(), "no_attempt")
+def test_reaching_for_a_wrong_cube_without_grasping_is_no_attempt():
+    """The fact "reached" says that the hand is at a thing."""
+    play = played_without_simulator("PickXtimes", 2)  # the blue cube is meant
+    check_failure(
+        play.reach("cube_red").set(off=(Fact("reached", "cube_red"),)).rest(), "no_attempt"
+    )
 
 
 @pytest.mark.parametrize(
     ("late", "failure"), [(0.3, "mistimed"), (-0.7, "ambiguous_act"), (-1.0, "wrong_time")]
 )
-def test_when_the_moving_cube_is_stopped(late, failure):
-    play = staged("StopCube", 0)
+def test_failures_of_stopping_the_moving_cube_too_early_or_too_late(late, failure):
+    """`late` is how late the button is pressed, in passes of the cube (negative: early)."""
+    play = played_without_simulator("StopCube", 0)
     interval = play.episode.scene.motions[0].interval  # type: ignore[union-attr]
     moment = play.episode.stages[-1].primitive.steps + round(late * interval)
-    says(play.hover().until(moment - 2).press(), failure)
+    check_failure(play.hover().until(moment - 2).press(), failure)
 
 
 @pytest.mark.parametrize(
@@ -143,21 +159,23 @@ def test_when_the_moving_cube_is_stopped(late, failure):
         (DeclaredIntent(verdicts=((0, "right"),)), "not_followed"),
     ],
 )
-def test_what_was_declared_comes_before_acts(intent, failure):
-    play = staged("PickXtimes", 2).rest()
+def test_what_a_policy_says_it_understood_decides_before_what_it_did(intent, failure):
+    """A policy may declare its goal, or subgoals that are judged. Here it then does nothing."""
+    play = played_without_simulator("PickXtimes", 2).rest()
     play.intent = intent
-    says(play, failure)
+    check_failure(play, failure)
 
 
 @pytest.mark.parametrize("understood", ["the red one", {"confidence": 0.9}, ["red"], 3])
-def test_what_another_policy_calls_understood_is_no_goal(understood):
+def test_metadata_called_understood_that_is_no_goal_is_ignored(understood):
+    """Only a mapping from slots of the goal to values counts, such as {"color": "red"}."""
     record = SimpleNamespace(
         policy_metadata={"understood": understood}, goal={"color": "red"}, subgoals=()
     )
     assert declared_intent(cast("Record", record)) is None
 
 
-def check(play: Staged, found: FailureAttribution) -> None:
+def check_finding(play: Staged, found: FailureAttribution) -> None:
     """What holds of every finding."""
     assert found.kind == FAILURES[found.failure].kind
     assert 0 <= found.step <= play.step - play.turn
@@ -167,8 +185,8 @@ def check(play: Staged, found: FailureAttribution) -> None:
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_a_pose_that_cannot_be_reached_and_what_came_before(task):
-    play = staged(task, 3).tick(5)
+def test_an_unreachable_pose_is_an_execution_failure_at_the_step_of_the_report(task):
+    play = played_without_simulator(task, 3).tick(5)
     found = play.finding(timed_out=False, cause="no way to (9, 9, 9)")
 
     assert found == FailureAttribution(
@@ -177,7 +195,7 @@ def test_a_pose_that_cannot_be_reached_and_what_came_before(task):
     assert play.finding(timed_out=False) is None
 
 
-def test_an_episode_that_ends_in_its_demonstration_has_a_failure() -> None:
+def test_an_episode_that_ends_during_its_video_counts_as_no_attempt() -> None:
     episode = get_episode("VideoPlaceOrder", "test", 1)
     found = attribute_failure(episode, [], timed_out=True, policy_start_step=0, elapsed_steps=50)
     assert found is not None
@@ -188,7 +206,7 @@ def test_an_episode_that_ends_in_its_demonstration_has_a_failure() -> None:
 
 
 @pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("where", SAMPLE, ids=lambda where: f"{where[0]}-{where[1]}")
+@pytest.mark.parametrize("where", PLACES_OF_EPISODES, ids=lambda where: f"{where[0]}-{where[1]}")
 def test_a_success_has_no_attribution(task, where):
     episode = get_episode(task, *where)
     play = Staged(episode).play(episode.stages)
@@ -203,7 +221,8 @@ episodes = st.builds(get_episode, st.sampled_from(TASKS), st.just("test"), st.in
 
 @given(episodes, st.floats(0, 1, exclude_max=True))
 @settings(max_examples=80)
-def test_right_acts_that_stop_early_are_no_grounding_failure(episode, share):
+def test_stopping_a_correct_run_at_any_time_is_never_a_grounding_failure(episode, share):
+    """Grounding failures are to act on something that the words do not mean."""
     play = Staged(episode).play(episode.stages)
     end = play.turn + int(share * (play.step - play.turn))
     events = [event for event in play.events if event.step <= end]
@@ -219,7 +238,8 @@ def test_right_acts_that_stop_early_are_no_grounding_failure(episode, share):
 
 @given(episodes, st.data())
 @settings(max_examples=120)
-def test_taking_one_thing_for_another_is_a_grounding_failure_or_none(episode, data):
+def test_exchanging_two_objects_all_along_is_a_grounding_failure_or_no_failure(episode, data):
+    """From the stage `begin` on, a perfect hand takes `wrong` wherever `right` is meant."""
     begin = data.draw(st.sampled_from(stages_with_a_thing(episode)))
     primitive = episode.stages[begin].primitive
     right = primitive.subject
@@ -252,7 +272,7 @@ def stages_with_a_thing(episode: Episode) -> list[int]:
 # Anything at all
 
 
-def anything(episode: Episode) -> st.SearchStrategy[list[frozenset[Fact]]]:
+def any_course_of_facts(episode: Episode) -> st.SearchStrategy[list[frozenset[Fact]]]:
     """Courses of facts of which most make no sense, though they are about what is there."""
     asked = sorted(set(named_facts(episode.stages)), key=str)
     objects = {thing.name for thing in episode.scene.objects}
@@ -265,12 +285,10 @@ def anything(episode: Episode) -> st.SearchStrategy[list[frozenset[Fact]]]:
 
 @given(episodes, st.data(), st.booleans())
 @settings(max_examples=120)
-def test_whatever_happens_there_is_one_attribution_of_a_failure_and_none_else(
-    episode, data, timed_out
-):
+def test_any_course_of_facts_has_a_finding_exactly_if_the_episode_failed(episode, data, timed_out):
     done = data.draw(st.integers(0, len(episode.stages) - 1))
     play = Staged(episode).play(episode.stages[:done])
-    for facts in data.draw(anything(episode)):
+    for facts in data.draw(any_course_of_facts(episode)):
         lasting = {fact for fact in play.now if fact.kind == "binned"}
         play.now = lasting | facts
         play.tick(data.draw(st.integers(1, 40)))
@@ -280,15 +298,16 @@ def test_whatever_happens_there_is_one_attribution_of_a_failure_and_none_else(
 
     assert (found is not None) == (failed or (timed_out and play.judge.status is Status.ONGOING))
     if found is not None:
-        check(play, found)
+        check_finding(play, found)
         assert found == play.finding(timed_out=timed_out)
 
 
 # Details
 
 
-def test_what_shows_late_is_dated_when_it_was_done():
-    play = staged("BinFill", 2)  # green cubes are meant, three or more
+def test_a_mistake_that_is_judged_later_is_dated_when_it_happened():
+    """A blue cube falls into the bin first; the verdict comes at the end, when green ones lack."""
+    play = played_without_simulator("BinFill", 2)  # green cubes are meant, three or more
     play.lift("cube_blue_0").fill("cube_blue_0", "bin")
     done = play.step
 
@@ -300,7 +319,7 @@ def test_what_shows_late_is_dated_when_it_was_done():
     assert play.turn + found.step == done < play.step
 
 
-def test_how_a_failure_is_described_is_no_part_of_an_episode_s_identity():
+def test_the_fingerprint_of_an_episode_ignores_how_its_failures_are_named():
     named = Rule(Fact("pressed", "b"), "x", "wrong_time")
     other = Rule(Fact("pressed", "b"), "y")
 

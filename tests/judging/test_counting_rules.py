@@ -27,14 +27,14 @@ def color_numbers(scene):
 
 
 FILL_SCENE = scene_of(bin_fill, lambda scene: min(color_numbers(scene)) >= 3)
-FILL = bin_fill.stages(FILL_SCENE, Goal.of(colors=("red", "blue"), counts=(2, 1)))
+TWO_RED_ONE_BLUE = bin_fill.stages(FILL_SCENE, Goal.of(colors=("red", "blue"), counts=(2, 1)))
 
 
 def picked(cube):
     return Fact("picked", cube)
 
 
-def fill(*cubes):
+def facts_of_filling(*cubes):
     """Facts of picking each cube and dropping it into the bin, where it counts for ever."""
     inside = []
     for cube in cubes:
@@ -44,9 +44,14 @@ def fill(*cubes):
         yield list(inside)
 
 
-def filled(*cubes, then=()):
+def judged_after_filling(*cubes, then=()):
     inside = [Fact("binned", cube, "bin") for cube in cubes]
-    return judged(FILL, FILL_SCENE, *fill(*cubes), *([*inside, *facts] for facts in then))
+    return judged(
+        TWO_RED_ONE_BLUE,
+        FILL_SCENE,
+        *facts_of_filling(*cubes),
+        *([*inside, *facts] for facts in then),
+    )
 
 
 @pytest.mark.parametrize(
@@ -59,15 +64,17 @@ def filled(*cubes, then=()):
     ids=["as planned", "other order", "other cubes"],
 )
 def test_bin_fill_accepts_any_order_and_any_cubes_of_the_colors(cubes):
-    assert filled(*cubes, then=[[]]).status is Status.ONGOING
-    assert filled(*cubes, then=[[], [PRESSED]]).status is Status.SUCCESS
-    assert filled(*cubes, then=[[PRESSED]]).status is Status.SUCCESS
+    """The goal is two red cubes and a blue one, then to press the button."""
+    assert judged_after_filling(*cubes, then=[[]]).status is Status.ONGOING
+    assert judged_after_filling(*cubes, then=[[], [PRESSED]]).status is Status.SUCCESS
+    assert judged_after_filling(*cubes, then=[[PRESSED]]).status is Status.SUCCESS
 
 
 def test_bin_fill_punishes_a_press_before_the_last_drop():
-    assert filled(then=[[PRESSED]]).status is Status.FAILURE
+    """The goal is two red cubes and a blue one, then to press the button."""
+    assert judged_after_filling(then=[[PRESSED]]).status is Status.FAILURE
     for cubes in (("cube_red_0",), ("cube_red_0", "cube_red_1")):
-        judge = filled(*cubes, then=[[PRESSED]])
+        judge = judged_after_filling(*cubes, then=[[PRESSED]])
         assert judge.status is Status.FAILURE
         assert judge.cause.startswith("pressed the button; expected: pick up the")
 
@@ -82,9 +89,10 @@ def test_bin_fill_punishes_a_press_before_the_last_drop():
     ],
 )
 def test_bin_fill_punishes_a_wrong_mix_one_step_after_the_last_drop(cubes, cause):
-    assert filled(*cubes).status is Status.ONGOING
+    """The goal is two red cubes and a blue one; three cubes are in, but not these."""
+    assert judged_after_filling(*cubes).status is Status.ONGOING
 
-    judge = filled(*cubes, then=[[]])
+    judge = judged_after_filling(*cubes, then=[[]])
     assert judge.status is Status.FAILURE
     assert judge.cause == f"{cause}; expected: press the button"
 
@@ -98,79 +106,123 @@ def test_bin_fill_punishes_a_wrong_mix_one_step_after_the_last_drop(cubes, cause
     ],
 )
 def test_bin_fill_punishes_one_cube_too_many_as_it_lands_but_not_its_picking(extra, cause):
+    """The goal is two red cubes and a blue one, and a fourth cube follows."""
     right = ("cube_red_0", "cube_red_1", "cube_blue_0")
-    held = filled(*right, then=[[], [picked(extra)], []])
+    held = judged_after_filling(*right, then=[[], [picked(extra)], []])
     assert held.status is Status.ONGOING
 
-    landed = filled(*right, then=[[], [picked(extra)], [Fact("binned", extra, "bin")]])
+    landed = judged_after_filling(
+        *right, then=[[], [picked(extra)], [Fact("binned", extra, "bin")]]
+    )
     assert landed.status is Status.FAILURE
     assert landed.cause.startswith(cause)
 
 
 def test_bin_fill_does_not_punish_dropping_beside_and_picking_again():
+    """A green and a red cube fall next to the bin; then the two red and the blue one go in."""
     steps = [[picked("cube_green_0")], [], [picked("cube_red_0")], [], [picked("cube_red_0")], []]
-    assert judged(FILL, FILL_SCENE, *steps).status is Status.ONGOING
+    assert judged(TWO_RED_ONE_BLUE, FILL_SCENE, *steps).status is Status.ONGOING
 
-    rest = fill("cube_red_0", "cube_red_1", "cube_blue_0")
+    rest = facts_of_filling("cube_red_0", "cube_red_1", "cube_blue_0")
     inside = [Fact("binned", c, "bin") for c in ("cube_red_0", "cube_red_1", "cube_blue_0")]
-    judge = judged(FILL, FILL_SCENE, *steps, *rest, inside, [*inside, PRESSED])
+    judge = judged(TWO_RED_ONE_BLUE, FILL_SCENE, *steps, *rest, inside, [*inside, PRESSED])
     assert judge.status is Status.SUCCESS
 
 
 # SwingXtimes: the red cube, twice.
 
 SWING_SCENE = scene_of(swing_x_times, lambda _scene: True)
-SWING = swing_x_times.stages(SWING_SCENE, Goal.of(color="red", repeats=2))
-HELD = picked("cube_red")
-LYING = Fact("lying", "cube_red")
+RED_TWICE = swing_x_times.stages(SWING_SCENE, Goal.of(color="red", repeats=2))
+RED_HELD = picked("cube_red")
+RED_LYING = Fact("lying", "cube_red")
 RIGHT, LEFT = (Fact("over", "cube_red", f"target_{side}") for side in ("right", "left"))
-TAKE = [[LYING], [HELD]]
-SWUNG = [[HELD, RIGHT], [HELD, RIGHT], [HELD], [HELD, LEFT], [HELD]]
+PICK_RED = [[RED_LYING], [RED_HELD]]
+RIGHT_THEN_LEFT = [[RED_HELD, RIGHT], [RED_HELD, RIGHT], [RED_HELD], [RED_HELD, LEFT], [RED_HELD]]
 
 
-def swung(*steps):
-    return judged(SWING, SWING_SCENE, *steps)
+def judged_swings(*steps):
+    return judged(RED_TWICE, SWING_SCENE, *steps)
 
 
 def test_swing_is_done_after_the_swings_the_put_down_and_the_press():
-    judge = swung(*TAKE, *SWUNG, *SWUNG, [LYING], [LYING, PRESSED])
+    """The goal is to swing the red cube from the right to the left target, twice."""
+    judge = judged_swings(
+        *PICK_RED, *RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT, [RED_LYING], [RED_LYING, PRESSED]
+    )
     assert judge.status is Status.SUCCESS
 
 
-def test_swing_is_done_where_the_cube_was_put_down_over_the_target():
-    judge = swung(*TAKE, *SWUNG, *SWUNG[:-1], [LEFT, LYING], [LEFT, LYING, PRESSED])
+def test_swing_succeeds_if_the_cube_is_put_down_over_the_left_target():
+    """The red cube, twice; lying down over a target is no visit too many."""
+    judge = judged_swings(
+        *PICK_RED,
+        *RIGHT_THEN_LEFT,
+        *RIGHT_THEN_LEFT[:-1],
+        [LEFT, RED_LYING],
+        [LEFT, RED_LYING, PRESSED],
+    )
     assert judge.status is Status.SUCCESS
 
 
 def test_swing_punishes_another_cube_in_every_stage():
-    whole = [[HELD], [HELD, RIGHT], [HELD, LEFT], [HELD, RIGHT], [HELD, LEFT], [LYING]]
+    """The goal is the red cube, twice: a pick, two swings each way, and a put-down."""
+    whole = [
+        [RED_HELD],
+        [RED_HELD, RIGHT],
+        [RED_HELD, LEFT],
+        [RED_HELD, RIGHT],
+        [RED_HELD, LEFT],
+        [RED_LYING],
+    ]
     for done in range(len(whole) + 1):
         for wrong in ("cube_green", "cube_blue"):
-            judge = swung(*whole[:done], [picked(wrong)])
+            judge = judged_swings(*whole[:done], [picked(wrong)])
             assert judge.status is Status.FAILURE
             assert judge.cause.startswith(f"picked up the {wrong[5:]} cube")
 
 
 @pytest.mark.parametrize("side", [RIGHT, LEFT])
 def test_swing_punishes_a_visit_too_many_before_and_after_the_put_down(side):
-    swings = [*TAKE, *SWUNG, *SWUNG]
-    for steps in ([*swings, [HELD, side]], [*swings, [LYING], [HELD], [HELD, side]]):
-        assert swung(*steps[:-1]).status is Status.ONGOING
-        judge = swung(*steps)
+    """`side` is the fact that the red cube is over one of the targets a fifth time."""
+    swings = [*PICK_RED, *RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT]
+    for steps in (
+        [*swings, [RED_HELD, side]],
+        [*swings, [RED_LYING], [RED_HELD], [RED_HELD, side]],
+    ):
+        assert judged_swings(*steps[:-1]).status is Status.ONGOING
+        judge = judged_swings(*steps)
         assert judge.status is Status.FAILURE
         assert judge.cause.startswith("moved the cube over a target too often")
 
 
 def test_swing_visits_of_other_cubes_do_not_count():
-    other = [[HELD, Fact("over", "cube_blue", "target_right")], [HELD]] * 6
-    steps = [*TAKE, *other, *SWUNG, *SWUNG, [LYING], [LYING, PRESSED]]
-    assert swung(*steps).status is Status.SUCCESS
+    """A blue cube is over the right target six times, without having been picked up."""
+    other = [[RED_HELD, Fact("over", "cube_blue", "target_right")], [RED_HELD]] * 6
+    steps = [
+        *PICK_RED,
+        *other,
+        *RIGHT_THEN_LEFT,
+        *RIGHT_THEN_LEFT,
+        [RED_LYING],
+        [RED_LYING, PRESSED],
+    ]
+    assert judged_swings(*steps).status is Status.SUCCESS
 
 
 def test_swing_does_not_punish_dropping_on_the_way_nor_picking_after_the_put_down():
-    dropped = [[LYING], [LYING], [HELD]]
-    steps = [*TAKE, *SWUNG, *dropped, *SWUNG, [LYING], [HELD], [LYING], [LYING, PRESSED]]
-    assert swung(*steps).status is Status.SUCCESS
+    """The red cube falls between the two swings, and is lifted once more at the end."""
+    dropped = [[RED_LYING], [RED_LYING], [RED_HELD]]
+    steps = [
+        *PICK_RED,
+        *RIGHT_THEN_LEFT,
+        *dropped,
+        *RIGHT_THEN_LEFT,
+        [RED_LYING],
+        [RED_HELD],
+        [RED_LYING],
+        [RED_LYING, PRESSED],
+    ]
+    assert judged_swings(*steps).status is Status.SUCCESS
 
 
 # StopCube: 120 steps a pass, the third visit, whose middle is at step 300.
@@ -182,14 +234,16 @@ NEAR, STOPPED = (Fact(kind, "shuttle", "target") for kind in ("near", "stopped")
 
 
 def has_interval(scene):
-    return any(isinstance(run, Shuttle) and run.interval == INTERVAL for run in scene.motions)
+    return any(
+        isinstance(motion, Shuttle) and motion.interval == INTERVAL for motion in scene.motions
+    )
 
 
 STOP_SCENE = scene_of(stop_cube, has_interval)
-STOP = stop_cube.stages(STOP_SCENE, Goal.of(visit=VISIT))
+THIRD_VISIT = stop_cube.stages(STOP_SCENE, Goal.of(visit=VISIT))
 
 
-def run(pressed_at=None, hover_at=40, until=500):
+def facts_of_a_run(pressed_at=None, hover_at=40, until=500):
     """The facts of every step: near within 8 steps of each pass's middle, until it is stopped."""
     stopped = False
     for step in range(until):
@@ -207,24 +261,25 @@ def run(pressed_at=None, hover_at=40, until=500):
         yield facts
 
 
-def stop(**how):
+def verdict_and_step(**how):
     """The judge, and the step at which it gave its verdict."""
-    judge = Judge(STOP, STOP_SCENE)
-    for step, facts in enumerate(run(**how)):
+    judge = Judge(THIRD_VISIT, STOP_SCENE)
+    for step, facts in enumerate(facts_of_a_run(**how)):
         if judge.update(step, frozenset(facts)) is not Status.ONGOING:
             return judge, step
     return judge, None
 
 
-OFF = "pressed the button while the cube was off the target"
-EARLY = "stopped the cube on an earlier"
-PASSED = "let the cube's third visit pass"
-OVER = 3 * INTERVAL + 1
+NOT_ON_TARGET = "pressed the button while the cube was off the target"
+EARLIER_VISIT = "stopped the cube on an earlier"
+VISIT_PASSED = "let the cube's third visit pass"
+AFTER_THIRD_VISIT = 3 * INTERVAL + 1
 
 
 @pytest.mark.parametrize("pressed_at", [292, 300, 308])
 def test_stop_cube_is_done_when_stopped_on_the_wanted_visit(pressed_at):
-    judge, step = stop(pressed_at=pressed_at)
+    """The cube passes its target every 120 steps; the middle of the third visit is step 300."""
+    judge, step = verdict_and_step(pressed_at=pressed_at)
     assert (judge.status, step) == (Status.SUCCESS, pressed_at)
 
 
@@ -232,21 +287,31 @@ def test_stop_cube_is_done_when_stopped_on_the_wanted_visit(pressed_at):
     ("how", "at", "cause"),
     [
         # Off the target at once, on an earlier visit when it is time to press.
-        *(({"pressed_at": step}, step, OFF) for step in (0, 20, 120, 200, 280, 291, 309)),
-        *(({"pressed_at": step}, 270 + 1, EARLY) for step in (60, 180, 188)),
-        ({"pressed_at": 180, "hover_at": None}, OVER, PASSED),
-        *((late, OVER, PASSED) for late in ({}, {"pressed_at": 420}, {"hover_at": None})),
+        *(({"pressed_at": step}, step, NOT_ON_TARGET) for step in (0, 20, 120, 200, 280, 291, 309)),
+        *(({"pressed_at": step}, 270 + 1, EARLIER_VISIT) for step in (60, 180, 188)),
+        ({"pressed_at": 180, "hover_at": None}, AFTER_THIRD_VISIT, VISIT_PASSED),
+        *(
+            (late, AFTER_THIRD_VISIT, VISIT_PASSED)
+            for late in ({}, {"pressed_at": 420}, {"hover_at": None})
+        ),
     ],
 )
-def test_stop_cube_punishes_other_moments(how, at, cause):
-    judge, step = stop(**how)
+def test_stop_cube_fails_if_the_button_is_pressed_off_the_target_or_on_another_visit(
+    how, at, cause
+):
+    """The third visit is meant, steps 292 to 308; `at` is the step of the verdict.
+
+    An earlier visit is punished only when it is time to press, at step 271.
+    """
+    judge, step = verdict_and_step(**how)
     assert (judge.status, step) == (Status.FAILURE, at)
     assert judge.cause.startswith(cause)
     assert judge.cause.endswith("; expected: wait") == (at in (120, 200))
 
 
-def test_stop_cube_a_late_hover_catches_up():
-    judge, step = stop(pressed_at=300, hover_at=299)
+def test_stop_cube_succeeds_though_the_hand_comes_to_the_button_late():
+    """The stages before the press are to hover over the button and to wait, one evaluation each."""
+    judge, step = verdict_and_step(pressed_at=300, hover_at=299)
     assert judge.status is Status.SUCCESS
     assert step <= 300 + 7
-    assert stop(pressed_at=300, hover_at=340)[0].status is Status.SUCCESS
+    assert verdict_and_step(pressed_at=300, hover_at=340)[0].status is Status.SUCCESS

@@ -27,7 +27,8 @@ from roboirg.tasks.splits.splits import get_episode
 SOURCE = Path(roboirg.__file__).parent
 
 
-def test_every_kind_that_is_detected_has_traits_and_the_other_way_round():
+def test_the_kinds_of_facts_in_the_code_are_those_in_the_table_of_traits():
+    """A fact is what holds in the world, such as *picked*; attempts are found by other code."""
     kinds = {
         path.stem: set(re.findall(r"\bFact\(\s*\"(\w+)\"", path.read_text()))
         for path in SOURCE.rglob("*.py")
@@ -40,7 +41,8 @@ def test_every_kind_that_is_detected_has_traits_and_the_other_way_round():
 
 
 @pytest.mark.parametrize("task", every_task())
-def test_facts_of_tasks_have_kinds_and_are_about_the_objects_of_their_kinds(task):
+def test_facts_in_tasks_are_about_objects_that_their_kind_allows(task):
+    """*Picked* is about a cube or a tape, and has no place; *over* has a place."""
     for index in range(8):
         episode = get_episode(task, "test", index)
         stages = (*episode.demonstration, *episode.stages)
@@ -58,7 +60,7 @@ def test_facts_of_tasks_have_kinds_and_are_about_the_objects_of_their_kinds(task
 
 
 @pytest.mark.parametrize("kind", FACT_TRAITS)
-def test_words_of_a_fact_name_what_its_traits_declare(kind):
+def test_the_words_of_a_kind_of_fact_name_its_subject_and_place(kind):
     traits = FACT_TRAITS[kind]
     assert traits.holds_while
 
@@ -68,7 +70,7 @@ def test_words_of_a_fact_name_what_its_traits_declare(kind):
     assert (traits.role is FactRole.STATE) <= (not traits.grips)
 
 
-def test_an_unknown_kind_in_a_record_is_called_by_its_name():
+def test_an_unknown_kind_of_fact_is_shown_by_its_name():
     assert fact_words(Fact("turned_over", "cup")) == "cup turned over"
     assert not Fact("turned_over", "cup").traits.lasts
 
@@ -79,7 +81,7 @@ TOPPLED = Fact("toppled", "pillar")
 
 
 @pytest.fixture
-def toppled(monkeypatch: pytest.MonkeyPatch) -> FactTraits:
+def registered_toppled(monkeypatch: pytest.MonkeyPatch) -> FactTraits:
     monkeypatch.setattr(fact_traits, "_TRAITS", added := dict(FACT_TRAITS))
     monkeypatch.setattr(fact_traits, "FACT_TRAITS", added)
     traits = FactTraits(
@@ -99,20 +101,22 @@ def toppled(monkeypatch: pytest.MonkeyPatch) -> FactTraits:
     return traits
 
 
-def stage(expects: Fact, *forbids: Fact | Rule) -> Stage:
+def stage_that_expects(expects: Fact, *forbids: Fact | Rule) -> Stage:
     return Stage(expects, Primitive("hold", "robot"), "leave the pillar alone", forbids)
 
 
-def test_a_kind_from_outside_is_judged(toppled):
+def test_a_registered_kind_of_fact_can_be_forbidden_and_is_judged(registered_toppled):
+    """The stage expects the robot at home, and forbids that the pillar is knocked over."""
     pillar = SceneObject("pillar", "pillar", Point(0.0, 0.0, 0.05), color="red")
-    judge = Judge([stage(Fact("home", "robot"), TOPPLED)], Scene((pillar,)))
+    judge = Judge([stage_that_expects(Fact("home", "robot"), TOPPLED)], Scene((pillar,)))
 
     judge.update(0, frozenset([TOPPLED]))
 
     assert judge.cause == "knocked the red pillar over; expected: leave the pillar alone"
 
 
-def test_a_kind_from_outside_is_described(toppled):
+def test_a_registered_kind_of_fact_is_described_in_the_words_it_brings(registered_toppled):
+    """*Toppled* brings "knocked {subject} over" for events and "knocked over" for a state."""
     event = EventRecord(step=3, kind="toppled", subject="pillar", place=None, holds=True)
 
     assert fact_words(TOPPLED) == "pillar knocked over"
@@ -121,22 +125,29 @@ def test_a_kind_from_outside_is_described(toppled):
     assert event_text(over, {}) == "knocked pillar over; this no longer holds"
 
 
-def test_a_kind_from_outside_is_attributed_by_its_traits(toppled):
-    plan = [stage(Fact("picked", "cube")), stage(TOPPLED)]
+def test_a_failure_by_a_registered_kind_of_fact_is_named_by_its_role(registered_toppled):
+    """*Toppled* has the role of a press: done when something else is due, it is a wrong count."""
+    plan = [stage_that_expects(Fact("picked", "cube")), stage_that_expects(TOPPLED)]
     assert classify_grounding_error(TOPPLED, plan, 0) == "wrong_count"
 
     carried = Fact("over", "cube", "target_left")  # ends no task, as a press does
-    assert classify_grounding_error(carried, [*plan, stage(carried)], 0) == "wrong_order"
+    assert (
+        classify_grounding_error(carried, [*plan, stage_that_expects(carried)], 0) == "wrong_order"
+    )
 
 
-def test_a_kind_is_registered_again_only_under_its_own_name(toppled):
-    register_fact_kind("toppled", toppled)
+def test_registering_a_kind_of_fact_under_a_taken_name_is_refused(registered_toppled):
+    """Registering the same kind again is allowed, *picked* is one of ours."""
+    register_fact_kind("toppled", registered_toppled)
     with pytest.raises(InvalidValueError, match="already a kind of fact 'picked'"):
-        register_fact_kind("picked", toppled)
+        register_fact_kind("picked", registered_toppled)
 
 
 @pytest.mark.sim
-def test_kinds_of_fact_and_object_from_outside_are_simulated(toppled, monkeypatch):
+def test_a_registered_kind_of_object_is_built_and_its_kind_of_fact_detected(
+    registered_toppled, monkeypatch
+):
+    """A pillar counts as toppled once its center has been beyond x = 0.05, and for ever."""
     from sapien.wrapper.actor_builder import ActorBuilder
 
     from roboirg.simulation import bodies, fact_detection

@@ -8,14 +8,16 @@ from hypothesis import strategies as st
 from roboirg.core.conditions import All, Elapsed, Fact, FactCount, OccurrenceCount, absent
 from roboirg.judging.fact_history import FactHistory
 
-A = Fact("picked", "a")
-B = Fact("picked", "b")
-C = Fact("pressed", "button")
-courses = st.lists(st.frozensets(st.sampled_from([A, B, C])), min_size=1, max_size=15)
+PICKED_A = Fact("picked", "a")
+PICKED_B = Fact("picked", "b")
+PRESSED = Fact("pressed", "button")
+lists_of_simultaneous_facts = st.lists(
+    st.frozensets(st.sampled_from([PICKED_A, PICKED_B, PRESSED])), min_size=1, max_size=15
+)
 bounds = st.integers(0, 4)
 
 
-def followed(course):
+def history_of(course):
     history = FactHistory()
     for step, facts in enumerate(course):
         history.update(step, facts)
@@ -23,34 +25,42 @@ def followed(course):
 
 
 @settings(max_examples=60)
-@given(courses, bounds, st.none() | bounds)
-def test_counts_are_of_now(course, least, most):
-    now = sum(fact in course[-1] for fact in (A, B))
+@given(lists_of_simultaneous_facts, bounds, st.none() | bounds)
+def test_fact_count_counts_which_facts_hold_at_the_last_step(course, least, most):
+    """`least` and `most` are bounds of the count; None is no bound."""
+    now = sum(fact in course[-1] for fact in (PICKED_A, PICKED_B))
     wanted = now >= least and (most is None or now <= most)
-    assert followed(course).holds(FactCount((A, B), least, most)) == wanted
+    assert history_of(course).holds(FactCount((PICKED_A, PICKED_B), least, most)) == wanted
 
 
 @settings(max_examples=60)
-@given(courses, st.integers(1, 4), st.none() | st.integers(0, 15))
-def test_beginnings_are_counted_as_they_happen(course, least, until):
+@given(lists_of_simultaneous_facts, st.integers(1, 4), st.none() | st.integers(0, 15))
+def test_occurrence_count_counts_how_often_facts_have_begun_to_hold(course, least, until):
+    """Up to the step `until`, if there is one."""
     considered = course if until is None else course[: until + 1]
     begun = 0
     for before, now in itertools.pairwise([frozenset(), *considered]):
-        begun += sum(fact in now - before for fact in (A, C))
+        begun += sum(fact in now - before for fact in (PICKED_A, PRESSED))
 
-    assert followed(course).holds(OccurrenceCount((A, C), least, until)) == (begun >= least)
+    assert history_of(course).holds(OccurrenceCount((PICKED_A, PRESSED), least, until)) == (
+        begun >= least
+    )
 
 
 @settings(max_examples=60)
-@given(courses)
+@given(lists_of_simultaneous_facts)
 def test_a_fact_and_its_absence_exclude_each_other(course):
-    history = followed(course)
-    assert history.holds(A) != history.holds(absent(A))
-    assert history.holds(All((A, B))) == (history.holds(A) and history.holds(B))
-    assert not history.holds(All((A, absent(A))))
+    """`absent(fact)` is the condition that a fact does not hold, `All` that several do."""
+    history = history_of(course)
+    assert history.holds(PICKED_A) != history.holds(absent(PICKED_A))
+    assert history.holds(All((PICKED_A, PICKED_B))) == (
+        history.holds(PICKED_A) and history.holds(PICKED_B)
+    )
+    assert not history.holds(All((PICKED_A, absent(PICKED_A))))
 
 
-def test_time_is_counted_from_reset_or_from_a_timer_that_starts_once():
+def test_elapsed_time_counts_from_the_reset_or_from_the_first_start_of_a_timer():
+    """Ten steps, 0 to 9; the timer is started at step 3 and again, without effect, at step 5."""
     history = FactHistory()
     assert not history.holds(Elapsed(0, timer="pick"))
 

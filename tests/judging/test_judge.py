@@ -12,59 +12,85 @@ from roboirg.judging.judge import describe_object
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 
-A = Fact("picked", "a")
-B = Fact("placed", "a", "target")
-BAD = Fact("pressed", "button")
+PICKED = Fact("picked", "a")
+PLACED = Fact("placed", "a", "target")
+PRESSED = Fact("pressed", "button")
 
 
-def stage(expects: Fact, *forbids: Fact, lasting: int = 0) -> Stage:
+def stage_with_facts(expects: Fact, *forbids: Fact, lasting: int = 0) -> Stage:
     primitive = Primitive("press", expects.subject)
     return Stage(expects, primitive, "do {at} it", forbids, points_at="a", lasting=lasting)
 
 
-def test_stages_complete_in_order():
-    judge = judged([stage(A, BAD), stage(B, BAD)], None, [], [A], [A], [B])
+def test_doing_what_each_stage_expects_in_order_is_a_success():
+    """A stage has the fact that it expects, then those that it
+    forbids; each list holds the facts of one control step."""
+    judge = judged(
+        [stage_with_facts(PICKED, PRESSED), stage_with_facts(PLACED, PRESSED)],
+        None,
+        [],
+        [PICKED],
+        [PICKED],
+        [PLACED],
+    )
     assert judge.status is Status.SUCCESS
     assert judge.cause is None
 
 
-def test_a_later_stage_does_not_complete_early():
-    assert judged([stage(A), stage(B)], None, [B]).index == 0
+def test_doing_what_the_second_stage_expects_does_not_complete_the_first():
+    """Two stages, and one control step in which the fact that the second one expects holds."""
+    assert judged([stage_with_facts(PICKED), stage_with_facts(PLACED)], None, [PLACED]).index == 0
 
 
-def test_an_evaluation_ends_one_stage_at_most():
-    judge = judged([stage(A), stage(A)], None, [A])
+def test_one_control_step_completes_at_most_one_stage():
+    """Both stages expect the same fact, which holds in two steps."""
+    judge = judged([stage_with_facts(PICKED), stage_with_facts(PICKED)], None, [PICKED])
     assert (judge.index, judge.status) == (1, Status.ONGOING)
 
-    judge.update(1, frozenset([A]))
+    judge.update(1, frozenset([PICKED]))
     assert judge.status is Status.SUCCESS
 
 
-def test_what_is_forbidden_counts_before_what_is_expected():
-    judge = judged([stage(A, BAD)], None, [A, BAD])
+def test_a_forbidden_fact_fails_even_if_the_expected_one_holds_too():
+    """The stage expects a pick and forbids a press; both happen in the same step."""
+    judge = judged([stage_with_facts(PICKED, PRESSED)], None, [PICKED, PRESSED])
     assert judge.status is Status.FAILURE
     assert judge.cause == "pressed button; expected: do it"
 
 
-def test_what_ends_a_stage_is_not_held_against_the_next_in_the_same_step():
+def test_a_fact_that_completes_a_stage_may_be_forbidden_by_the_next_one():
+    """A stage has the fact that it expects, then those that it forbids. The
+    fact has one step to go away; if it still holds then, the episode fails."""
     # The cube is picked, which the next stage forbids; it is gone by the next evaluation.
-    judge = judged([stage(A), stage(B, A)], None, [A], [B])
+    judge = judged(
+        [stage_with_facts(PICKED), stage_with_facts(PLACED, PICKED)], None, [PICKED], [PLACED]
+    )
     assert judge.status is Status.SUCCESS
-    assert judged([stage(A), stage(B, A)], None, [A], [A]).status is Status.FAILURE
+    assert (
+        judged(
+            [stage_with_facts(PICKED), stage_with_facts(PLACED, PICKED)],
+            None,
+            [PICKED],
+            [PICKED],
+        ).status
+        is Status.FAILURE
+    )
 
 
-def test_verdicts_are_final():
-    judge = judged([stage(A, BAD)], None, [BAD], [A])
+def test_a_verdict_never_changes():
+    """The stage expects a pick and forbids a press; the other one comes a step later."""
+    judge = judged([stage_with_facts(PICKED, PRESSED)], None, [PRESSED], [PICKED])
     judge.fail("too late")
     assert (judge.status, judge.cause) == (Status.FAILURE, "pressed button; expected: do it")
 
-    judge = judged([stage(A, BAD)], None, [A], [BAD])
+    judge = judged([stage_with_facts(PICKED, PRESSED)], None, [PICKED], [PRESSED])
     assert judge.status is Status.SUCCESS
 
 
-def test_lasting_stages_count_from_the_first_evaluation_and_start_again():
+def test_a_stage_that_has_to_last_starts_again_after_an_interruption():
+    """The robot has to be still for three steps after the first one that shows it."""
     still = Fact("still", "robot")
-    watch = [stage(still, lasting=3)]
+    watch = [stage_with_facts(still, lasting=3)]
     assert judged(watch, None, *[[still]] * 3).status is Status.ONGOING
     assert judged(watch, None, *[[still]] * 4).status is Status.SUCCESS
 
@@ -73,11 +99,12 @@ def test_lasting_stages_count_from_the_first_evaluation_and_start_again():
     assert judged(watch, None, *interrupted, [still]).status is Status.SUCCESS
 
 
-facts = st.frozensets(st.sampled_from([A, B, BAD, Fact("still", "robot")]))
+facts = st.frozensets(st.sampled_from([PICKED, PLACED, PRESSED, Fact("still", "robot")]))
 
 
 @given(st.lists(facts, max_size=20))
-def test_events_tell_the_same_story_as_the_facts(history):
+def test_the_facts_of_every_step_can_be_rebuilt_from_the_events(history):
+    """An event is a change: a fact begins or ceases to hold."""
     before: frozenset[Fact] = frozenset()
     rebuilt: set[Fact] = set()
     for step, now in enumerate(history):
@@ -90,7 +117,8 @@ def test_events_tell_the_same_story_as_the_facts(history):
 
 @pytest.mark.parametrize("task", every_task())
 @pytest.mark.parametrize("index", range(4))
-def test_every_forbidden_fact_of_every_stage_fails(task, index):
+def test_each_fact_that_a_task_forbids_fails_its_stage_with_a_cause(task, index):
+    """Rules that are more than a fact are tested for each task elsewhere."""
     episode = get_episode(task, "test", index)
     for number, stage in enumerate(episode.stages):
         for wrong in stage.forbids:

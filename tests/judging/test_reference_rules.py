@@ -17,76 +17,89 @@ HOME = Fact("home", "robot")
 TOO_EARLY = "pressed the button too early; expected: "
 
 
-def sample(task, difficulty):
+def scene_and_goal(task, difficulty):
     """Scene and goal of the first seed that gives one."""
     return next(drawn_scenes(task.name, difficulty))
 
 
-def make(task, difficulty="medium", goal=None):
+def episode_of(task, difficulty="medium", goal=None):
     """An episode for the goal of its scene, or another."""
-    scene, own = sample(task, difficulty)
+    scene, own = scene_and_goal(task, difficulty)
     goal = goal or own
     stages = task.stages(scene, goal)
     shown = task.demonstration(scene)
     return Episode(task.name, "test", 0, 0, difficulty, scene, goal, stages, shown)
 
 
-def judge_of(episode, *steps):
+def judged_after(episode, *steps):
     return judged(episode.stages, episode.scene, *steps)
 
 
-def verdict(episode, *steps):
-    return judge_of(episode, *steps).status
+def status_after(episode, *steps):
+    return judged_after(episode, *steps).status
 
 
 # VideoRepick
 
 
-def repick(repeats, difficulty="medium"):
-    episode = make(VIDEO_REPICK, difficulty, Goal.of(repeats=repeats))
+def repick_episode_and_facts(repeats, difficulty="medium"):
+    episode = episode_of(VIDEO_REPICK, difficulty, Goal.of(repeats=repeats))
     target = episode.scene.past[0].subject
     return episode, Fact("picked", target), Fact("lying", target)
 
 
 @pytest.mark.parametrize("repeats", [1, 2, 3])
-def test_repick_as_often_as_wanted_then_press(repeats):
-    episode, picked, lying = repick(repeats)
+def test_repick_succeeds_after_the_wanted_number_of_picks_and_a_press(repeats):
+    """Each list holds the facts of one step: the cube
+    lies, is picked up, is in the air, lies again."""
+    episode, picked, lying = repick_episode_and_facts(repeats)
     cycle = [[lying], [picked], [], [lying]]
 
-    assert verdict(episode, *cycle * repeats, [lying, PRESSED]) is Status.SUCCESS
-    assert verdict(episode, *cycle * repeats) is Status.ONGOING
+    assert status_after(episode, *cycle * repeats, [lying, PRESSED]) is Status.SUCCESS
+    assert status_after(episode, *cycle * repeats) is Status.ONGOING
 
 
 @pytest.mark.parametrize("done", [0, 1, 2, 3, 4])
 def test_repick_of_any_other_cube_fails_at_any_time(done):
-    episode, picked, lying = repick(2, "hard")
+    """`done` is how many of the four stages (pick and put down, twice) are complete before."""
+    episode, picked, lying = repick_episode_and_facts(2, "hard")
     start = [[picked], [lying], [picked], [lying]][:done]
     others = {cube.name for cube in episode.scene.of_kind("cube")} - {picked.subject}
 
     for other in others:
-        judge = judge_of(episode, *start, [Fact("picked", other)])
+        judge = judged_after(episode, *start, [Fact("picked", other)])
         assert (judge.index, judge.status) == (done, Status.FAILURE)
-        assert verdict(episode, *start, [Fact("lying", other)]) is Status.ONGOING
+        assert status_after(episode, *start, [Fact("lying", other)]) is Status.ONGOING
 
 
-def test_repick_dropping_and_grasping_again_counts_as_what_it_is():
-    episode, picked, lying = repick(1)
+def test_repick_counts_a_cube_that_was_let_go_as_put_down():
+    """Each list holds the facts of one step. In the
+    air, neither picked nor lying, nothing happens."""
+    episode, picked, lying = repick_episode_and_facts(1)
     # Held low or in the air, neither picked nor lying: nothing happens.
-    assert verdict(episode, [picked], [], [], [picked], [lying], [PRESSED]) is Status.SUCCESS
+    assert status_after(episode, [picked], [], [], [picked], [lying], [PRESSED]) is Status.SUCCESS
 
-    episode, picked, lying = repick(2)
+    episode, picked, lying = repick_episode_and_facts(2)
     # Let go is put down, wherever that is: the next lift is the second one.
     steps = [[picked], [lying], [picked], [lying], [PRESSED]]
-    assert verdict(episode, *steps) is Status.SUCCESS
+    assert status_after(episode, *steps) is Status.SUCCESS
 
 
-WINDOW = [(0, False), (49, False), (50, True), (51, True), (500, True), (501, False), (900, False)]
+PRESS_TIMES = [
+    (0, False),
+    (49, False),
+    (50, True),
+    (51, True),
+    (500, True),
+    (501, False),
+    (900, False),
+]
 PICK = "pick up the correct cube for the first time"
 DOWN = "put it down"
 AGAIN = "pick up the correct cube for the second time"
 
 
-@pytest.mark.parametrize(("elapsed", "fails"), WINDOW)
+@pytest.mark.parametrize(("elapsed", "fails"), PRESS_TIMES)
 @pytest.mark.parametrize(
     ("steps", "index", "start", "due"),
     [
@@ -98,10 +111,14 @@ AGAIN = "pick up the correct cube for the second time"
         (["picked", "lying", "picked"], 3, 1, DOWN),
     ],
 )
-def test_a_press_before_its_stage_is_over_fails_repick(steps, index, start, due, elapsed, fails):
-    episode, picked, lying = repick(2)
+def test_pressing_the_button_during_a_repick_stage_fails_from_50_to_500_steps(
+    steps, index, start, due, elapsed, fails
+):
+    """A press is punished 50 to 500 steps after the timer of the current stage has started;
+    `start` is the step of that, `index` the stage, and `due` what the cause names as expected."""
+    episode, picked, lying = repick_episode_and_facts(2)
     facts = {"": [], "picked": [picked], "lying": [lying]}
-    judge = judge_of(episode, *(facts[step] for step in steps))
+    judge = judged_after(episode, *(facts[step] for step in steps))
 
     judge.update(start + elapsed, frozenset([PRESSED]))
 
@@ -112,15 +129,16 @@ def test_a_press_before_its_stage_is_over_fails_repick(steps, index, start, due,
         assert (judge.status, judge.cause) == (Status.ONGOING, None)
 
 
-def test_repick_timers_do_not_start_with_the_video():
-    episode, picked, lying = repick(1)
+def test_the_time_in_which_a_press_is_ignored_starts_after_the_video():
+    """A press is ignored for the first 50 steps of the policy's turn; the video is longer."""
+    episode, picked, lying = repick_episode_and_facts(1)
     judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
     step = 0
     while judge.index < len(episode.demonstration):
         judge.update(step, frozenset([lying if step else picked, STILL, HOME]))
         step += 1
 
-    assert step > 100
+    assert step > 100  # the video alone is longer than the 50 steps
     for elapsed in (0, 49):
         judge.update(step + elapsed, frozenset([PRESSED]))
         assert judge.status is Status.ONGOING
@@ -129,19 +147,21 @@ def test_repick_timers_do_not_start_with_the_video():
     assert judge.status is Status.FAILURE
 
 
-def test_repick_press_that_is_ignored_does_not_count():
-    episode, picked, lying = repick(1)
-    assert verdict(episode, [PRESSED], [picked], [lying]) is Status.ONGOING
-    assert verdict(episode, [PRESSED], [picked], [lying], [PRESSED]) is Status.SUCCESS
+def test_a_press_before_the_repick_does_not_replace_the_one_after_it():
+    """The task is to pick a cube up once more and to
+    press the button; early presses are ignored."""
+    episode, picked, lying = repick_episode_and_facts(1)
+    assert status_after(episode, [PRESSED], [picked], [lying]) is Status.ONGOING
+    assert status_after(episode, [PRESSED], [picked], [lying], [PRESSED]) is Status.SUCCESS
 
 
 # VideoPlaceButton and VideoPlaceOrder
 
 
 PLACE_EPISODES = [
-    make(task, "hard", goal)
+    episode_of(task, "hard", goal)
     for task in (VIDEO_PLACE_BUTTON, VIDEO_PLACE_ORDER)
-    for goal in task.goals(sample(task, "hard")[0])
+    for goal in task.goals(scene_and_goal(task, "hard")[0])
 ]
 """Every goal of a scene with three cubes and four discs, in either task."""
 
@@ -152,7 +172,7 @@ every_place_goal = pytest.mark.parametrize(
 )
 
 
-def place_facts(episode):
+def right_pick_and_right_place(episode):
     cube = f"cube_{episode.goal.text('color')}"
     visits = [fact.place for fact in episode.scene.past if fact.kind == "placed"]
     if episode.task == "VideoPlaceButton":
@@ -163,46 +183,50 @@ def place_facts(episode):
 
 
 @every_place_goal
-def test_a_place_task_is_done_by_a_pick_and_the_right_place(episode):
-    picked, placed = place_facts(episode)
+def test_a_place_task_needs_the_right_cube_picked_and_then_placed_on_the_right_disc(episode):
+    """Each list holds the facts of one step; discs are targets on the table."""
+    picked, placed = right_pick_and_right_place(episode)
     lying = Fact("lying", picked.subject)
 
-    assert verdict(episode, [lying], [picked], [], [placed, lying]) is Status.SUCCESS
-    assert verdict(episode, [placed]) is Status.ONGOING
-    assert verdict(episode, [picked]) is Status.ONGOING
+    assert status_after(episode, [lying], [picked], [], [placed, lying]) is Status.SUCCESS
+    assert status_after(episode, [placed]) is Status.ONGOING
+    assert status_after(episode, [picked]) is Status.ONGOING
 
 
 @every_place_goal
-def test_place_on_any_other_disc_fails_even_together_with_the_right_one(episode):
-    picked, placed = place_facts(episode)
+def test_placing_the_right_cube_on_a_wrong_disc_fails(episode):
+    """Discs are targets on the table. Before it is picked up, the cube may be on any."""
+    picked, placed = right_pick_and_right_place(episode)
     others = {disc.name for disc in episode.scene.of_kind("target")} - {placed.place}
     for other in others:
         wrong = Fact("placed", picked.subject, other)
-        assert verdict(episode, [picked], [], [wrong]) is Status.FAILURE
-        assert verdict(episode, [picked], [placed, wrong]) is Status.FAILURE
+        assert status_after(episode, [picked], [], [wrong]) is Status.FAILURE
+        assert status_after(episode, [picked], [placed, wrong]) is Status.FAILURE
         # Before it is picked, the cube may be anywhere.
-        assert verdict(episode, [wrong], [picked], [placed]) is Status.SUCCESS
+        assert status_after(episode, [wrong], [picked], [placed]) is Status.SUCCESS
 
 
 @every_place_goal
-def test_place_picking_another_cube_fails_until_the_right_one_is_picked(episode):
-    picked, placed = place_facts(episode)
+def test_picking_another_cube_fails_unless_the_right_one_was_picked_before(episode):
+    """Each list holds the facts of one step."""
+    picked, placed = right_pick_and_right_place(episode)
     others = {cube.name for cube in episode.scene.of_kind("cube")} - {picked.subject}
     for other in others:
         wrong = Fact("picked", other)
-        assert verdict(episode, [wrong]) is Status.FAILURE
-        assert verdict(episode, [wrong, picked]) is Status.FAILURE
-        assert verdict(episode, [picked], [wrong], [placed]) is Status.SUCCESS
+        assert status_after(episode, [wrong]) is Status.FAILURE
+        assert status_after(episode, [wrong, picked]) is Status.FAILURE
+        assert status_after(episode, [picked], [wrong], [placed]) is Status.SUCCESS
         elsewhere = Fact("placed", other, "target_3")
-        assert verdict(episode, [elsewhere], [picked], [elsewhere, placed]) is Status.SUCCESS
+        assert status_after(episode, [elsewhere], [picked], [elsewhere, placed]) is Status.SUCCESS
 
 
 @every_place_goal
-def test_place_press_drop_and_site_do_not_matter(episode):
-    picked, placed = place_facts(episode)
+def test_in_a_place_task_presses_drops_and_the_marked_site_are_ignored(episode):
+    """The site is a mark on the table that is no target."""
+    picked, placed = right_pick_and_right_place(episode)
     lying = Fact("lying", picked.subject)
     site = Fact("placed", picked.subject, "site")
     steps = [[PRESSED, site, lying], [picked], [PRESSED], [lying], [lying, site], [picked]]
 
-    assert verdict(episode, *steps) is Status.ONGOING
-    assert verdict(episode, *steps, [placed, PRESSED]) is Status.SUCCESS
+    assert status_after(episode, *steps) is Status.ONGOING
+    assert status_after(episode, *steps, [placed, PRESSED]) is Status.SUCCESS

@@ -40,7 +40,8 @@ def random_events(episode: Episode, rng: np.random.Generator) -> list[Event]:
 
 
 @pytest.mark.parametrize("task", all_tasks())
-def test_judging_again_agrees_with_an_evaluation_of_every_step(task):
+def test_judging_stored_events_gives_the_verdict_of_judging_every_step(task):
+    """Records store events only; judging them again skips the steps without any."""
     rng = np.random.default_rng(3)
     ends = set()
 

@@ -20,12 +20,16 @@ from roboirg.tasks.splits.splits import get_episode, make_episode
 TASKS = tuple(all_tasks())
 
 
-def options_of(episode: Episode) -> list[InstructionOptions]:
+def options_of_each_setting_of(episode: Episode) -> list[InstructionOptions]:
     return [InstructionOptions(name) for name in expressible(episode)]
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_other_goals_take_as_many_picks_and_none_begins_the_other(task):
+def test_goals_for_the_wrong_goal_control_need_as_many_picks_as_the_right_goal(task):
+    """A control run commands another goal of the same scene; `other_goals` lists the choices.
+
+    If one plan began with the other, success at one goal would come along with the other.
+    """
     for index in range(50):
         episode = get_episode(task, "test", index)
         found = other_goals(episode)
@@ -33,17 +37,18 @@ def test_other_goals_take_as_many_picks_and_none_begins_the_other(task):
         assert set(found) <= set(get_task(task).goals(episode.scene))
         for goal in found:
             stages = with_goal(episode, goal).stages
-            assert picks_in(stages) == picks_in(episode.stages)
+            assert number_of_picks(stages) == number_of_picks(episode.stages)
             assert not begins_with(stages, episode.stages)
             assert not begins_with(episode.stages, stages)
 
 
-def picks_in(stages):
+def number_of_picks(stages):
     """Return how many stages pick something up."""
     return sum(stage.primitive.kind in {"pick_cube", "pick_container"} for stage in stages)
 
 
-def test_the_other_goal_is_drawn_evenly_and_not_by_the_words():
+def test_the_wrong_goal_of_a_control_run_is_drawn_evenly_over_600_seeds():
+    """A StopCube goal names one of four visits; the control commands one of the other three."""
     counts: Counter[tuple[int, int]] = Counter()
     for seed in range(600):
         episode = make_episode("StopCube", seed, "easy")
@@ -52,12 +57,15 @@ def test_the_other_goal_is_drawn_evenly_and_not_by_the_words():
         assert drawn is not None
         counts[episode.goal.number("visit"), drawn.number("visit")] += 1
 
+    # 600 seeds: 50 of each pair on average.
     assert len(counts) == 12  # each of four visits, with each of the other three
     assert min(counts.values()) > 25
     assert max(counts.values()) < 80
 
 
-def test_a_scene_without_another_goal_says_so():
+def test_a_scene_with_one_goal_has_no_command_for_a_wrong_one():
+    """All goals of a VideoRepick scene need different numbers of picks, so none can replace
+    another. A command that states no goal (the control "silent") is still possible."""
     episode = get_episode("VideoRepick", "test", 0)
     assert draw_other_goal(episode) is None
     with pytest.raises(InvalidValueError, match="no other goal"):
@@ -67,11 +75,15 @@ def test_a_scene_without_another_goal_says_so():
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_the_words_of_every_arm_that_states_a_goal_mean_it(task):
+def test_the_words_of_a_control_run_mean_its_goal_and_no_other(task):
+    """Controls ("arms") are another goal of the same scene, or the same goal in other words.
+
+    `understood_goals` computes which goals the words leave; a wrong text would leave another.
+    """
     stated = 0
     for index in (1, 2, 3):
         episode = get_episode(task, "test", index)
-        for options in options_of(episode):
+        for options in options_of_each_setting_of(episode):
             told = instruct_with(episode, options).text
             texts = [told]
             for arm in ("other-goal", "paraphrase-1", "paraphrase-2"):
@@ -94,7 +106,11 @@ def test_the_words_of_every_arm_that_states_a_goal_mean_it(task):
 
 
 @pytest.mark.parametrize("setting", ["explicit", "contextual", "reasoning"])
-def test_told_silent_and_scrambled_words(setting):
+def test_silent_controls_state_no_goal_and_scrambled_ones_shuffle_the_content_words(setting):
+    """An arm is what is said in a control run of an episode: *told* is the usual command.
+
+    *Scrambled* keeps the content words in another order, without articles and the like.
+    """
     episode = get_episode("PickXtimes", "test", 3)
     options = InstructionOptions(setting)
     told = instruct_with(episode, options)
@@ -114,7 +130,8 @@ def test_told_silent_and_scrambled_words(setting):
     assert not scrambled.mentions
 
 
-def test_arms_are_read_by_name_and_anything_else_is_refused():
+def test_names_of_control_runs_are_parsed_and_wrong_names_are_refused():
+    """`paraphrase:3` stands for the first three paraphrases, `paraphrase` for all of them."""
     assert parse_arm("other-goal") == ("other-goal",)
     assert parse_arm("paraphrase:3") == ("paraphrase-1", "paraphrase-2", "paraphrase-3")
     assert len(parse_arm("paraphrase")) == PARAPHRASES

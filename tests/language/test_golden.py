@@ -8,8 +8,8 @@ from language_variants import TASKS, first_episodes
 from roboirg.language import LANGUAGE_VERSION, instruct_with
 from roboirg.language.variants import expressible_options
 
-GOLDEN_VERSION = "4.7.0"
-GOLDEN: dict[str, str] = {
+VERSION_OF_DIGESTS = "4.7.0"
+DIGESTS: dict[str, str] = {
     "PickXtimes": "8ce8590c3b9bf936",
     "StopCube": "ecbc7dfbb52a7d08",
     "SwingXtimes": "1af48e284c7ff049",
@@ -26,7 +26,7 @@ GOLDEN: dict[str, str] = {
 }
 
 
-def digest(task):
+def digest_of_first_instructions(task):
     """A hash of all instructions, with all options, of the first episodes of train and of test."""
     sha = hashlib.sha256()
     for episode in (
@@ -40,9 +40,10 @@ def digest(task):
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_the_words_are_those_of_the_version(task):
-    assert LANGUAGE_VERSION == GOLDEN_VERSION, "new version: put its digests here"
-    assert digest(task) == GOLDEN[task], (
+def test_instructions_change_only_with_the_language_version(task):
+    """Compare a hash of the instructions of the first episodes with the one stored above."""
+    assert LANGUAGE_VERSION == VERSION_OF_DIGESTS, "new version: put its digests here"
+    assert digest_of_first_instructions(task) == DIGESTS[task], (
         "The words (or the scenes) have changed: bump LANGUAGE_VERSION in "
         "roboirg/language/word_sampler.py and put the new digests here."
     )

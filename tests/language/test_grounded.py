@@ -17,13 +17,13 @@ from roboirg.language.settings import settings_of
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 
-GROUNDED = tuple(task for task in TASKS if "grounded" in settings_of(get_task(task)))
+TASKS_WITH_SETTING = tuple(task for task in TASKS if "grounded" in settings_of(get_task(task)))
 SCENES = 60
 OPTIONS = InstructionOptions("grounded")
 
 
 @functools.cache
-def told(task):
+def grounded_instructions(task):
     """The grounded instructions of random scenes with their episodes."""
     return [
         (episode, instruct_with(episode, OPTIONS))
@@ -32,9 +32,13 @@ def told(task):
     ]
 
 
-@pytest.mark.parametrize("task", GROUNDED)
-def test_exactly_the_touched_slots_are_hidden(task):
-    for episode, said in told(task):
+@pytest.mark.parametrize("task", TASKS_WITH_SETTING)
+def test_only_values_that_must_be_seen_are_replaced_by_pointers(task):
+    """In the setting *grounded*, a value of the goal (its slot) is left out and has to be seen.
+
+    The command refers back to it with a word such as *it*: a mention with the role "anaphor".
+    """
+    for episode, said in grounded_instructions(task):
         touched = said.metadata["touched"]
         assert touched
         pointed = {mention.slot for mention in said.mentions if mention.role == "anaphor"}
@@ -43,9 +47,10 @@ def test_exactly_the_touched_slots_are_hidden(task):
         assert row(episode, said)["touched"] == ", ".join(touched)
 
 
-@pytest.mark.parametrize("task", GROUNDED)
-def test_no_thing_is_described_by_a_color(task):
-    for episode, said in told(task):
+@pytest.mark.parametrize("task", TASKS_WITH_SETTING)
+def test_grounded_instructions_never_name_the_hidden_color(task):
+    """The policy has to see which color is meant, so the words about it must not contain one."""
+    for episode, said in grounded_instructions(task):
         colors = [value for value in values_of_goal(episode.goal) if value.slot in COLOR_SLOTS]
         for mention in said.mentions:
             # Of two things the words state one.
@@ -56,13 +61,20 @@ def test_no_thing_is_described_by_a_color(task):
 
 @pytest.mark.parametrize(
     ("task", "slot"),
-    [(task, slot) for task in GROUNDED for slot, _ in get_episode(task, "test", 0).goal.slots],
+    [
+        (task, slot)
+        for task in TASKS_WITH_SETTING
+        for slot, _ in get_episode(task, "test", 0).goal.slots
+    ],
 )
-def test_the_words_do_not_go_with_the_goal(task, slot):
-    """A guess from the description, with hindsight, is hardly better than the commonest value."""
+def test_the_description_of_a_hidden_value_does_not_give_the_value_away(task, slot):
+    """Guess each value from its description by the most frequent pair, with hindsight:
+
+    this must hardly be better than always guessing the value that is most frequent overall.
+    """
     values = defaultdict(Counter)
     prior = Counter()
-    for episode, said in told(task):
+    for episode, said in grounded_instructions(task):
         if slot in said.metadata["touched"]:
             spans = [
                 said.span(mention)
@@ -82,11 +94,13 @@ def test_the_words_do_not_go_with_the_goal(task, slot):
         assert size < 20 or max(group.values()) / size <= expected + room
 
 
-def test_what_has_nothing_to_see_is_refused():
+def test_grounded_instructions_exist_only_where_a_value_can_be_seen():
+    """StopCube has nothing to see. A color can be hidden where there are several (not in easy
+    scenes), and VideoRepick hides only the number of repetitions."""
     assert "grounded" not in settings_of(get_task("StopCube"))
     for task in ("PickXtimes", "SwingXtimes"):
-        for episode, said in told(task):
+        for episode, said in grounded_instructions(task):
             assert said.metadata["touched"] == ["color"]
             assert episode.difficulty != "easy"
-    for _, said in told("VideoRepick"):
+    for _, said in grounded_instructions("VideoRepick"):
         assert said.metadata["touched"] == ["repeats"]

@@ -63,7 +63,7 @@ def cubes(places, button=(-0.2, 0.0), target=(0.0, 0.1)):
     return Scene((*fixtures, *things))
 
 
-def meant(scene, thing, target, frame="robot"):
+def landmarks_of(scene, thing, target, frame="robot"):
     """The landmarks that single out a thing."""
     return [
         selector.landmark
@@ -72,13 +72,17 @@ def meant(scene, thing, target, frame="robot"):
     ]
 
 
-def phrases(scene, target, thing="container", frame="robot"):
-    return {selector.phrase for selector in meant(scene, thing, scene[target], frame)}
+def phrases_that_select(scene, target, thing="container", frame="robot"):
+    return {selector.phrase for selector in landmarks_of(scene, thing, scene[target], frame)}
 
 
 @pytest.mark.parametrize("frame", FRAMES)
 @pytest.mark.parametrize("task", SPATIAL_TASKS)
-def test_published_scenes_can_be_told_by_places(task, frame):
+def test_in_published_scenes_words_of_place_single_out_a_goal_object(task, frame):
+    """A landmark phrase, such as *closest to the button*, selects one object or none.
+
+    In each scene at least one cube (or its container) of the goal's colors must be selectable.
+    """
     for split, index in itertools.product(SPLITS, range(FRAMES.index(frame), 100, 7)):
         found = published_episode(task, split, index)
         if found is None:
@@ -100,11 +104,13 @@ def slot_colors(goal):
 
 @settings(max_examples=40)
 @given(PLACES)
-def test_extremes_win_by_the_margin(places):
+def test_a_superlative_is_used_only_if_it_is_true_by_the_margin(places):
+    """*Farthest to your left* is said of a container only if every other one is at least `MARGIN`
+    less far to the left; the robot's left is positive y, and far from it is positive x."""
     scene = containers(places)
     for index, (x, y) in enumerate(places):
         others = [*places[:index], *places[index + 1 :]]
-        found = phrases(scene, f"container_{index}")
+        found = phrases_that_select(scene, f"container_{index}")
         holds = {
             "farthest to your left": all(y - left >= MARGIN for _, left in others),
             "farthest to your right": all(left - y >= MARGIN for _, left in others),
@@ -116,43 +122,50 @@ def test_extremes_win_by_the_margin(places):
             assert (phrase in found) == holds[phrase], phrase
 
 
-def test_a_single_candidate_is_every_extreme():
+def test_every_superlative_applies_to_a_single_cube():
     scene = cubes([(0.0, 0.0)])
-    assert phrases(scene, "cube_red", "cube") >= EXTREMES | FAR_SIDES
+    assert phrases_that_select(scene, "cube_red", "cube") >= EXTREMES | FAR_SIDES
 
 
-ROW = [(0.0, y) for y in (-0.16, -0.08, 0.0, 0.08, 0.16)]
-TIED = [(0.0, 0.1), (0.1, 0.1), (0.05, -0.1)]
-SIDES = [(0.0, 0.15), (0.0, -0.15)]
-ENDS = [(-0.15, 0.0), (0.15, 0.0)]
+FIVE_IN_A_ROW = [(0.0, y) for y in (-0.16, -0.08, 0.0, 0.08, 0.16)]
+TWO_EQUALLY_FAR_LEFT = [(0.0, 0.1), (0.1, 0.1), (0.05, -0.1)]
+ONE_LEFT_ONE_RIGHT = [(0.0, 0.15), (0.0, -0.15)]
+ONE_NEAR_ONE_FAR = [(-0.15, 0.0), (0.15, 0.0)]
 
 
 @pytest.mark.parametrize(
     ("places", "index", "frame", "words"),
     [
         # Ties have no landmark of that direction.
-        (TIED, 0, "robot", {"closest to you"}),
-        (TIED, 2, "robot", {"farthest to your right", "at your far right"}),
-        (ROW, 2, "robot", {"third from your left", "third from your right"}),
-        (ROW, 3, "robot", {"second from your left"}),
+        (TWO_EQUALLY_FAR_LEFT, 0, "robot", {"closest to you"}),
+        (TWO_EQUALLY_FAR_LEFT, 2, "robot", {"farthest to your right", "at your far right"}),
+        (FIVE_IN_A_ROW, 2, "robot", {"third from your left", "third from your right"}),
+        (FIVE_IN_A_ROW, 3, "robot", {"second from your left"}),
         # Left is mirrored for the camera; near and far are the robot's in both frames.
-        (SIDES, 0, "robot", {"farthest to your left", "at your far left"}),
-        (SIDES, 0, "camera", {"farthest to the camera's right"}),
-        (ENDS, 0, "robot", {"closest to you"}),
-        (ENDS, 0, "camera", {"closest to the robot"}),
+        (ONE_LEFT_ONE_RIGHT, 0, "robot", {"farthest to your left", "at your far left"}),
+        (ONE_LEFT_ONE_RIGHT, 0, "camera", {"farthest to the camera's right"}),
+        (ONE_NEAR_ONE_FAR, 0, "robot", {"closest to you"}),
+        (ONE_NEAR_ONE_FAR, 0, "camera", {"closest to the robot"}),
     ],
 )
-def test_the_simplest_words_of_a_place(places, index, frame, words):
-    assert phrases(containers(places), f"container_{index}", frame=frame) >= words
+def test_examples_of_phrases_for_the_place_of_a_container(places, index, frame, words):
+    """`places` are points (x, y) in meters: x points away from the robot, y to its left.
+
+    Words for the camera mirror left and right, since it looks back at the robot.
+    """
+    assert phrases_that_select(containers(places), f"container_{index}", frame=frame) >= words
 
 
-def test_a_far_side_is_said_where_it_is_no_other_corner():
+def test_at_your_far_right_is_not_said_of_a_thing_in_the_near_right_corner():
+    """*At your far right* could be heard as the far corner; container_1 is in the near one."""
     scene = containers([(0.1, 0.0), (-0.2, -0.15)])
-    assert "farthest to your right" in phrases(scene, "container_1")
-    assert "at your far right" not in phrases(scene, "container_1")  # perhaps the far corner
+    assert "farthest to your right" in phrases_that_select(scene, "container_1")
+    assert "at your far right" not in phrases_that_select(
+        scene, "container_1"
+    )  # perhaps the far corner
 
 
-def test_things_in_the_middle_of_a_row_are_told_by_a_higher_rank():
+def test_the_middle_one_of_seven_is_the_fourth_from_either_side():
     scene = containers([(0.0, y) for y in (-0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15)])
     by_rank = {"fourth from your left", "fourth from your right"}
 
@@ -165,7 +178,10 @@ def test_things_in_the_middle_of_a_row_are_told_by_a_higher_rank():
 
 @pytest.mark.parametrize("count", [3, 4, 6])
 def test_a_place_has_these_words_and_no_others(count, snapshot):
-    """A rank too many or too few, or a class left out, shows in no text as long as others do."""
+    """The full list of phrases for 3, 4 and 6 objects, compared with a stored one.
+
+    A phrase that is lost or added changes no published text as long as others can be said.
+    """
     places = [(-0.15, 0.02), (0.12, -0.14), (0.04, 0.16), (-0.05, -0.09), (0.16, 0.07), (0.0, 0.0)]
     thing = "container" if count > len(COLORS) else "cube"
     scene = with_button(places[:count], (-0.2, 0)) if thing == "container" else cubes(places)
@@ -186,7 +202,8 @@ def selected(scene):
     return {words: item for words, item in found.items() if item is not None}
 
 
-def test_sides_of_the_camera_are_those_of_its_picture():
+def test_left_and_right_of_the_camera_follow_its_picture_and_not_the_table():
+    """Perspective: a thing farther to the side appears nearer to the middle if it is far away."""
     # The second one stands farther to the side, but so far from the camera that the picture shows
     # it farther in.
     near_camera = (0.2, 0.135)
@@ -194,12 +211,17 @@ def test_sides_of_the_camera_are_those_of_its_picture():
 
     scene = containers([near_camera, far_away])
 
-    assert phrases(scene, "container_1") >= {"farthest to your left"}
-    assert phrases(scene, "container_0", frame="camera") >= {"farthest to the camera's right"}
-    assert "farthest to the camera's right" not in phrases(scene, "container_1", frame="camera")
+    assert phrases_that_select(scene, "container_1") >= {"farthest to your left"}
+    assert phrases_that_select(scene, "container_0", frame="camera") >= {
+        "farthest to the camera's right"
+    }
+    assert "farthest to the camera's right" not in phrases_that_select(
+        scene, "container_1", frame="camera"
+    )
 
 
-def test_a_corner_is_used_only_if_it_does_not_matter_which_one_is_meant():
+def test_a_corner_phrase_is_dropped_if_work_area_and_table_corner_disagree():
+    """A listener may take *your near left corner* for that of the table or of the work area."""
     # Extremes are blocked by ties; seen from the work area's corner (-0.3, 0.25) container_0 is the
     # nearest, seen from the table's (-0.74, 1.20) it is container_1.
     scene = containers([(-0.11, 0.06), (0.0, 0.17), (-0.11, -0.2), (0.0, -0.2), (0.1, 0.17)])
@@ -216,11 +238,12 @@ def test_a_corner_is_used_only_if_it_does_not_matter_which_one_is_meant():
     assert corner.select() is None
 
     clear = containers([(-0.15, 0.15), (-0.15, -0.15), (0.15, 0.15), (0.15, -0.15)])
-    assert words in phrases(clear, "container_0")
+    assert words in phrases_that_select(clear, "container_0")
 
 
 @pytest.mark.parametrize("task", SPATIAL_TASKS)
-def test_the_camera_frame_mixes_no_points_of_view(task):
+def test_places_in_the_camera_frame_never_say_you(task):
+    """The robot is *you*; words from the camera's point of view must not mix in the robot's."""
     options = InstructionOptions("spatial", frame="camera")
     for episode in random_episodes(task, 40):
         if find_refusal(episode, options) is None:
@@ -228,24 +251,29 @@ def test_the_camera_frame_mixes_no_points_of_view(task):
             assert not {"you", "your"} & set(place.split())
 
 
-def test_cubes_that_come_later_are_no_candidates():
+def test_a_cube_that_arrives_later_is_not_compared_with_the_others():
+    """The motion `Away` keeps cube_red off the table for the first 50 steps."""
     scene = cubes([(0.0, 0.15), (0.0, -0.15), (0.1, 0.0)])
     late = Scene(scene.objects, motions=(Away("cube_red", 0, 50),))
 
-    assert phrases(scene, "cube_red", "cube") >= {"farthest to your left", "at your far left"}
-    assert not phrases(late, "cube_red", "cube")
-    assert "farthest to your left" in phrases(late, "cube_blue", "cube")
+    assert phrases_that_select(scene, "cube_red", "cube") >= {
+        "farthest to your left",
+        "at your far left",
+    }
+    assert not phrases_that_select(late, "cube_red", "cube")
+    assert "farthest to your left" in phrases_that_select(late, "cube_blue", "cube")
 
 
-def test_containers_appear_and_are_candidates_all_the_same():
+def test_containers_that_appear_during_the_video_can_be_named_by_place():
+    """Unlike cubes, containers all come up at the same time, so they are compared."""
     scene = containers([(0.0, 0.15), (0.0, -0.15)])
     appearing = tuple(Away(thing.name, 0, 32) for thing in scene.objects)
-    assert phrases(Scene(scene.objects, motions=appearing), "container_0") >= {
+    assert phrases_that_select(Scene(scene.objects, motions=appearing), "container_0") >= {
         "farthest to your left", "at your far left",
     }  # fmt: skip
 
 
-def test_the_bin_is_a_fixture():
+def test_cubes_can_be_named_by_their_distance_to_the_bin():
     bin_ = SceneObject("bin", "bin", Point(-0.2, 0.0, 0.0))
     scene = Scene((*cubes([(-0.1, 0.0), (0.1, 0.0)]).of_kind("cube"), bin_))
 
@@ -258,7 +286,7 @@ def test_the_bin_is_a_fixture():
     assert found["farthest from the bin"] is scene["cube_green"]
 
 
-def test_a_place_of_a_counted_color_is_that_of_one_of_its_cubes():
+def test_in_binfill_the_place_that_is_said_has_a_cube_of_a_goal_color():
     for episode in random_episodes("BinFill", 30):
         if find_refusal(episode, InstructionOptions("spatial")):
             continue
@@ -268,7 +296,8 @@ def test_a_place_of_a_counted_color_is_that_of_one_of_its_cubes():
 
 
 @pytest.mark.parametrize("task", SPATIAL_TASKS)
-def test_hardly_any_episode_lacks_a_landmark(task):
+def test_at_most_a_few_percent_of_scenes_have_no_phrase_for_the_goal_object(task):
+    """Such an episode is left out of the spatial setting, so they must be rare."""
     found: dict[str, list[bool]] = defaultdict(list)
     for index in range(80):
         episode = get_episode(task, "random", index)
@@ -283,6 +312,7 @@ def test_hardly_any_episode_lacks_a_landmark(task):
 
 
 @pytest.mark.parametrize("gap", [0.0, MARGIN / 2, math.nextafter(MARGIN, 0.0), MARGIN])
-def test_the_margin_is_inclusive(gap):
+def test_a_lead_of_exactly_the_margin_is_enough_for_a_superlative(gap):
+    """`gap` is how much farther to the left container_0 stands, in meters."""
     scene = containers([(0.0, gap), (0.0, 0.0)])
-    assert bool(phrases(scene, "container_0")) == (gap >= MARGIN)
+    assert bool(phrases_that_select(scene, "container_0")) == (gap >= MARGIN)

@@ -29,10 +29,10 @@ from roboirg.tasks import get_task, goals_of
 from roboirg.tasks.splits.splits import get_episode
 
 WRITTEN = [*written_words()]
-SCENE = get_episode("PickXtimes", "test", 0)
+EPISODE = get_episode("PickXtimes", "test", 0)
 
 
-def options_of(task):
+def all_options_of(task):
     """Yield options of every setting, form, pool and delivery of a task."""
     for setting, form, pool, delivery in itertools.product(
         settings_of(get_task(task)), ("implicit", "resolved"), POOLS, DELIVERIES
@@ -40,53 +40,60 @@ def options_of(task):
         yield InstructionOptions(setting, form, wordings=pool, delivery=delivery)
 
 
-def said_of(task, step):
+def all_instructions_of(task, step):
     """Yield published episodes with everything that can be said of them."""
     for episode in scenes_of(task, 0)[::step]:
-        for options in options_of(task):
+        for options in all_options_of(task):
             if find_refusal(episode, options) is None:
                 yield episode, options, instruct_with(episode, options)
 
 
-def is_goal_alone(goals, episode):
+def are_all_the_right_goal(goals, episode):
     return bool(goals) and all(is_right(goal, episode) for goal in goals)
 
 
 @pytest.mark.parametrize("task", WRITTEN)
 @pytest.mark.parametrize("step", [10, pytest.param(1, marks=pytest.mark.slow)])
-def test_the_declared_meaning_is_the_goal_and_no_other(task, step):
-    for episode, options, said in said_of(task, step):
-        assert is_goal_alone(understood_goals(said, episode), episode), said.text
+def test_an_instruction_means_the_goal_of_its_episode_and_no_other_goal(task, step):
+    """Words declare their meaning, from which the goals that they leave open are computed.
+
+    The whole dialogue leaves the right goal alone; its last sentence alone may leave more.
+    """
+    for episode, options, said in all_instructions_of(task, step):
+        assert are_all_the_right_goal(understood_goals(said, episode), episode), said.text
         left = goals_of_command(said, episode)
         assert episode.goal in left, said.text
         assert set(left) >= set(blind_goals(said, episode)) >= {episode.goal}, said.text
         if options.setting == "explicit" or options.form == "resolved":
-            assert is_goal_alone(left, episode), said.text
+            assert are_all_the_right_goal(left, episode), said.text
 
 
 @pytest.mark.parametrize("task", WRITTEN)
-def test_an_implicit_command_alone_leaves_more_than_the_goal_unless_the_scene_has_no_more(task):
-    """Or its words agree with a single one, *once for that take*: the chance level knows it."""
-    for episode, options, said in said_of(task, 10):
+def test_an_implicit_command_needs_its_introduction_unless_the_scene_has_one_choice(task):
+    """*Lift it twice* alone leaves the color open, unless all cubes have the same color.
+
+    An exception: singular and plural can agree with one number only, *once for that take*.
+    """
+    for episode, options, said in all_instructions_of(task, 10):
         is_implicit = options.setting != "explicit" and options.form == "implicit"
         agrees_with_one = any(said.meaning.agrees.values())
         if is_implicit and agrees_with_one:
             assert options.setting != "direct-rival", said.text
-        elif is_implicit and is_goal_alone(goals_of_command(said, episode), episode):
+        elif is_implicit and are_all_the_right_goal(goals_of_command(said, episode), episode):
             open_fields = said.meaning.terms.keys() - said.meaning.settled
             assert all(len(values_left(name, episode)) == 1 for name in open_fields), said.text
 
 
-def fields_of(goal):
+def values_by_field(goal):
     return {value.field: value.value for value in values_of_goal(goal)}
 
 
 def values_left(name, episode):
     """Return the values of a field among the goals that agree with the right one in the others."""
-    own = fields_of(episode.goal)
+    own = values_by_field(episode.goal)
     found = set()
     for goal in goals_of(episode):
-        values = fields_of(goal)
+        values = values_by_field(goal)
         if values.keys() == own.keys() and all(
             values[other] == own[other] for other in own if other != name
         ):
@@ -95,9 +102,13 @@ def values_left(name, episode):
 
 
 @pytest.mark.parametrize("task", WRITTEN)
-def test_another_value_in_the_introduction_is_another_goal(task):
+def test_changing_one_value_of_an_introduction_changes_the_goal_that_is_meant(task):
+    """The introduction says *two red cubes*; what if it had said *two blue cubes*?
+
+    Finds words whose meaning is declared as a constant instead of by what was introduced.
+    """
     moved = 0
-    for episode, options, said in said_of(task, 25):
+    for episode, options, said in all_instructions_of(task, 25):
         if options.form == "resolved" or options.setting == "explicit":
             continue
         for name, term in said.meaning.terms.items():
@@ -117,30 +128,37 @@ def test_another_value_in_the_introduction_is_another_goal(task):
 
 
 @pytest.mark.parametrize("setting", ["direct", "spatial", "contextual", "reasoning"])
-def test_what_was_not_said_means_nothing(setting):
-    said = instruct_with(SCENE, InstructionOptions(setting))
+def test_a_command_that_points_at_values_nobody_introduced_means_no_goal(setting):
+    said = instruct_with(EPISODE, InstructionOptions(setting))
     unsaid = {name: term._replace(operands=()) for name, term in said.meaning.terms.items()}
-    assert meaning.meant_goals(Meaning(unsaid), SCENE) == ()
+    assert meaning.meant_goals(Meaning(unsaid), EPISODE) == ()
 
 
-def test_no_words_leave_all_goals_and_scrambled_ones_have_no_meaning():
+def test_a_silent_command_leaves_all_goals_open_and_a_scrambled_one_means_none():
+    """Both are controls: one states no goal at all, the other has its words in random order."""
     options = InstructionOptions("direct")
-    silent = say_arm(SCENE, options, "silent").instruction
-    assert understood_goals(silent, SCENE) == goals_of(SCENE)
+    silent = say_arm(EPISODE, options, "silent").instruction
+    assert understood_goals(silent, EPISODE) == goals_of(EPISODE)
 
-    scrambled = say_arm(SCENE, options, "scrambled").instruction
+    scrambled = say_arm(EPISODE, options, "scrambled").instruction
     assert scrambled.meaning is None
-    assert understood_goals(scrambled, SCENE) == goals_of_command(scrambled, SCENE) == ()
-    assert right_share(blind_goals(scrambled, SCENE), SCENE) is None
+    assert understood_goals(scrambled, EPISODE) == goals_of_command(scrambled, EPISODE) == ()
+    assert right_share(blind_goals(scrambled, EPISODE), EPISODE) is None
 
 
-def test_a_place_means_nothing_where_no_thing_is_clear_by_the_margin():
+def test_a_place_that_selects_no_object_means_no_goal():
     clear = Described("no such place", "place", "robot")
     term = Term("same", (clear,))
-    assert meaning.meant_goals(Meaning({"color": term, "repeats": Term("same", (1,))}), SCENE) == ()
+    assert (
+        meaning.meant_goals(Meaning({"color": term, "repeats": Term("same", (1,))}), EPISODE) == ()
+    )
 
 
-def test_a_rival_is_a_guess_between_two_and_the_command_leaves_more():
+def test_without_the_command_a_rival_value_leaves_a_guess_between_two_goals():
+    """In *direct-rival* the introduction names two colors, and the command points at one of them.
+
+    Who ignores the pointer is right in half of the cases; who hears the command alone, in fewer.
+    """
     shares = []
     for index in range(12):
         episode = get_episode("PickXtimes", "test", index)
@@ -166,7 +184,7 @@ def entry(table, key, value):
     return lambda patch: patch.setitem(table, key, value)
 
 
-FAULTS = {
+PLANTED_FAULTS = {
     "minus adds": entry(declared._STEP_SIGNS, "minus", 1),
     "earlier is later": entry(declared._STEP_SIGNS, "earlier", 1),
     "right after is two after": entry(declared._STEPS, "after", 2),
@@ -209,16 +227,22 @@ def another_if(kind, described_thing, described, episode):
     return next((other for other in things if other != thing), None)
 
 
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_in_operations_pointers_places_or_clues_is_found(fault, monkeypatch):
-    FAULTS[fault](monkeypatch)
-    texts = itertools.chain.from_iterable(said_of(task, 4) for task in WRITTEN)
+@pytest.mark.parametrize("fault", PLANTED_FAULTS)
+def test_a_planted_fault_in_the_computation_of_meaning_is_detected(fault, monkeypatch):
+    """A check of the checks: with each fault, some published text must mean a wrong goal."""
+    PLANTED_FAULTS[fault](monkeypatch)
+    texts = itertools.chain.from_iterable(all_instructions_of(task, 4) for task in WRITTEN)
     assert any(
-        not is_goal_alone(understood_goals(said, episode), episode) for episode, _, said in texts
+        not are_all_the_right_goal(understood_goals(said, episode), episode)
+        for episode, _, said in texts
     )
 
 
-def test_amounts_have_no_order_and_them_may_be_of_any_number_of_colors():
+def test_amounts_of_two_colors_mean_the_same_goal_in_either_order():
+    """The terms name the two colors of a BinFill goal in reverse: *one blue and two red cubes*.
+
+    A command that states one color and its count leaves the other count open.
+    """
     episodes = scenes_of("BinFill", 0)
     episode = next(found for found in episodes if len(found.goal["colors"]) == 2)
     (color, count), (other_color, other_count) = episode.goal.amounts
@@ -238,9 +262,9 @@ def test_amounts_have_no_order_and_them_may_be_of_any_number_of_colors():
         assert given[color] == count
 
 
-def test_the_rest_is_all_cubes_but_those_that_are_kept():
+def test_all_cubes_but_three_means_the_number_of_cubes_minus_three():
     kept = 0
-    for episode, options, said in said_of("BinFill", 1):
+    for episode, options, said in all_instructions_of("BinFill", 1):
         if options.setting == "grounded" and said.meaning.terms["counts.0"].operation == "without":
             cubes = candidates_in(episode.scene, "cube")
             assert episode.goal["counts"] == (len(cubes) - 3,), said.text

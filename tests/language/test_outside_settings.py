@@ -35,18 +35,18 @@ from roboirg.shortcuts.command_chance import understood_goals
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
-EPISODE = get_episode("PickXtimes", "test", 0)  # easy
-HARD = get_episode("PickXtimes", "test", 3)
-REASON = "the scene is too easy"
+EASY_EPISODE = get_episode("PickXtimes", "test", 0)  # easy
+HARD_EPISODE = get_episode("PickXtimes", "test", 3)
+TOO_EASY = "the scene is too easy"
 
-DUMMY = Setting(
+NOT_FOR_EASY_SCENES = Setting(
     name="dummy",
     order=9,
     summary="direct, but not in easy scenes",
     color="#123456",
     offers="contextual",
     applies_to=lambda task: task.suite == "counting",
-    refusal=lambda request: REASON if request.episode.difficulty == "easy" else None,
+    refusal=lambda request: TOO_EASY if request.episode.difficulty == "easy" else None,
     example=0,
 )
 
@@ -73,8 +73,9 @@ def printed(*tables):
     return console.file.getvalue()
 
 
-def test_a_setting_is_in_the_lists_of_its_tasks(register):
-    register(DUMMY)
+def test_a_registered_setting_is_listed_for_the_tasks_it_applies_to(register):
+    """A setting is a way of giving commands; this one, "dummy", applies to the suite *counting*."""
+    register(NOT_FOR_EASY_SCENES)
     counting = [task.name for task in all_tasks().values() if task.suite == "counting"]
 
     assert setting_names()[-1] == "dummy"
@@ -83,31 +84,34 @@ def test_a_setting_is_in_the_lists_of_its_tasks(register):
         instruct(get_episode("VideoUnmask", "test", 0), "dummy")
 
 
-def test_a_refusal_says_why_wherever_it_shows(register):
-    register(DUMMY)
-    assert "dummy" not in expressible(EPISODE)
-    assert "dummy" in expressible(HARD)
-    assert find_refusals(EPISODE)["dummy"] == REASON
-    with pytest.raises(InvalidValueError, match=f"dummy setting cannot express .*{REASON}"):
-        instruct(EPISODE, "dummy")
-    assert REASON in printed(instructions_table(EPISODE, ["dummy"], InstructionOptions()))
+def test_the_reason_why_a_setting_refuses_a_scene_is_shown_everywhere(register):
+    """The setting "dummy" refuses easy scenes; lists, errors, tables and plans must show that."""
+    register(NOT_FOR_EASY_SCENES)
+    assert "dummy" not in expressible(EASY_EPISODE)
+    assert "dummy" in expressible(HARD_EPISODE)
+    assert find_refusals(EASY_EPISODE)["dummy"] == TOO_EASY
+    with pytest.raises(InvalidValueError, match=f"dummy setting cannot express .*{TOO_EASY}"):
+        instruct(EASY_EPISODE, "dummy")
+    assert TOO_EASY in printed(instructions_table(EASY_EPISODE, ["dummy"], InstructionOptions()))
 
     plan = make_plan(["listener"], tasks="PickXtimes", settings="all", episodes="0,3")
     assert ["dummy" in plan.settings_of("PickXtimes", index) for index in (0, 3)] == [False, True]
 
 
-def test_a_new_setting_does_not_change_the_splits(register, monkeypatch):
+def test_a_registered_setting_does_not_change_which_episodes_are_published(register, monkeypatch):
+    """Episodes were accepted if our own settings can express them; a new one has no say in this."""
     slot = EpisodeSlot("PickXtimes", "test", 0)
-    register(DUMMY)
-    assert check_words(slot, EPISODE.seed) is None
+    register(NOT_FOR_EASY_SCENES)
+    assert check_words(slot, EASY_EPISODE.seed) is None
 
     monkeypatch.setattr(seed_selection, "ACCEPTANCE_SETTINGS", ("direct", "dummy"))
-    rejection = check_words(slot, EPISODE.seed)
-    assert (rejection.reason, rejection.cause) == ("not expressible", f"dummy: {REASON}")
+    rejection = check_words(slot, EASY_EPISODE.seed)
+    assert (rejection.reason, rejection.cause) == ("not expressible", f"dummy: {TOO_EASY}")
 
 
-def test_statistics_and_export_have_the_setting(register):
-    register(DUMMY)
+def test_statistics_and_exported_rows_include_a_registered_setting(register):
+    """It refuses easy episodes, so it has two instructions (forms) for each of the others."""
+    register(NOT_FOR_EASY_SCENES)
     episodes = [get_episode("PickXtimes", "test", index) for index in range(12)]
 
     jobs = list(instructions(episodes, setting_names(), FORMS))
@@ -120,47 +124,49 @@ def test_statistics_and_export_have_the_setting(register):
 
 
 @pytest.mark.parametrize("name", ["direct", "reasoning", "spatial", "grounded", "direct-rival"])
-def test_a_setting_says_scenarios_of_its_own_in_the_ways_of_one_of_ours(name, register, tmp_path):
-    lab = f"lab-{name}"
+def test_a_setting_modeled_on_ours_speaks_the_scenarios_of_its_own_file(name, register, tmp_path):
+    """Scenarios are little stories around a command. A copy of one of our settings has none under
+    its new name, until it names a file that has some."""
+    add_lab = f"lab-{name}"
     episode = get_episode("PickXtimes", "test", 6)
     ours = (FOLDER / "color_and_number.toml").read_text()
     path = tmp_path / "lab.toml"
-    path.write_text(ours.replace(f'setting = "{name}"', f'setting = "{lab}"'))
-    setting = dataclasses.replace(all_settings()[name], name=lab)
+    path.write_text(ours.replace(f'setting = "{name}"', f'setting = "{add_lab}"'))
+    setting = dataclasses.replace(all_settings()[name], name=add_lab)
     register(setting)
     unwritten = r"\): color_and_number\.toml has no lab-\S+ scenario for it in the pool test; leave"
     with pytest.raises(InvalidValueError, match=unwritten):
-        instruct(episode, lab)
+        instruct(episode, add_lab)
 
     register(dataclasses.replace(setting, words=str(path)))
     setting_scenarios.cache_clear()
-    scenarios = setting_scenarios(lab)["PickXtimes"].scenarios
+    scenarios = setting_scenarios(add_lab)["PickXtimes"].scenarios
     of_the_pool = [scenario for scenario in scenarios if scenario.fields.pool == "test"]
 
     for form in FORMS:
-        said = instruct(episode, lab, form)
+        said = instruct(episode, add_lab, form)
         assert understood_goals(said, episode) == (episode.goal,)
         frame = said.metadata["scenario"]
         (scenario,) = [found for found in of_the_pool if found.fields.frame == frame]
-        assert scenario.fields.setting == lab
+        assert scenario.fields.setting == add_lab
     states_color = episode.goal.text("color") in said.command
     assert states_color or name not in ("direct", "direct-rival")
 
     setting_scenarios.cache_clear()
 
 
-def test_settings_made_from_explicit_and_contextual_say_what_these_do(register):
+def test_copies_of_the_settings_explicit_and_contextual_give_the_same_commands(register):
     made = [
         dataclasses.replace(all_settings()[name], name=f"my-{name}")
         for name in ("explicit", "contextual")
     ]
     register(*made)
     for setting in made:
-        usual = instruct(HARD, setting.name.removeprefix("my-"))
-        assert instruct(HARD, setting.name).turns == usual.turns
+        usual = instruct(HARD_EPISODE, setting.name.removeprefix("my-"))
+        assert instruct(HARD_EPISODE, setting.name).turns == usual.turns
 
 
-LAB = """
+LAB_FILE = """
 tasks = ["PickXtimes"]
 [commands]
 all = ["Lab: lift {color} {repeats}."]
@@ -173,7 +179,7 @@ setting = "lab"
 introduction = "The lab says {repeats:times}."
 say.repeats = ["<each repeats: [repeats: once for that lap|once for each of them]>"]
 """
-MINE = 'name = "mine"\ntasks = ["PickXtimes"]\n'
+MY_FILE_HEAD = 'name = "mine"\ntasks = ["PickXtimes"]\n'
 MY_COMMAND = '[commands]\nall = ["Mine: lift {color} {repeats}."]\n'
 MY_VALUE = '[stated.all]\ncolor = "my {color} cube"\n'
 MY_SCENARIO = """
@@ -186,7 +192,7 @@ say.repeats = ["<each repeats: [repeats: once for that lap|once for each of them
 
 
 @pytest.fixture
-def lab(register, tmp_path):
+def add_lab(register, tmp_path):
     """A setting with a file of its own, of which the test gives the text."""
 
     def add(text, **changes):
@@ -211,18 +217,20 @@ def lab(register, tmp_path):
         (MY_COMMAND + MY_VALUE + MY_SCENARIO, "I say {}.", "Mine: lift my {} cube "),
     ],
 )
-def test_a_wording_file_comes_before_the_file_of_a_setting_and_this_before_the_task_s(
-    lab, mine, introduction, command
+def test_words_of_a_user_file_win_over_those_of_a_setting_and_these_over_the_task_s(
+    add_lab, mine, introduction, command
 ):
-    lab(LAB)
-    wordings = register_wordings(parse_wordings(MINE + mine, "mine.toml")) if mine else None
-    said = instruct(HARD, "lab", wordings=wordings)
-    color = HARD.goal.text("color")
+    """A user's file ("mine") may bring a command, a phrase for a value, or an introduction; what it
+    lacks is taken from the setting's file ("lab"). Other settings ignore the lab's."""
+    add_lab(LAB_FILE)
+    wordings = register_wordings(parse_wordings(MY_FILE_HEAD + mine, "mine.toml")) if mine else None
+    said = instruct(HARD_EPISODE, "lab", wordings=wordings)
+    color = HARD_EPISODE.goal.text("color")
 
-    assert said.turns[0] == introduction.format(times(HARD.goal["repeats"]))
+    assert said.turns[0] == introduction.format(times(HARD_EPISODE.goal["repeats"]))
     assert said.command.startswith(command.format(color))
 
-    explicit = instruct(HARD, wordings=wordings).command
+    explicit = instruct(HARD_EPISODE, wordings=wordings).command
     assert "Lab" not in explicit
     assert explicit.startswith("Mine: ") == (MY_COMMAND in mine)
 
@@ -230,24 +238,26 @@ def test_a_wording_file_comes_before_the_file_of_a_setting_and_this_before_the_t
 @pytest.mark.parametrize(
     "wrong", ['name = "lab"\n', '[[literal]]\ntask = "PickXtimes"\ntext = "x"\n']
 )
-def test_the_file_of_a_setting_has_neither_name_nor_whole_sentences(lab, wrong):
-    lab(wrong + LAB if "name" in wrong else LAB + wrong)
+def test_the_word_file_of_a_setting_with_a_name_or_a_whole_sentence_is_refused(add_lab, wrong):
+    """Both belong into files of users only."""
+    add_lab(wrong + LAB_FILE if "name" in wrong else LAB_FILE + wrong)
     with pytest.raises(InvalidValueError, match=r"^lab\.toml has a name or a \[\[literal"):
-        instruct(HARD, "lab")
+        instruct(HARD_EPISODE, "lab")
 
 
-def test_a_setting_made_from_contextual_refuses_by_its_own_rule_whatever_came_before(register):
+def test_a_cached_choice_of_one_setting_does_not_answer_for_another(register):
+    """ "calm" is a copy of *contextual* with its own refusal; *direct* shares the cache with it."""
     calm = dataclasses.replace(contextual.SETTING, name="calm", refusal=lambda _: "never calm")
     register(calm)
     options = {name: InstructionOptions(name) for name in ("direct", "calm")}
     for names in (("direct", "calm", "direct"), ("calm", "direct", "calm")):
         spoken._CHOICES.clear()
-        refused = {name: find_refusal(HARD, options[name]) for name in names}
+        refused = {name: find_refusal(HARD_EPISODE, options[name]) for name in names}
         assert refused == {"direct": None, "calm": "never calm"}
 
 
-def test_direct_and_contextual_choose_once():
+def test_direct_and_contextual_share_one_cached_choice_of_scenario():
     spoken._CHOICES.clear()
     for name in ("direct", "contextual"):
-        instruct(HARD, name)
+        instruct(HARD_EPISODE, name)
         assert len(spoken._CHOICES) == 1

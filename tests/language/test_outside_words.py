@@ -15,13 +15,13 @@ from roboirg.language.scenarios.identity import words_of
 from roboirg.tasks import all_tasks
 
 DOCS = Path(__file__).parents[2] / "docs"
-FRAME = """
+SCENARIO_HEAD = """
 [[scenario]]
 frame = "%s"
 pool = "%s"
 setting = "%s"
 """
-SCENARIOS = [
+SCENARIO_OF_EACH_SETTING = [
     (
         "direct",
         """
@@ -80,13 +80,13 @@ def blocks(page: str, heading: str) -> list[str]:
     return re.findall(r"```(?:python|toml)\n(.*?)```", section, re.DOTALL)
 
 
-def all_words() -> str:
+def words_for_every_setting() -> str:
     """Return the page's file of words with scenarios of every setting instead of its own."""
     head, _, _ = TASK_WORDS.partition("[[scenario]]")
     scenarios = []
     for pool, noun in zip(POOLS, ("painting", "film"), strict=True):
-        for number, (setting, text) in enumerate(SCENARIOS):
-            scenario = FRAME % (f"{noun} {number}", pool, setting) + text.strip()
+        for number, (setting, text) in enumerate(SCENARIO_OF_EACH_SETTING):
+            scenario = SCENARIO_HEAD % (f"{noun} {number}", pool, setting) + text.strip()
             scenarios.append(scenario.replace("NOUN", noun))
     return head + "\n".join(scenarios)
 
@@ -98,7 +98,7 @@ TASK_PROJECT, *_ = re.findall(r"```toml\n(.*?)```", TASK_PAGE, re.DOTALL)
 COLORED, COLORED_PROJECT, COLORED_WORDS = blocks("add-setting.md", "Add a setting")
 
 
-class Package:
+class InstalledPackage:
     """A package as if it were installed.
 
     Args:
@@ -132,7 +132,7 @@ class Package:
         """Return what a program yields with `found`, where the package is installed."""
         path = os.pathsep.join([str(self.folder), *sys.path])
         done = subprocess.run(
-            [sys.executable, "-c", PRELUDE + code + "\nprint(json.dumps(found))"],
+            [sys.executable, "-c", IMPORTS + code + "\nprint(json.dumps(found))"],
             env={**os.environ, "PYTHONPATH": path},
             capture_output=True,
             text=True,
@@ -153,7 +153,7 @@ def _merged(entries: str) -> str:
     return "\n".join("\n".join([group, *lines]) for group, lines in groups.items())
 
 
-PRELUDE = """
+IMPORTS = """
 import itertools, json
 from dataclasses import replace
 from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
@@ -181,10 +181,11 @@ def refused(task, setting):
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory):
-    return Package(tmp_path_factory.mktemp("package"))
+    return InstalledPackage(tmp_path_factory.mktemp("package"))
 
 
-def test_the_page_s_setting_says_scenarios_of_its_own_file(package):
+def test_the_setting_of_the_documentation_page_speaks_the_words_of_its_own_file(package):
+    """Runs the page's code for a new setting, "colored", in a process where it is installed."""
     found = package.run("""
 for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
     episode = get_episode(task, "test", 1)
@@ -202,7 +203,8 @@ for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
     assert found == ["new coat", "loan"] * 2
 
 
-def test_its_file_counts_in_the_words_of_that_setting_alone(package):
+def test_the_words_of_an_installed_setting_change_the_digest_of_that_setting_only(package):
+    """`words_of` identifies words by task, pool (train or test) and a digest of what is said."""
     found = package.run("""
 for task, pool, setting in itertools.product(all_tasks(), POOLS, all_settings()):
     found.append([task, pool, setting, words_of(task, pool, setting)])
@@ -220,7 +222,8 @@ found.append(language_label(["PickXtimes"], "test", ["direct", "colored"]))
     assert {task for task, *_ in found} == set(all_tasks())
 
 
-def test_the_page_s_task_speaks_with_the_words_of_its_own_file(package):
+def test_the_task_of_the_documentation_page_speaks_the_words_of_its_own_file(package):
+    """The page's file has no scenario for *reasoning*, and the refusal names that file."""
     explicit, introduction, spatial, *rest = package.run("""
 words = task_scenarios("PlaceAndPress")
 found += [refused("PlaceAndPress", "explicit"), refused("PlaceAndPress", "contextual")]
@@ -234,9 +237,11 @@ for report in check_scenarios(words, None, scenes_of("PlaceAndPress", 0)[::20]):
     assert not rest
 
 
-def test_a_task_from_outside_has_every_setting_form_and_arm(tmp_path):
-    outside = Package(tmp_path)
-    (outside.files / "words.toml").write_text(all_words())
+def test_a_task_of_another_package_can_be_commanded_in_every_setting(tmp_path):
+    """With a file that has words for each setting, all forms and all control runs work, and the
+    words mean the goal. `found` collects what is wrong, then the settings."""
+    outside = InstalledPackage(tmp_path)
+    (outside.files / "words.toml").write_text(words_for_every_setting())
     *found, settings = outside.run("""
 task = get_task("PlaceAndPress")
 arms = ("paraphrase-1", "other-goal", "silent", "scrambled", "again")
@@ -314,10 +319,11 @@ found.append(sorted(spoken))
         ),
     ],
 )  # fmt: skip
-def test_what_words_from_outside_lack_is_said_in_a_sentence(
+def test_a_mistake_in_the_words_of_a_package_is_reported_with_file_and_cure(
     tmp_path, file, before, after, task, setting, sentence
 ):
-    outside = Package(tmp_path)
+    """Replaces `before` by `after` in one file of an installed package, then asks for a command."""
+    outside = InstalledPackage(tmp_path)
     text = (outside.files / file).read_text()
     assert before in text
 

@@ -28,8 +28,8 @@ from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 
 UNMASK = ("VideoUnmask", "VideoUnmaskSwap", "ButtonUnmask", "ButtonUnmaskSwap")
-WRITTEN = ("PickXtimes", "SwingXtimes", "StopCube", *UNMASK)
-SPATIAL = ("PickXtimes", *UNMASK)
+TASKS_CHECKED_MORE = ("PickXtimes", "SwingXtimes", "StopCube", *UNMASK)
+TASKS_WITH_PLACES = ("PickXtimes", *UNMASK)
 NEAR_AND_FAR = {
     f"{words} {whom}"
     for words in ("closest to", "close to", "far from", "farthest from")
@@ -39,10 +39,10 @@ GRID = st.integers(-17, 17).map(lambda step: step / 100)
 PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=7, unique=True)
 """Centimeter grid: ties, exact margins and collinear rows are common."""
 MOST_WORDS = 12
-UNSEEN = "nothing to see in this scene singles out a slot's value"
+NOTHING_TO_SEE = "nothing to see in this scene singles out a slot's value"
 
 
-def table(places, *fixtures):
+def scene_with_containers(places, *fixtures):
     """Return a scene with containers, and fixtures by kind and place."""
     found = [SceneObject(kind, kind, Point(*at, 0.0)) for kind, at in fixtures]
     for number, (x, y) in enumerate(places):
@@ -50,7 +50,7 @@ def table(places, *fixtures):
     return Scene(tuple(found))
 
 
-def cubes(*places):
+def scene_with_cubes(*places):
     colored = zip(COLORS, places, strict=False)
     things = [
         SceneObject(f"cube_{color}", "cube", Point(x, y, 0.02), color=color)
@@ -75,29 +75,30 @@ def things_by_phrase(scene, kind="container", frame="robot"):
     return found
 
 
-def usual_places(scene, kind="container", frame="robot"):
+def everyday_places(scene, kind="container", frame="robot"):
     return [place for place in spoken_places(scene, kind, frame) if place.kind < PlaceClass.UNUSUAL]
 
 
-def usual(scene, name, kind="container", frame="robot"):
+def phrases_after_a_noun(scene, name, kind="container", frame="robot"):
     """Return the usual words after a noun for a thing."""
-    places = usual_places(scene, kind, frame)
+    places = everyday_places(scene, kind, frame)
     return {place.attributive for place in places if place.thing.name == name and place.attributive}
 
 
-def spots(scene, kind="container", frame="robot"):
+def things_by_spot(scene, kind="container", frame="robot"):
     return {place.spot: place.thing for place in spoken_places(scene, kind, frame) if place.spot}
 
 
 def scenes_of(task):
     episodes = list(split_episodes(task))
-    if task in WRITTEN:
+    if task in TASKS_CHECKED_MORE:
         episodes += random_episodes(task, 200)
     return [episode.scene for episode in episodes]
 
 
-@pytest.mark.parametrize("task", slow_but(WRITTEN, all_tasks()))
-def test_each_phrase_of_a_scene_belongs_to_one_thing_in_both_frames(task):
+@pytest.mark.parametrize("task", slow_but(TASKS_CHECKED_MORE, all_tasks()))
+def test_a_phrase_means_the_same_object_for_the_robot_and_for_the_camera(task):
+    """The frame is the point of view. *Left* and *right* differ in it, so they name it."""
     kind = get_task(task).things.pointed
     for scene in scenes_of(task):
         robot, camera = (things_by_phrase(scene, kind, frame) for frame in FRAMES)
@@ -106,8 +107,8 @@ def test_each_phrase_of_a_scene_belongs_to_one_thing_in_both_frames(task):
             assert not re.search(r"\b(left|right)\b(?! by)", words)
 
 
-@pytest.mark.parametrize("task", slow_but(WRITTEN, all_tasks()))
-def test_each_phrase_selects_its_thing_and_usual_ones_are_short(task):
+@pytest.mark.parametrize("task", slow_but(TASKS_CHECKED_MORE, all_tasks()))
+def test_each_phrase_selects_the_object_it_was_made_for_and_everyday_ones_are_short(task):
     kind = get_task(task).things.pointed
     for scene, frame in itertools.product(scenes_of(task), FRAMES):
         known = things_at(scene, kind, frame)
@@ -115,23 +116,27 @@ def test_each_phrase_selects_its_thing_and_usual_ones_are_short(task):
             assert known[words].name == name
         for selector in selectors(scene, kind, frame):
             assert known[selector.landmark.phrase] is selector.select()
-        for words, _ in words_of(usual_places(scene, kind, frame)):
+        for words, _ in words_of(everyday_places(scene, kind, frame)):
             assert len(words.split()) <= MOST_WORDS
 
 
 @settings(max_examples=100)
 @given(PLACES, st.sampled_from(FRAMES), st.integers(0, 6), GRID, st.floats(0, 2 * math.pi))
-def test_no_phrase_goes_over_to_another_thing_when_one_moves_by_less_than_the_margin(
+def test_a_small_move_of_one_object_never_makes_a_phrase_mean_another_object(
     places, frame, mover, button, turn
 ):
+    """Small is less than `MARGIN`, by which a phrase must be clear in the first place.
+
+    `turn` is the direction of the move, `mover` the number of the object.
+    """
     fixtures = (("button", (-0.2, button)), ("target", (0.0, -button)))
     step = 0.98 * MARGIN
     moved = list(places)
     x, y = moved.pop(mover % len(places))
     moved.insert(mover % len(places), (x + step * math.cos(turn), y + step * math.sin(turn)))
 
-    before = usual_places(table(places, *fixtures), frame=frame)
-    after = things_by_phrase(table(moved, *fixtures), frame=frame)
+    before = everyday_places(scene_with_containers(places, *fixtures), frame=frame)
+    after = things_by_phrase(scene_with_containers(moved, *fixtures), frame=frame)
 
     for words, thing in words_of(before):
         assert after.get(words, thing.name) == thing.name, words
@@ -139,22 +144,25 @@ def test_no_phrase_goes_over_to_another_thing_when_one_moves_by_less_than_the_ma
 
 @pytest.mark.parametrize("frame", FRAMES)
 def test_near_and_far_are_not_said_where_depth_and_distance_from_the_robot_disagree(frame):
-    """One container stands 6 cm deeper than the other, which is 1 cm farther away."""
-    disagreeing = table([(-0.2, 0.25), (-0.14, 0.0)])
+    """Closest can mean the smallest depth (x) or the smallest distance from the robot's base.
+
+    One container stands 6 cm deeper than the other, which is 1 cm farther away.
+    """
+    disagreeing = scene_with_containers([(-0.2, 0.25), (-0.14, 0.0)])
     distances = [math.dist(item.position[:2], ROBOT_BASE[:2]) for item in disagreeing.objects]
     assert distances == pytest.approx([0.484, 0.475], abs=0.001)
 
     found = things_by_phrase(disagreeing, frame=frame)
     assert NEAR_AND_FAR.isdisjoint(found)
 
-    agreeing = table([(-0.2, 0.0), (-0.14, 0.25)])
+    agreeing = scene_with_containers([(-0.2, 0.0), (-0.14, 0.25)])
     found = things_by_phrase(agreeing, frame=frame)
     robot = "you" if frame == "robot" else "the robot"
     assert found[f"closest to {robot}"] == "container_0"
 
 
-@pytest.mark.parametrize("task", SPATIAL)
-def test_the_first_from_near_to_far_is_so_in_depth_and_by_distance(task):
+@pytest.mark.parametrize("task", TASKS_WITH_PLACES)
+def test_closest_to_you_is_closest_both_in_depth_and_by_distance(task):
     measures = (
         lambda item: item.position.x,
         lambda item: math.dist(item.position[:2], ROBOT_BASE[:2]),
@@ -190,11 +198,12 @@ def test_the_first_from_near_to_far_is_so_in_depth_and_by_distance(task):
     ],
 )
 def test_nothing_is_in_a_corner_if_another_thing_is_near_that_corner(other, words):
-    scene = table([(0.1, 0.1), other, (-0.3, 0.0), (0.2, -0.2)])
+    """container_0 stands in the back left quarter; `other` is where container_1 stands."""
+    scene = scene_with_containers([(0.1, 0.1), other, (-0.3, 0.0), (0.2, -0.2)])
     corner = {"nearest to the back left corner", "at the back left", "in the back left corner"}
 
-    assert usual(scene, "container_0") & corner == words
-    assert not corner.intersection(usual(scene, "container_1"))
+    assert phrases_after_a_noun(scene, "container_0") & corner == words
+    assert not corner.intersection(phrases_after_a_noun(scene, "container_1"))
 
 
 def gap(thing, fixture):
@@ -226,14 +235,15 @@ def is_there(spot, thing, scene, middle):
     return all(truths[word] for word in named)
 
 
-@pytest.mark.parametrize("task", SPATIAL)
-def test_a_spot_is_true_of_its_thing_and_of_no_other_one(task):
+@pytest.mark.parametrize("task", TASKS_WITH_PLACES)
+def test_a_spot_such_as_on_the_left_is_true_of_one_object_only(task):
+    """A spot is a place that can be said alone. `is_there` checks it by measures of its own."""
     kind = get_task(task).things.pointed
     for scene in scenes_of(task):
         things = candidates_in(scene, kind)
         depths = [thing.position.x for thing in things]
         middle = (min(depths) + max(depths)) / 2 if len(things) > 1 else -0.05
-        for spot, thing in spots(scene, kind).items():
+        for spot, thing in things_by_spot(scene, kind).items():
             fitting = [other for other in things if is_there(spot, other, scene, middle)]
             assert thing in fitting, spot
             fitting.remove(thing)
@@ -245,8 +255,9 @@ def test_a_spot_is_true_of_its_thing_and_of_no_other_one(task):
             assert not fitting, spot
 
 
-@pytest.mark.parametrize("task", SPATIAL)
-def test_two_of_three_published_scenes_have_a_spot_and_nearly_all_have_usual_words(task):
+@pytest.mark.parametrize("task", TASKS_WITH_PLACES)
+def test_nearly_all_published_scenes_have_everyday_words_for_a_goal_object(task):
+    """Two of three have a spot, a place that can be said without a noun: *on the left*."""
     kind = get_task(task).things.pointed
     with_spot = []
     unusual = []
@@ -270,57 +281,70 @@ def test_two_of_three_published_scenes_have_a_spot_and_nearly_all_have_usual_wor
 @pytest.mark.parametrize(
     ("task", "index"), [("VideoUnmask", 10), ("BinFill", 34)], ids=["neighbor", "unusual"]
 )
-def test_a_thing_that_only_a_neighbor_would_name_is_not_grounded(task, index):
-    """*Nearest to the one closest to you* is said by no one."""
+def test_an_object_with_unusual_words_only_is_refused_by_the_grounded_setting(task, index):
+    """*Nearest to the one closest to you* is said by no one; the spatial setting still uses it."""
     episode = get_episode(task, "test", index)
-    assert find_refusal(episode, InstructionOptions("grounded")) == UNSEEN
+    assert find_refusal(episode, InstructionOptions("grounded")) == NOTHING_TO_SEE
 
     spatial = instruct(episode, "spatial")
     assert spatial.metadata["landmark_classes"] == [PlaceClass.UNUSUAL]
 
 
-ROW = [(0.0, y) for y in (-0.16, -0.08, 0.0, 0.08, 0.16)]
+FIVE_IN_A_ROW = [(0.0, y) for y in (-0.16, -0.08, 0.0, 0.08, 0.16)]
 SQUARE = [(-0.15, 0.15), (-0.15, -0.15), (0.15, 0.15), (0.15, -0.15)]
 
 
-def test_what_people_say_of_a_row_and_of_a_square():
-    row = table(ROW)
-    assert usual(row, "container_4") == {"all the way on the left"}
-    assert usual(row, "container_3") == {"second from the left"}
-    assert "in the middle" in usual(row, "container_2")
-    assert spots(row)["on the far right"].name == "container_0"
-    assert "in the back left corner" in usual(table(SQUARE), "container_2")
-    assert "at the front right" in usual(table(SQUARE), "container_1")
+def test_examples_of_everyday_words_for_a_row_and_for_a_square():
+    """Container 0 of the row is the one on the robot's right; the camera sees it on its left."""
+    row = scene_with_containers(FIVE_IN_A_ROW)
+    assert phrases_after_a_noun(row, "container_4") == {"all the way on the left"}
+    assert phrases_after_a_noun(row, "container_3") == {"second from the left"}
+    assert "in the middle" in phrases_after_a_noun(row, "container_2")
+    assert things_by_spot(row)["on the far right"].name == "container_0"
+    assert "in the back left corner" in phrases_after_a_noun(
+        scene_with_containers(SQUARE), "container_2"
+    )
+    assert "at the front right" in phrases_after_a_noun(
+        scene_with_containers(SQUARE), "container_1"
+    )
 
-    camera = usual(row, "container_4", frame="camera")
+    camera = phrases_after_a_noun(row, "container_4", frame="camera")
     assert camera == {"all the way on the right of the picture"}
 
 
-def test_what_people_say_of_things_at_a_button_and_a_target():
+def test_examples_of_everyday_words_for_things_near_a_button_or_a_target():
     fixtures = (("button", (-0.2, 0.0)), ("target", (0.1, 0.0)))
-    scene = table([(-0.05, -0.03), (-0.19, 0.09), (0.1, -0.2)], *fixtures)
-    assert "between the button and the target" in usual(scene, "container_0")
-    assert "right by the button" in spots(scene)
-    assert {"next to the button", "to the left of the button"} <= usual(scene, "container_1")
-    assert "farthest from the button" in usual(scene, "container_2")
+    scene = scene_with_containers([(-0.05, -0.03), (-0.19, 0.09), (0.1, -0.2)], *fixtures)
+    assert "between the button and the target" in phrases_after_a_noun(scene, "container_0")
+    assert "right by the button" in things_by_spot(scene)
+    assert {"next to the button", "to the left of the button"} <= phrases_after_a_noun(
+        scene, "container_1"
+    )
+    assert "farthest from the button" in phrases_after_a_noun(scene, "container_2")
 
-    behind = table([(-0.05, 0.04), (0.1, -0.2)], fixtures[0])
-    assert "to the left of the button" not in usual(behind, "container_0")
+    behind = scene_with_containers([(-0.05, 0.04), (0.1, -0.2)], fixtures[0])
+    assert "to the left of the button" not in phrases_after_a_noun(behind, "container_0")
 
 
-def test_the_place_of_a_thing_alone_on_the_table_is_no_choice_among_others():
-    for scene in (cubes((0.1, 0.1)), cubes((-0.08, 0.0)), cubes((-0.2, 0.04))):
+def test_a_cube_alone_on_the_table_is_not_described_by_comparison():
+    """No *leftmost cube* and no corner; and of two cubes, one is not *next to* the other."""
+    for scene in (
+        scene_with_cubes((0.1, 0.1)),
+        scene_with_cubes((-0.08, 0.0)),
+        scene_with_cubes((-0.2, 0.04)),
+    ):
         places = spoken_places(scene, "cube", "robot")
         assert places
         assert not any(place.attributive for place in places)
         assert not any("corner" in place.spot for place in places)
-    assert usual(cubes((0.0, 0.1), (0.0, 0.0)), "cube_green", "cube").isdisjoint(
-        {"nearest to the red cube", "next to the red cube"}
-    )
+    assert phrases_after_a_noun(
+        scene_with_cubes((0.0, 0.1), (0.0, 0.0)), "cube_green", "cube"
+    ).isdisjoint({"nearest to the red cube", "next to the red cube"})
 
 
 def test_places_do_not_depend_on_cubes_that_arrive_later():
-    scene = cubes((0.0, 0.15), (0.0, 0.0), (0.0, -0.15))
+    """`Away` keeps the blue cube off the table for the first 100 steps."""
+    scene = scene_with_cubes((0.0, 0.15), (0.0, 0.0), (0.0, -0.15))
     late = replace(scene, motions=(Away("cube_blue", 0, 100),))
 
     early = replace(
@@ -330,8 +354,9 @@ def test_places_do_not_depend_on_cubes_that_arrive_later():
     assert things_by_phrase(late, "cube") == things_by_phrase(early, "cube")
 
 
-@pytest.mark.parametrize("task", SPATIAL)
-def test_a_clue_leads_to_one_thing(task):
+@pytest.mark.parametrize("task", TASKS_WITH_PLACES)
+def test_a_clue_leads_to_one_object_and_never_to_one_that_it_excludes(task):
+    """A clue describes an object by what can be seen, in part by what it is not."""
     kind = get_task(task).things.pointed
     for scene in scenes_of(task):
         found = {}
@@ -342,7 +367,8 @@ def test_a_clue_leads_to_one_thing(task):
             }
 
 
-def test_a_scenario_with_a_spot_fits_only_what_has_one():
+def test_a_story_that_needs_a_spot_is_chosen_only_for_a_cube_with_a_spot():
+    """The story says *The table wobbles on the left*: a place that stands without a noun."""
     (scenario,) = read_task_scenarios(WOBBLY, "mine.toml")["PickXtimes"].scenarios
     options = InstructionOptions("spatial", wordings="train")
     fitting = 0
@@ -353,7 +379,9 @@ def test_a_scenario_with_a_spot_fits_only_what_has_one():
         (color,) = request.color_values
         things = request.objects_to_point_at(color)
         known = {
-            spot for spot, thing in spots(request.episode.scene, "cube").items() if thing in things
+            spot
+            for spot, thing in things_by_spot(request.episode.scene, "cube").items()
+            if thing in things
         }
         assert bool(chosen) == bool(known)
         if chosen:
@@ -364,7 +392,9 @@ def test_a_scenario_with_a_spot_fits_only_what_has_one():
     assert fitting
 
 
-def test_any_place_is_a_spot_where_there_is_one_and_fits_all_others_too():
+def test_a_story_that_takes_any_place_prefers_a_spot():
+    """A spot is a place that stands without a noun, *on the left*. Where a cube has none, the mark
+    `{place:any}` takes words after the noun, where `{place:spot}` would not fit."""
     (scenario,) = read_task_scenarios(WOBBLY, "mine.toml")["PickXtimes"].scenarios
     text = WOBBLY.replace("The table wobbles {place:spot}", "Sand the cube {place:any}")
     (any_place,) = read_task_scenarios(text, "mine.toml")["PickXtimes"].scenarios
@@ -382,7 +412,7 @@ def test_any_place_is_a_spot_where_there_is_one_and_fits_all_others_too():
 
 
 @pytest.mark.parametrize("task", UNMASK)
-def test_only_what_has_moved_since_is_said_to_have_started_there(task):
+def test_only_containers_that_change_places_are_said_to_have_started_somewhere(task):
     noun = "cube" if "Button" in task else "container"
     started = "that started " if task == "VideoUnmaskSwap" else ""
     for scene in scenes_of(task):
@@ -394,13 +424,13 @@ def test_only_what_has_moved_since_is_said_to_have_started_there(task):
             assert clue.kind == "sets" or places[clue.words] is thing
 
 
-def test_what_was_somewhere_at_the_start_is_the_cube_if_it_is_the_container_over_it():
+def test_a_place_at_the_start_means_a_cube_and_the_container_that_covers_it_later():
     """At first the video of VideoUnmaskSwap shows the cubes alone."""
     same = 0
     for scene in scenes_of("VideoUnmaskSwap"):
         covers = {cube.inside for cube in scene.of_kind("hidden_cube")}
-        of_cubes = spots(scene, "hidden_cube")
-        for spot, container in spots(scene).items():
+        of_cubes = things_by_spot(scene, "hidden_cube")
+        for spot, container in things_by_spot(scene).items():
             if container.name in covers and spot in of_cubes:
                 assert of_cubes[spot].inside == container.name
                 same += 1
@@ -408,7 +438,7 @@ def test_what_was_somewhere_at_the_start_is_the_cube_if_it_is_the_container_over
 
 
 def test_the_phrases_of_places_by_class(snapshot):
-    """The table of all places, by class: a change of words is read in the diff."""
+    """The table of all phrases for places, by class: a change of words is read in the diff."""
     found = defaultdict(set)
     for task in all_tasks():
         kind = get_task(task).things.pointed

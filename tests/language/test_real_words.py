@@ -16,8 +16,10 @@ GRID = st.integers(-20, 20).map(lambda step: step / 100)
 
 
 @given(GRID, GRID, GRID, GRID, st.sampled_from(["box", "tape"]))
-def test_two_of_a_kind_are_told_by_their_sides_alone(left, right, near, far, kind):
-    """The margin along y decides, at any positions along x."""
+def test_two_boxes_or_tapes_are_told_apart_by_left_and_right_if_these_are_clear(
+    left, right, near, far, kind
+):
+    """They are clear if the positions along y differ by the margin, wherever they stand along x."""
     green = SceneObject("green", kind, Point(near, left, 0.03), color="green")
     gray = SceneObject("gray", kind, Point(far, right, 0.03), color="gray")
     scene = Scene((green, gray))
@@ -36,7 +38,8 @@ def test_two_of_a_kind_are_told_by_their_sides_alone(left, right, near, far, kin
 
 
 @pytest.mark.parametrize("kind", ["box", "tape"])
-def test_for_the_camera_sides_are_mirrored(kind):
+def test_the_object_on_the_robot_s_left_is_on_the_camera_s_right(kind):
+    """The camera looks at the robot from the front."""
     left = SceneObject("left", kind, Point(0.0, 0.15, 0.03), color="green")
     right = SceneObject("right", kind, Point(0.0, -0.15, 0.03), color="gray")
     scene = Scene((left, right))
@@ -49,7 +52,8 @@ def test_for_the_camera_sides_are_mirrored(kind):
 
 
 @pytest.mark.parametrize("task", ["PutInBox", "PickByCount"])
-def test_competing_remarks_name_colors_of_the_table_only(task):
+def test_remarks_about_another_color_name_colors_of_the_scene_other_than_the_goal_s(task):
+    """Competing remarks are distractions about a color that is not wanted."""
     colors = {"PutInBox": {"green", "purple", "yellow"}, "PickByCount": {"yellow", "gray"}}[task]
     for episode in random_episodes(task, 10):
         said = instruct(episode, "contextual", distractor="competing", distractors=40)
@@ -60,6 +64,6 @@ def test_competing_remarks_name_colors_of_the_table_only(task):
         assert named <= colors - {episode.goal.text("color")}
 
 
-def test_a_pronoun_stands_between_a_verb_and_its_particle():
+def test_pick_up_it_becomes_pick_it_up():
     said = swap_particles((*plain("Pick up "), *anaphor("it", "it", "color", "green")))
     assert "".join(piece.text for piece in said) == "Pick it up"

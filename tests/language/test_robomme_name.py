@@ -8,7 +8,7 @@ from roboirg.language.scenarios.wording_file import parse_wordings
 from roboirg.tasks.splits.published_episodes import published_goals
 
 
-def words(name="robomme", verb="Stop"):
+def wording_file_with_five_sentences(name="robomme", verb="Stop"):
     """Return the words of a file with a sentence for each visit."""
     text = f'name = "{name}"\ntasks = ["StopCube"]\n'
     for visit in range(1, 6):
@@ -17,21 +17,26 @@ def words(name="robomme", verb="Stop"):
     return parse_wordings(text, "file")
 
 
-def test_every_published_task_has_a_fingerprint():
+def test_each_of_the_eleven_tasks_has_its_own_fingerprint_of_robomme_s_sentences():
+    """Only a file with RoboMME's sentences may call itself "robomme"; hashes decide."""
     assert all(published_goals(task) for task in FINGERPRINTS)
     assert len(set(FINGERPRINTS.values())) == len(FINGERPRINTS) == 11
 
 
-def test_other_sentences_are_refused_under_the_name():
-    assert words("mine").name == "mine"
+def test_a_file_that_calls_itself_robomme_with_other_sentences_is_refused():
+    assert wording_file_with_five_sentences("mine").name == "mine"
     with pytest.raises(InvalidValueError, match="not those of RoboMME's published evaluation"):
-        words()
+        wording_file_with_five_sentences()
 
 
-def test_the_fingerprint_is_of_what_is_said(monkeypatch):
-    own = fingerprint("StopCube", words("mine").tasks["StopCube"].literals)
+def test_the_fingerprint_of_sentences_does_not_depend_on_the_name_of_the_file(monkeypatch):
+    """With the hash of these sentences as the expected one, the name is allowed; then one verb
+    changes."""
+    own = fingerprint(
+        "StopCube", wording_file_with_five_sentences("mine").tasks["StopCube"].literals
+    )
     monkeypatch.setitem(FINGERPRINTS, "StopCube", own)
 
-    assert words().name == "robomme"
+    assert wording_file_with_five_sentences().name == "robomme"
     with pytest.raises(InvalidValueError, match="StopCube"):
-        words(verb="Halt")
+        wording_file_with_five_sentences(verb="Halt")

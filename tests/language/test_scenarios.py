@@ -48,11 +48,15 @@ from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 WRITTEN = [*written_words()]
 DOCS = Path(__file__).parents[2] / "docs"
-OWN, PLACES = re.findall(r"```toml\n(.*?)```", (DOCS / "add-scenario.md").read_text(), re.DOTALL)
+USER_FILE_OF_THE_PAGE, SPATIAL_FILE_OF_THE_PAGE = re.findall(
+    r"```toml\n(.*?)```", (DOCS / "add-scenario.md").read_text(), re.DOTALL
+)
 """The page's examples: a file of a user's own, and two spatial scenarios."""
-DIRECT = OWN.replace('name = "mine"\n', "").replace("setting", 'pool = "train"\nsetting')
+BIRTHDAY = USER_FILE_OF_THE_PAGE.replace('name = "mine"\n', "").replace(
+    "setting", 'pool = "train"\nsetting'
+)
 """The first one as a file of ours."""
-RIVAL = """
+TWO_CUBES = """
 tasks = ["PickXtimes"]
 [[scenario]]
 frame = "two"
@@ -78,17 +82,17 @@ introduction = "{person} needs {reference:photo}, and I took {step}."
 say.repeats = ["<each reference: [repeats: for the photo|once for each photo]>"]
 """
 PHOTOS = "[repeats: for the photo|once for each photo]"
-UNSEEN = "nothing to see in this scene singles out a slot's value"
-UNRIVALED = "a goal that counts cubes of several colors leaves no rival"
+NOTHING_TO_SEE = "nothing to see in this scene singles out a slot's value"
+NO_SECOND_VALUE = "a goal that counts cubes of several colors leaves no rival"
 YEARS = "[repeats: once for that year|once for each year]"
 
 
-def read(text, task="PickXtimes"):
+def read_scenario_file(text, task="PickXtimes"):
     """Return what a file says of a task."""
     return read_task_scenarios(text, "mine.toml")[task]
 
 
-def spoken(task):
+def some_instructions_of(task):
     """Yield a few episodes of both pools with every option that can express them."""
     for split, index in itertools.product(("train", "test"), range(8)):
         episode = get_episode(task, split, index)
@@ -161,19 +165,24 @@ def spoken(task):
         ),
     ],
 )
-def test_a_file_with_a_mistake_is_refused_by_file_scenario_and_field(before, after, complaint):
-    assert before in DIRECT
+def test_a_mistake_in_a_scenario_file_is_reported_with_file_scenario_and_field(
+    before, after, complaint
+):
+    """A scenario is a little story around a command; `<it color: it>` marks a word that
+    refers back to a color, and the table pointers.toml lists all words that may."""
+    assert before in BIRTHDAY
     with pytest.raises(InvalidValueError, match=r"^mine\.toml") as found:
-        read(DIRECT.replace(before, after))
+        read_scenario_file(BIRTHDAY.replace(before, after))
     assert complaint in str(found.value)
 
 
-STEP = "{step} fewer [step: time|times] than <that reference: {he} did>"
+FEWER_THAN_HE_DID = "{step} fewer [step: time|times] than <that reference: {he} did>"
 
 
-def test_of_a_pointer_that_does_not_exist_the_five_nearest_are_named_each_once():
+def test_an_unknown_pointer_is_refused_with_the_five_nearest_known_ones():
+    """A pointer is a word that refers back, with what it refers to: `<that reference: that>`."""
     with pytest.raises(InvalidValueError) as found:
-        read(DIRECT.replace('["<it color: it>"]', f'["{STEP}"]'))
+        read_scenario_file(BIRTHDAY.replace('["<it color: it>"]', f'["{FEWER_THAN_HE_DID}"]'))
 
     nearest = re.search("for a reference: (.*) .* is any noun", str(found.value))[1].split("; ")
     assert len(nearest) == len(set(nearest)) == 5
@@ -194,17 +203,20 @@ def pointer_lines():
     return sorted(lines)
 
 
-def test_the_page_lists_every_pointer():
+def test_the_documentation_lists_every_pointer_of_the_table():
+    """A pointer is a word that refers back to something
+    said before, such as *it* or *the latter*."""
     lines = (DOCS / "scenario-marks.md").read_text().splitlines()
     table = lines[lines.index("| stands for | follows by | words |") + 2 :]
     assert sorted(table) == pointer_lines()
 
 
-def test_every_mistake_of_a_file_is_named_by_scenario_and_field():
-    wrong = DIRECT.replace('"train"', '"dev"').replace("\ncue", "\nclue")
+def test_all_mistakes_of_a_scenario_file_are_reported_at_once():
+    """Five mistakes in the scenario 'birthday', and two more in one that also stands twice."""
+    wrong = BIRTHDAY.replace('"train"', '"dev"').replace("\ncue", "\nclue")
     wrong = wrong.replace("{repeats} today", "{repeat} today").replace("{color} c", "{colr} c")
     wrong = wrong.replace("<it color: it>.", "<them color: it>")
-    again = RIVAL.replace("not_latter", "latest").partition("\n[")[2]
+    again = TWO_CUBES.replace("not_latter", "latest").partition("\n[")[2]
 
     with pytest.raises(InvalidValueError) as found:
         read_task_scenarios(f"{wrong}\n[{again}\n[{again}", "mine.toml")
@@ -226,40 +238,47 @@ def test_every_mistake_of_a_file_is_named_by_scenario_and_field():
 @pytest.mark.parametrize(
     ("text", "before", "after", "rule"),
     [
-        (DIRECT, "turns {repeats} today and ", "", "points at what the"),
-        (DIRECT, "wants to", "has a {color} one and wants to", "has 2 antecedents"),
-        (DIRECT, "Let's surprise", "You saw this. Surprise", "what was seen is not checked"),
-        (DIRECT, "The cake", "The second cake", "names second, which could be a value"),
-        (DIRECT, "The cake", "Look at that cake", "may be covered"),
-        (DIRECT, 'say.color = ["', 'lead = "Twice: "\nsay.color = ["', "names twice"),
-        (DIRECT, 'say.color = ["', 'lead = "Twice: "\nsay.color = ["', "gives away twice"),
-        (DIRECT, "The cake", "The cake " + "is so very good " * 9, "only 64 are heard"),
-        (DIRECT, "{rival color} one", "{rival color} one {list}",
+        (BIRTHDAY, "turns {repeats} today and ", "", "points at what the"),
+        (BIRTHDAY, "wants to", "has a {color} one and wants to", "has 2 antecedents"),
+        (BIRTHDAY, "Let's surprise", "You saw this. Surprise", "what was seen is not checked"),
+        (BIRTHDAY, "The cake", "The second cake", "names second, which could be a value"),
+        (BIRTHDAY, "The cake", "Look at that cake", "may be covered"),
+        (BIRTHDAY, 'say.color = ["', 'lead = "Twice: "\nsay.color = ["', "names twice"),
+        (BIRTHDAY, 'say.color = ["', 'lead = "Twice: "\nsay.color = ["', "gives away twice"),
+        (BIRTHDAY, "The cake", "The cake " + "is so very good " * 9, "only 64 are heard"),
+        (BIRTHDAY, "{rival color} one", "{rival color} one {list}",
          "a competing remark with a value for list or rival color in this"),
-        (DIRECT, "{rival color}", "{rival visit}", "known: aside.0"),
-        (RIVAL, "Not <former list.0: the", "Not <latter list.1: the", "the class 'former' for a"),
-        (RIVAL, "Do <former list.0: the former>", "Do <latter list.1: the latter>", "first point"),
+        (BIRTHDAY, "{rival color}", "{rival visit}", "known: aside.0"),
+        (TWO_CUBES, "Not <former list.0: the", "Not <latter list.1: the",
+         "the class 'former' for a"),
+        (TWO_CUBES, "Do <former list.0: the former>", "Do <latter list.1: the latter>",
+         "first point"),
         (FEWER, PHOTOS, "once for each of them", "say.repeats must stand"),
         (FEWER, " {reference:photo}", "", "says the same of another goal"),
         (FEWER, "once for each", "once per", "which does not exist"),
-        *((DIRECT, "The cake", f"{words}, the cake", f"names {words.lower()}")
+        *((BIRTHDAY, "The cake", f"{words}, the cake", f"names {words.lower()}")
           for words in ("Twice", "On the left", "Once", "Four")),
     ],
 )  # fmt: skip
-def test_the_checker_names_the_rule_that_a_scenario_breaks(text, before, after, rule):
+def test_the_checker_for_authors_names_the_rule_that_a_scenario_breaks(text, before, after, rule):
+    """Each case takes a scenario without a fault and replaces `before` by `after`."""
     scenes = scenes_of("PickXtimes", 0)[::10]
-    assert not check_scenarios(read(text), None, scenes)[0].broken
+    assert not check_scenarios(read_scenario_file(text), None, scenes)[0].broken
     assert before in text
 
     try:
-        words = read(text.replace(before, after))
+        words = read_scenario_file(text.replace(before, after))
         broken = list(check_scenarios(words, None, scenes)[0].broken)
     except InvalidValueError as error:  # said no expression of the table
         broken = [str(error)]
     assert any(rule in sentence for sentence in broken), broken
 
 
-def test_a_value_after_pointers_and_a_place_are_given_away_and_pointers_are_not():
+def test_a_value_or_place_of_the_goal_in_the_command_is_found_as_a_leak():
+    """A command that refers back must not name what the introduction has said.
+
+    *First* and *other* refer back and are no leak; *red* and *at the far left* are values.
+    """
     command = "Lift the first cube, then the other red cube at the far left."
     pointers = [
         Mention(0, command.index(word), command.index(word) + 5, "anaphor", word, "colors", "red")
@@ -277,7 +296,8 @@ def test_a_value_after_pointers_and_a_place_are_given_away_and_pointers_are_not(
     assert find_leaks(said, Goal.of(visit=1)) == {"at the far left"}
 
 
-def test_that_one_is_no_number_but_one_time_is():
+def test_the_word_one_is_a_leak_only_where_it_is_a_number():
+    """A leak is a value of the goal that the command names instead of referring back to it."""
     said = instruct(get_episode("PickXtimes", "test", 3), "direct")
     for words, leaks in {
         "Lift the one before that one.": set(),
@@ -289,9 +309,10 @@ def test_that_one_is_no_number_but_one_time_is():
         assert find_leaks(telling, Goal.of(color="red", repeats=1)) == leaks
 
 
-@pytest.mark.parametrize(("text", "setting"), [(DIRECT, "direct"), (FEWER, "reasoning")])
-def test_one_more_scenario_moves_no_text_but_those_that_say_it(text, setting):
-    (added,) = read(text).scenarios
+@pytest.mark.parametrize(("text", "setting"), [(BIRTHDAY, "direct"), (FEWER, "reasoning")])
+def test_adding_a_scenario_changes_only_the_episodes_that_choose_it(text, setting):
+    """Each episode draws one of the scenarios that fit; a new one must not redraw all others."""
+    (added,) = read_scenario_file(text).scenarios
     ours = [
         scenario
         for scenario in task_scenarios("PickXtimes").scenarios
@@ -310,14 +331,16 @@ def test_one_more_scenario_moves_no_text_but_those_that_say_it(text, setting):
     assert 3 < told < 60
 
 
-def test_the_example_of_the_page_breaks_no_rule_in_any_scene():
-    (report,) = check_scenarios(read(DIRECT), None, scenes_of("PickXtimes"))
+def test_the_example_scenario_of_the_documentation_breaks_no_rule():
+    (report,) = check_scenarios(read_scenario_file(BIRTHDAY), None, scenes_of("PickXtimes"))
     assert not report.broken
 
 
-def test_the_page_s_file_is_one_of_ones_own_and_its_two_places_serve_every_scene():
+def test_the_example_file_of_the_documentation_has_a_scenario_for_every_scene():
     scenes = scenes_of("PickXtimes", 0)[::4]
-    words = parse_wordings(OWN + PLACES, "mine.toml").tasks["PickXtimes"]
+    words = parse_wordings(USER_FILE_OF_THE_PAGE + SPATIAL_FILE_OF_THE_PAGE, "mine.toml").tasks[
+        "PickXtimes"
+    ]
 
     reports = check_scenarios(words, None, scenes)
 
@@ -334,26 +357,28 @@ def test_the_page_s_file_is_one_of_ones_own_and_its_two_places_serve_every_scene
         (WOBBLY, "{place:spot}", "{place.1}", "nothing has the place or clue that the introd"),
     ],
 )
-def test_of_a_scenario_that_fits_no_scene_the_reason_is_given(text, before, after, reason):
+def test_a_scenario_that_fits_no_scene_is_reported_with_the_reason(text, before, after, reason):
+    """No goal is reached by *nine fewer*, and no cube has a clue or a second place."""
     scenes = scenes_of("PickXtimes", 0)[:3]
-    (report,) = check_scenarios(read(text.replace(before, after)), None, scenes)
+    (report,) = check_scenarios(read_scenario_file(text.replace(before, after)), None, scenes)
 
     fits_none = f"fits none of the scenes; in PickXtimes/train/0 {reason}"
 
     assert [rule[: len(fits_none)] for rule in report.broken][-1:] == [fits_none]
 
 
-def test_authors_see_a_competing_remark_where_a_setting_has_one():
+def test_the_report_for_authors_shows_a_competing_remark_if_the_setting_has_one():
+    """A competing remark is a distraction about a color that is not wanted."""
     scenes = scenes_of("PickXtimes", 0)[::20]
-    for text, number in ((DIRECT, 1), (RIVAL, 0)):
-        (report,) = check_scenarios(read(text), None, scenes)
+    for text, number in ((BIRTHDAY, 1), (TWO_CUBES, 0)):
+        (report,) = check_scenarios(read_scenario_file(text), None, scenes)
         (*texts, _, _) = report_lines(report, "PickXtimes")
         shown = [text for text in texts if text.startswith("  With a competing remark: ")]
         assert len(shown) == number
         assert all(" one. Let's surprise" in text for text in shown)
 
 
-CONTAINER = """
+CONTAINER_FILE = """
 tasks = ["VideoUnmask"]
 [[scenario]]
 frame = "two for us"
@@ -375,18 +400,22 @@ say."colors.0" = ["WORDS"]
         ("<other colors.0: the other one>", True),
     ],
 )
-def test_words_for_a_container_that_point_at_its_cube_name_the_container(words, is_broken):
-    scenario = read(CONTAINER.replace("WORDS", words), "VideoUnmask").scenarios[0]
+def test_a_command_to_lift_the_cube_instead_of_its_container_is_a_broken_rule(words, is_broken):
+    """*Lift the other one* would mean the cube, which nobody can lift through its container."""
+    scenario = read_scenario_file(CONTAINER_FILE.replace("WORDS", words), "VideoUnmask").scenarios[
+        0
+    ]
     broken = any(
         "a container is lifted" in sentence for sentence in broken_sentences(scenario, "container")
     )
     assert broken == is_broken
 
 
-def test_a_resolved_text_that_is_too_long_is_marked():
+def test_a_text_that_is_too_long_only_when_it_names_everything_is_reported():
+    """The form *resolved* names all values again and so is longer than the usual one."""
     longer = "<it color: it> is much prettier than {person.2}'s {rival color} one."
-    text = DIRECT.replace("{person.2} has a {rival color} one.", longer)
-    (report,) = check_scenarios(read(text), None, scenes_of("PickXtimes"))
+    text = BIRTHDAY.replace("{person.2} has a {rival color} one.", longer)
+    (report,) = check_scenarios(read_scenario_file(text), None, scenes_of("PickXtimes"))
 
     (*_, complaint, example, _) = report_lines(report, "PickXtimes")
 
@@ -394,22 +423,24 @@ def test_a_resolved_text_that_is_too_long_is_marked():
     assert re.match(r"    resolved: .*Pick up the \w+ cube and put it on the target", example)
 
 
-def test_words_that_only_look_like_a_value_may_be_said_and_people_only_in_passing():
+def test_right_now_at_once_and_a_second_are_not_taken_for_values():
+    """The checker refuses words that could be a value of the goal, such as *right* or *once*."""
     words = (
         "All right, right now it's left at home. Once we're done, at once. Just a second, the cake"
     )
-    text = DIRECT.replace("The cake", words).replace("{person} turns", "My cat turns")
+    text = BIRTHDAY.replace("The cake", words).replace("{person} turns", "My cat turns")
     text = text.replace("{he}", "it").replace("surprise {him}", "surprise it")
     scenes = scenes_of("PickXtimes", 0)[::20]
 
-    (report,) = check_scenarios(read(text), None, scenes)
+    (report,) = check_scenarios(read_scenario_file(text), None, scenes)
 
     assert not set(report.broken) - {f"needs {tokens_of(report.longest)} tokens; only 64 are heard"}
 
 
 @pytest.mark.parametrize("task", WRITTEN)
 @pytest.mark.parametrize("step", [25, pytest.param(1, marks=pytest.mark.slow)])
-def test_no_scenario_breaks_a_rule_in_published_and_random_scenes(task, step):
+def test_none_of_our_scenarios_breaks_a_rule(task, step):
+    """In a sample of scenes (`step` > 1) a scenario may find none that it fits."""
     reports = check_scenarios(task_scenarios(task), None, scenes_of(task)[::step])
     broken = {
         report.scenario.fields.frame: dict(report.broken) for report in reports if report.broken
@@ -421,16 +452,18 @@ def test_no_scenario_breaks_a_rule_in_published_and_random_scenes(task, step):
 
 
 @pytest.mark.parametrize("task", WRITTEN)
-def test_every_published_scene_has_words_in_both_pools(task):
+def test_every_published_scene_can_be_commanded_in_every_setting_and_pool(task):
+    """A pool is a set of wordings, for training or for tests. Two settings may refuse a scene."""
     for episode, name, pool in itertools.product(scenes_of(task, 0), all_settings(), POOLS):
         if name in settings_of(get_task(task)):
             refused = find_refusal(episode, InstructionOptions(name, wordings=pool))
-            known = {"grounded": (None, UNSEEN), "direct-rival": (None, UNRIVALED)}
+            known = {"grounded": (None, NOTHING_TO_SEE), "direct-rival": (None, NO_SECOND_VALUE)}
             assert refused in known.get(name, (None,)), (episode.key, name, pool)
 
 
-def test_nobody_needs_several_cubes_where_one_is_to_be_put_into_the_bin():
-    """*I need more cubes like the one on the left. So put one like that one into the bin.*"""
+def test_a_story_does_not_speak_of_several_cubes_if_one_goes_into_the_bin():
+    """*I need more cubes like the one on the left. So
+    put one like that one into the bin.*"""
     single = 0
     for episode in split_episodes(["BinFill"], SPLITS):
         options = InstructionOptions("spatial", wordings="train")
@@ -444,9 +477,11 @@ def test_nobody_needs_several_cubes_where_one_is_to_be_put_into_the_bin():
 
 
 @pytest.mark.parametrize("task", WRITTEN)
-def test_instructions_keep_the_rules(task):
+def test_all_instructions_are_clean_text_with_consistent_metadata(task):
+    """Also: an instruction is the same when asked for again, a contextual one without context
+    is a direct one, and the form that names all values ends with the explicit command."""
     commands = {}
-    for episode, options, told in spoken(task):
+    for episode, options, told in some_instructions_of(task):
         notes = told.metadata
         assert notes["language_version"] == LANGUAGE_VERSION
         assert json.loads(json.dumps(notes)) == dict(notes)
@@ -486,7 +521,8 @@ def test_of_two_containers_only_one_has_to_be_found_out(name):
 
 
 @pytest.mark.parametrize("name", ["spatial", "grounded"])
-def test_of_several_amounts_one_color_has_to_be_found_out_and_the_others_are_stated(name):
+def test_of_several_amounts_only_the_color_of_one_has_to_be_found_out(name):
+    """*Two red cubes, and one like the one on the left*: the rest of the goal is stated."""
     hidden = defaultdict(set)
     for index, pool in itertools.product(range(120), POOLS):
         episode = get_episode("BinFill", "random", index)
@@ -507,7 +543,8 @@ def test_of_several_amounts_one_color_has_to_be_found_out_and_the_others_are_sta
     assert hidden[2] == {0, 1}
 
 
-def test_all_amounts_are_said_in_one_phrase_each_count_and_color_a_mention():
+def test_three_amounts_are_said_in_one_phrase_with_a_mention_for_each_value():
+    """A mention marks the span of the text that stands for a value of the goal."""
     scenes = scenes_of("BinFill", 0)
     episode = next(scene for scene in scenes if len(scene.goal["colors"]) == 3)
     said = instruct(episode)
@@ -517,7 +554,8 @@ def test_all_amounts_are_said_in_one_phrase_each_count_and_color_a_mention():
     assert values == [value for color, count in episode.goal.amounts for value in (count, color)]
 
 
-def test_a_clue_that_sets_two_things_aside_has_a_sentence_for_them():
+def test_a_clue_that_excludes_two_objects_mentions_these_in_a_sentence_first():
+    """A clue says what can be seen of the right object, in part by what it is not."""
     for index in range(60):
         episode = get_episode("PickXtimes", "random", index)
         options = InstructionOptions("grounded")
@@ -530,7 +568,8 @@ def test_a_clue_that_sets_two_things_aside_has_a_sentence_for_them():
 
 
 @pytest.mark.parametrize("kind", ["neutral", "competing"])
-def test_a_long_context_begins_with_the_shorter_one(kind):
+def test_a_context_of_nine_remarks_begins_with_those_of_a_context_of_two(kind):
+    """A dialogue has four turns besides its remarks: two before them, and two after them."""
     episode = get_episode("PickXtimes", "train", 2)
     few, many = (
         instruct(episode, "contextual", distractor=kind, distractors=number).turns
@@ -539,7 +578,8 @@ def test_a_long_context_begins_with_the_shorter_one(kind):
     assert (many[:4], many[-2:], len(many)) == (few[:4], few[-2:], 13)
 
 
-def test_each_arm_says_other_words_of_a_scenario():
+def test_each_control_run_of_an_episode_says_different_words():
+    """Controls are other words for the same goal, another goal, or the words in random order."""
     episode = get_episode("PickXtimes", "train", 2)
     options = InstructionOptions("direct")
     told = instruct_with(episode, options).text
@@ -549,17 +589,17 @@ def test_each_arm_says_other_words_of_a_scenario():
     assert len({told, *(arm.instruction.text for arm in arms)}) == 4
 
 
-def test_a_task_without_words_is_refused_in_a_sentence(monkeypatch):
+def test_a_task_without_a_file_of_words_is_refused_by_name(monkeypatch):
     take_words(monkeypatch, "VideoRepick")
     lacking = "has no commands of VideoRepick in the pool train."
 
     with pytest.raises(InvalidValueError, match=lacking):
-        read(DIRECT.replace("PickXtimes", "VideoRepick"))
+        read_scenario_file(BIRTHDAY.replace("PickXtimes", "VideoRepick"))
     with pytest.raises(InvalidValueError, match="VideoRepick names no file of words"):
         instruct(get_episode("VideoRepick", "test", 0), "direct")
 
 
-TWO_TASKS = """
+FILE_FOR_TWO_TASKS = """
 tasks = ["PickXtimes", "SwingXtimes"]
 [commands.all]
 train = ["Move {color} {repeats}."]
@@ -587,9 +627,11 @@ say.color = ["the cube <there place: there>"]
 """
 
 
-def test_a_file_serves_several_tasks_each_with_its_own_commands_and_scenarios():
-    pick = read(TWO_TASKS)
-    swing = read(TWO_TASKS, "SwingXtimes")
+def test_one_file_of_words_gives_each_of_its_tasks_its_own_commands():
+    """SwingXtimes has its own command in the pool test, its own phrase for
+    a number, and one scenario more; all else is shared with PickXtimes."""
+    pick = read_scenario_file(FILE_FOR_TWO_TASKS)
+    swing = read_scenario_file(FILE_FOR_TWO_TASKS, "SwingXtimes")
 
     assert pick.commands["train"] == swing.commands["train"] == ("Move {color} {repeats}.",)
     assert pick.commands["test"] == ("Take {color} {repeats}.",)
@@ -600,16 +642,16 @@ def test_a_file_serves_several_tasks_each_with_its_own_commands_and_scenarios():
     assert [scenario.fields.frame for scenario in swing.scenarios] == ["here", "there"]
 
 
-def test_a_file_without_commands_has_those_of_each_task():
-    text = TWO_TASKS.partition("[commands.all]")[0] + DIRECT.partition("\n")[2]
+def test_a_file_without_commands_uses_our_commands_of_each_task():
+    text = FILE_FOR_TWO_TASKS.partition("[commands.all]")[0] + BIRTHDAY.partition("\n")[2]
     for task in ("PickXtimes", "SwingXtimes"):
         own = task_scenarios(task)
-        assert read(text, task).commands == own.commands
-        (scenario,) = read(text, task).scenarios
+        assert read_scenario_file(text, task).commands == own.commands
+        (scenario,) = read_scenario_file(text, task).scenarios
         assert scenario not in own.scenarios
 
 
-SIMILAR = 0.7
+MOST_SHARED_WORDS = 0.7
 """Share of words from which two introductions are the same one with other nouns."""
 
 
@@ -632,8 +674,9 @@ def is_said(row, text):
     return re.search(pattern, text) is not None
 
 
-def test_every_pointer_is_said_in_both_pools():
-    """A pointer that one pool lacks would be new to whoever learned from the other one."""
+def test_every_pointer_is_used_both_in_training_and_in_test_words():
+    """A pointer refers back, such as *the latter*. One that training lacks would
+    be new to whoever learned from it, and the test would measure vocabulary."""
     said = dict.fromkeys(POOLS, "")
     for file in {get_task(task).words for task in WRITTEN}:
         written = tomllib.loads((FOLDER / file).read_text())["scenario"]
@@ -650,7 +693,8 @@ def test_every_pointer_is_said_in_both_pools():
     assert not lacking
 
 
-def test_no_implicit_text_of_the_test_split_is_said_in_training():
+def test_no_instruction_of_the_test_split_occurs_in_training():
+    """Explicit commands are left out: these are equal wherever the goals are."""
     said = dict.fromkeys(POOLS, frozenset())
     settings = [name for name in all_settings() if name != "explicit"]
 
@@ -665,13 +709,15 @@ def test_no_implicit_text_of_the_test_split_is_said_in_training():
     assert not said["train"] & said["test"]
 
 
-def test_no_frame_is_in_both_pools_or_twice_in_one():
+def test_every_scenario_name_is_unique_over_training_and_test_words():
     """Sentences are compared by the checker, which compares with all tasks."""
     frames = [scenario.fields.frame for pool in POOLS for scenario in scenarios_of(pool)]
     assert len(frames) == len(set(frames))
 
 
-def test_no_introduction_of_a_test_is_one_of_training_with_other_nouns():
+def test_no_test_introduction_is_a_training_one_with_other_nouns():
+    """Two introductions count as alike if they share 70 % of their words in the same order."""
+
     def words_of(scenario):
         introduction = literal(scenario.text("introduction")).lower()
         return re.findall(r"[\w']+", re.sub(r"\{[^}]*\}", "_", introduction))
@@ -681,10 +727,10 @@ def test_no_introduction_of_a_test_is_one_of_training_with_other_nouns():
         words = words_of(scenario)
         for other in known:
             alike = difflib.SequenceMatcher(None, words, other, autojunk=False).ratio()
-            assert alike < SIMILAR, (words, other)
+            assert alike < MOST_SHARED_WORDS, (words, other)
 
 
-def test_nobody_says_that_many_times_of_one():
+def test_that_many_times_is_never_said_of_once():
     """But of a one that was spun, where another number was, too."""
     words = task_scenarios("PickXtimes")
     scenarios = []
@@ -704,7 +750,7 @@ def test_nobody_says_that_many_times_of_one():
     assert found == {pool: {2, 3, 4, 5} for pool in POOLS}
 
 
-ONE_STEP = """
+ONE_STEP_BACK_FILE = """
 tasks = ["VideoPlaceOrder"]
 [[scenario]]
 frame = "one step"
@@ -718,17 +764,19 @@ say.placement = ["<that reference: that one>"]
 
 
 @pytest.mark.parametrize(("relation", "way"), [("one earlier", "back"), ("one later", "on")])
-def test_words_for_both_directions_mean_that_of_the_relations_of_their_scenario(relation, way):
-    text = ONE_STEP.replace("one earlier", relation).replace("back", way)
+def test_one_step_means_earlier_or_later_as_its_scenario_declares(relation, way):
+    """*We go back one* and *we go on one* use the same mark, `{step}`."""
+    text = ONE_STEP_BACK_FILE.replace("one earlier", relation).replace("back", way)
     scenes = scenes_of("VideoPlaceOrder", 0)[::4]
 
-    (report,) = check_scenarios(read(text, "VideoPlaceOrder"), None, scenes)
+    (report,) = check_scenarios(read_scenario_file(text, "VideoPlaceOrder"), None, scenes)
 
     assert report.scenes > report.broken.total() == 0
     assert all(f"go {way} one. " in text for text in report.renderings)
 
 
-def test_where_nothing_is_said_of_one_the_command_has_no_gap():
+def test_a_phrase_that_is_left_out_for_once_leaves_no_gap_in_the_command():
+    """*Put it back once for each rep, then press*: for one repetition the phrase is empty."""
     words = task_scenarios("VideoRepick")
     found = {}
     for episode in scenes_of("VideoRepick", 0)[::9]:
@@ -747,15 +795,16 @@ def test_where_nothing_is_said_of_one_the_command_has_no_gap():
 
 
 def test_no_number_of_one_or_two_is_given_away_by_singular_or_plural():
-    """*Once for that run* is one, and *once for each run* would be two: a command with one of them
-    leaves the color at least."""
+    """*Once for that run* is one, and *once for each run* would be
+    two: a command with one of them leaves the color at least."""
     scenarios = task_scenarios("PickByCount").scenarios
     for scenario in scenarios:
         said = str(scenario.texts.get("say.repeats", ()))
         assert "Agreement" not in said or scenario.said == ("color", "repeats"), scenario.fields
 
 
-def test_any_of_the_asides_of_a_scenario_can_be_said_before_the_others():
+def test_each_of_the_three_remarks_of_a_scenario_comes_first_in_some_episode():
+    """240 dialogues with one remark each: every scenario should show each of its remarks."""
     found = defaultdict(set)
     for index in range(240):
         episode = get_episode("StopCube", "random", index)
@@ -767,8 +816,9 @@ def test_any_of_the_asides_of_a_scenario_can_be_said_before_the_others():
     assert all(len(asides) == 3 for asides in found.values()), found
 
 
-def test_a_list_and_a_position_in_it_before_the_command_give_the_value():
-    """*It's the second one's turn, so lift the container over it.*"""
+def test_an_introduction_may_list_colors_and_then_pick_one_by_its_position():
+    """*It's the second one's turn, so lift the
+    container over it.*"""
     words = task_scenarios("VideoUnmask")
     scenes = scenes_of("VideoUnmask", 0)[::10]
 
@@ -778,7 +828,8 @@ def test_a_list_and_a_position_in_it_before_the_command_give_the_value():
 
 
 @pytest.mark.parametrize("task", ["ButtonUnmask", "ButtonUnmaskSwap"])
-def test_before_containers_stand_only_cubes_are_spoken_of(task):
+def test_introductions_do_not_mention_containers_that_are_not_there_yet(task):
+    """In these tasks the containers come down only after the button is pressed."""
     for scenario in task_scenarios(task).scenarios:
         texts = {name: text for name, text in scenario.texts.items() if "say." not in name}
         for text in itertools.chain.from_iterable(texts.values()):
@@ -787,14 +838,14 @@ def test_before_containers_stand_only_cubes_are_spoken_of(task):
             assert literal(text).startswith("the container over ")
 
 
-def test_a_place_at_the_start_of_the_video_is_not_called_a_place_of_now():
+def test_a_place_before_containers_move_is_said_to_be_one_at_the_start():
     for scenario in task_scenarios("VideoUnmaskSwap").scenarios:
         said = f"{literal(scenario.text('introduction'))} {literal(scenario.text('say.colors.0'))}"
         if scenario.fields.setting == "spatial" or "aside" in str(scenario.texts):
             assert re.search("start|beginning|before .* moved|as soon as they moved", said)
 
 
-def test_positions_count_cubes_that_are_named_by_color_and_by_place():
+def test_the_latter_may_follow_one_cube_named_by_place_and_one_by_color():
     text = """
 tasks = ["ButtonUnmask"]
 [[scenario]]
@@ -807,15 +858,17 @@ say.colors.1 = ["the one over <latter colors.1: {person.2}'s>"]
 """
     scenes = scenes_of("ButtonUnmask", 40)
 
-    (report,) = check_scenarios(read(text, "ButtonUnmask"), None, scenes)
+    (report,) = check_scenarios(read_scenario_file(text, "ButtonUnmask"), None, scenes)
 
     assert report.scenes > report.broken.total() == 0
 
 
-def test_a_person_stands_for_what_he_or_she_wants():
-    text = RIVAL.replace("We have", "{person} wants").replace("they still sell", "{person.2} wants")
+def test_his_or_hers_may_stand_for_the_color_that_a_person_wants():
+    text = TWO_CUBES.replace("We have", "{person} wants").replace(
+        "they still sell", "{person.2} wants"
+    )
     text = text.replace("<former list.0: the former>", "<former list.0: {hers}>")
-    words = read(text)
+    words = read_scenario_file(text)
 
     (report,) = check_scenarios(words, None, scenes_of("PickXtimes", 0)[::4])
 
@@ -823,7 +876,7 @@ def test_a_person_stands_for_what_he_or_she_wants():
     assert any(re.search(r" (?:his|hers): ", text) for text in report.renderings)
 
 
-def test_where_no_container_moves_none_is_followed():
+def test_words_of_a_task_without_moving_containers_do_not_speak_of_following_one():
     moved = r"follow|keep(?:ing)? (?:up|track)|los(?:es?|t|ing) track|shell game"
     for scenario in task_scenarios("ButtonUnmask").scenarios:
         texts = itertools.chain.from_iterable(scenario.texts.values())
@@ -835,7 +888,7 @@ ELSEWHERE = r"last|year|yesterday|home|at work|used to|his|her\b|their|old"
 
 
 @pytest.mark.parametrize("task", ["PickXtimes", "SwingXtimes", "VideoUnmask", "ButtonUnmaskSwap"])
-def test_a_competing_cube_is_elsewhere_and_not_that_of_the_cue(task):
+def test_a_remark_about_another_cube_places_it_away_from_the_table(task):
     """After *It's nicer than my green one*, *that cube* is the green one on the table."""
     for scenario in task_scenarios(task).scenarios:
         told = [literal(text) for text in scenario.texts.get("competing", ())]
@@ -844,7 +897,7 @@ def test_a_competing_cube_is_elsewhere_and_not_that_of_the_cue(task):
         assert not rivals or "that cube" not in literal(scenario.text("cue"))
 
 
-def test_the_one_i_mentioned_is_the_one_that_was_mentioned_there():
+def test_the_one_i_mentioned_always_says_where_it_was_mentioned():
     """A competing remark mentions another one, but not there."""
     for scenario in itertools.chain.from_iterable(map(scenarios_of, POOLS)):
         for texts in (scenario.texts.get(f"say.{name}", ()) for name in ("color", "colors.0")):
@@ -852,7 +905,7 @@ def test_the_one_i_mentioned_is_the_one_that_was_mentioned_there():
             assert "I mentioned" not in said or re.search("I mentioned (?:to|in) ", said), said
 
 
-MOMENTS = """
+BEFORE_OR_AFTER_FILE = """
 tasks = ["VideoPlaceButton"]
 [[scenario]]
 frame = "gone"
@@ -866,17 +919,18 @@ say.relation = ["on <other taken: the other one it used>"]
 """One of two moments is named, and the other one is meant."""
 
 
-def test_of_two_moments_the_other_one_is_meant_though_only_one_is_named():
-    words = read(MOMENTS, "VideoPlaceButton")
+def test_the_other_one_may_mean_the_moment_that_was_not_named():
+    """There are two moments, before and after a press; one is named as gone."""
+    words = read_scenario_file(BEFORE_OR_AFTER_FILE, "VideoPlaceButton")
     (report,) = check_scenarios(words, None, scenes_of("VideoPlaceButton", 0)[::10])
     assert report.scenes > report.broken.total() == 0
 
 
-def test_of_three_colors_the_other_one_is_open_if_only_one_is_named():
-    text = MOMENTS.replace('"relation"', '"color"').replace(".relation", ".color")
+def test_the_other_one_is_refused_if_two_of_three_colors_could_be_meant():
+    text = BEFORE_OR_AFTER_FILE.replace('"relation"', '"color"').replace(".relation", ".color")
     text = text.replace("target the robot used right {taken} pressing the button", "{taken} cube")
     text = text.replace("on <other taken: the other one it used>", "<other taken: the other one>")
-    words = read(text, "VideoPlaceButton")
+    words = read_scenario_file(text, "VideoPlaceButton")
     (report,) = check_scenarios(words, None, scenes_of("VideoPlaceButton", 0)[::10])
 
     assert "means no goal, another one, or several" in report.broken
@@ -885,7 +939,7 @@ def test_of_three_colors_the_other_one_is_open_if_only_one_is_named():
     assert either in report.broken
 
 
-def test_a_cube_and_a_moment_are_not_taken_for_each_other():
+def test_one_may_refer_to_a_cube_and_another_to_a_moment_in_the_same_scenario():
     words = task_scenarios("VideoPlaceButton")
     scenes = scenes_of("VideoPlaceButton", 0)[::10]
 
@@ -894,7 +948,7 @@ def test_a_cube_and_a_moment_are_not_taken_for_each_other():
     assert report.scenes > report.broken.total() == 0
 
 
-def test_a_target_may_be_called_there_though_it_has_moved():
+def test_a_target_that_has_moved_may_still_be_called_there():
     words = task_scenarios("VideoPlaceButton")
     scenes = scenes_of("VideoPlaceButton", 0)
     moved = [scene for scene in scenes if scene.scene.motions_of(Swap)][::5]
@@ -904,7 +958,7 @@ def test_a_target_may_be_called_there_though_it_has_moved():
     assert report.scenes > report.broken.total() == 0
 
 
-def test_a_target_on_one_side_is_no_target_with_words_that_point_back():
+def test_the_target_on_the_left_is_not_taken_for_words_that_refer_back():
     scenes = scenes_of("VideoPlaceButton")
     (report,) = check_scenarios(
         task_scenarios("VideoPlaceButton"), "going with that target", scenes

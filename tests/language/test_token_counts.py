@@ -25,13 +25,14 @@ def tokenizer():
     return SentencePieceProcessor(model_file=str(model))
 
 
-def test_the_vocabulary_is_small(tokenizer):
+def test_the_tokenizer_that_counts_has_a_small_vocabulary(tokenizer):
     # Those of the compared systems have 49,000 to 257,000 pieces, and so need fewer of them.
     assert tokenizer.vocab_size() <= 32_000
 
 
 @pytest.mark.parametrize("task", every_task())
-def test_so_it_is_with_all_options(tokenizer, task):
+def test_our_token_count_agrees_with_the_tokenizer_for_every_option(tokenizer, task):
+    """The package counts tokens without a tokenizer, from a table of words."""
     for index in range(3):
         episode = get_episode(task, "random", index)
         for options in expressible_options(episode, POOLS[index % 2]):
@@ -41,7 +42,8 @@ def test_so_it_is_with_all_options(tokenizer, task):
 
 @settings(max_examples=40)
 @given(text=st.text(st.characters(codec="ascii", categories=("L", "P", "Zs")), max_size=60))
-def test_other_words_are_not_counted_too_low(tokenizer, text):
+def test_our_token_count_of_any_text_is_never_too_low(tokenizer, text):
+    """A policy cuts what is too long, so too high is safe."""
     text = " ".join(text.split())  # as policies do
     assert count_tokens(text) >= len(tokenizer.encode(text)) + ADDED_TOKENS
 
@@ -51,7 +53,7 @@ def every_second(task):
 
 
 @pytest.mark.slow
-def test_default_instructions_are_counted_right_and_heard_by_a_policy_that_reads_64(tokenizer):
+def test_all_default_instructions_fit_into_64_tokens(tokenizer):
     said = [
         instruction
         for task in every_task()
@@ -66,7 +68,7 @@ def test_default_instructions_are_counted_right_and_heard_by_a_policy_that_reads
 
 
 @pytest.mark.parametrize("setting", ["explicit", "direct", "reasoning"])
-def test_nearly_every_simple_one_is_heard_by_a_policy_that_reads_48(setting):
+def test_95_percent_of_the_simple_instructions_fit_into_48_tokens(setting):
     counts = [
         count_tokens(instruct(episode, setting).text)
         for task in every_task()

@@ -31,7 +31,9 @@ from roboirg.tasks import get_task, goals_of
 from roboirg.tasks.splits.splits import get_episode
 
 PAGE = (Path(__file__).parents[2] / "docs/wording-files.md").read_text()
-SPOKEN, WHOLE = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+COMMAND_FILE_OF_THE_PAGE, SENTENCE_FILE_OF_THE_PAGE = re.findall(
+    r"```toml\n(.*?)```", PAGE, re.DOTALL
+)
 """The page's examples: a command and scenarios; a whole sentence."""
 SENTENCE = "lift the {0} cube to the target, repeat {1}"
 HEAD = 'name = "hand"\ntasks = ["PickXtimes"]\n'
@@ -50,10 +52,12 @@ def literal(color, repeats, text=SENTENCE):
     return f'[[literal]]\ntask = "PickXtimes"\n{when}\ntext = "{text.format(color, repeats)}"\n'
 
 
-LITERALS = HEAD + "".join(literal("red", number) + literal("blue", number) for number in (1, 2, 3))
+SIX_SENTENCES = HEAD + "".join(
+    literal("red", number) + literal("blue", number) for number in (1, 2, 3)
+)
 
 
-def opened(text):
+def identity_of(text):
     """Return the identity of open wordings."""
     return register_wordings(parse_wordings(text, "words.toml"))
 
@@ -74,8 +78,9 @@ def options_of(task, **changes):
             yield InstructionOptions(setting, form, **changes)
 
 
-def test_a_whole_sentence_is_explicit_and_all_other_settings_say_ours():
-    identity = opened(LITERALS)
+def test_a_sentence_of_a_user_s_file_is_said_in_the_explicit_setting_only():
+    """A wording file may bring a whole sentence for a goal; other settings keep our words."""
+    identity = identity_of(SIX_SENTENCES)
     episode = episode_with("PickXtimes", color="red", repeats=2)
     for ours in options_of("PickXtimes"):
         if find_refusal(episode, ours) is not None:
@@ -93,8 +98,9 @@ def test_a_whole_sentence_is_explicit_and_all_other_settings_say_ours():
             assert said.metadata["command"] == "own"
 
 
-def test_a_goal_without_its_sentence_is_refused_in_explicit_only():
-    identity = opened(LITERALS)
+def test_a_goal_without_a_sentence_in_a_user_s_file_is_refused_in_explicit():
+    """The file has sentences for red and blue cubes; the goal is a green one."""
+    identity = identity_of(SIX_SENTENCES)
     episode = episode_with("PickXtimes", color="green", repeats=2)
     complaint = (
         f"{identity} has no sentence of PickXtimes for the goal: green, twice; leave explicit out"
@@ -105,11 +111,11 @@ def test_a_goal_without_its_sentence_is_refused_in_explicit_only():
     assert instruct(episode, "direct", wordings=identity).text
 
 
-def test_a_task_without_words_of_ours_can_have_sentences(monkeypatch):
+def test_a_user_s_sentences_can_serve_a_task_that_has_no_words_of_ours(monkeypatch):
     take_words(monkeypatch, "VideoRepick")
     slots = "when = { repeats = 2 }"
     head = 'name = "a"\ntasks = ["VideoRepick"]\n'
-    identity = opened(f'{head}[[literal]]\ntask = "VideoRepick"\n{slots}\ntext = "go"')
+    identity = identity_of(f'{head}[[literal]]\ntask = "VideoRepick"\n{slots}\ntext = "go"')
     goal = next(iter(find_wordings(identity).tasks["VideoRepick"].literals))
 
     episode = replace(episode_with("VideoRepick"), goal=goal)
@@ -119,9 +125,10 @@ def test_a_task_without_words_of_ours_can_have_sentences(monkeypatch):
         instruct(episode, "direct", wordings=identity)
 
 
-def test_a_sentence_means_each_goal_for_which_the_file_says_it():
+def test_a_sentence_given_for_two_goals_means_both():
+    """*Do the usual with the red cube* stands for once and for twice."""
     several = "do the usual with the {0} cube"
-    identity = opened(
+    identity = identity_of(
         HEAD + literal("red", 1, several) + literal("red", 2, several) + literal("blue", 1)
     )
     episode = episode_with("PickXtimes", color="red", repeats=1)
@@ -135,12 +142,12 @@ def test_a_sentence_means_each_goal_for_which_the_file_says_it():
         assert set(goals(said, episode)) == wanted
 
 
-def test_the_words_of_the_page_are_checked_and_said(tmp_path):
+def test_the_example_file_of_the_documentation_passes_the_check_and_is_spoken(tmp_path):
     """Whoever follows the page sees what it promises."""
     assert len(PAGE.split()) <= 950
 
     file = tmp_path / "mine.toml"
-    file.write_text(SPOKEN)
+    file.write_text(COMMAND_FILE_OF_THE_PAGE)
     checked = CliRunner().invoke(
         cli.app, ["language", "check-scenarios", str(file), "--seeds", "0"]
     )
@@ -163,45 +170,48 @@ def test_the_words_of_the_page_are_checked_and_said(tmp_path):
     assert told[shown.replace("\n", " ")] == "fresh paint"
 
 
-def check(file, text):
+def run_check(file, text):
     """Return what the check of a file prints."""
     file.write_text(text)
     return CliRunner().invoke(cli.app, ["language", "check-scenarios", str(file), "--seeds", "0"])
 
 
-def test_the_commands_of_the_page_state_every_goal_of_their_tasks(tmp_path):
+def test_the_example_commands_of_the_documentation_state_every_goal(tmp_path):
     rows = re.findall(r"\n\| ([A-Z]\w+)[^|]* \| (`[^|]+`) \|", PAGE)
     assert [task for task, _ in rows] == ["SwingXtimes", "StopCube", "BinFill", "VideoUnmask"]
 
     commands = [f"{task} = {re.findall('`(.*?)`', cell)}" for task, cell in rows]
     head = f'name = "mine"\ntasks = {[task for task, _ in rows]}\n[commands]\n'
-    checked = check(tmp_path / "mine.toml", head + "\n".join(commands))
+    checked = run_check(tmp_path / "mine.toml", head + "\n".join(commands))
     assert checked.exit_code == 0, checked.output
     assert checked.output.count("explicit (") == len(rows)
 
 
-def test_up_to_ten_goals_without_a_sentence_are_named_in_a_line_and_not_broken(tmp_path):
-    checked = check(tmp_path / "theirs.toml", WHOLE)
+def test_goals_without_a_sentence_are_listed_but_are_no_error(tmp_path):
+    """A file of whole sentences need not cover all goals; at most ten are listed."""
+    checked = run_check(tmp_path / "theirs.toml", SENTENCE_FILE_OF_THE_PAGE)
     assert checked.exit_code == 0
     assert "3 goals, such as: on visit 3; on visit 4; on visit 5. Episodes" in checked.output
 
-    many = check(tmp_path / "hand.toml", HEAD + literal("red", 2)).output
+    many = run_check(tmp_path / "hand.toml", HEAD + literal("red", 2)).output
     (listed,) = re.findall(r"No sentence of 14 goals, such as: (.*)\. Episodes", many)
     assert len(set(listed.split("; "))) == 10
 
-    never = WHOLE.replace("visit = 2", "visit = 77")
-    assert "BROKEN states no goal" in check(tmp_path / "theirs.toml", never).output
+    never = SENTENCE_FILE_OF_THE_PAGE.replace("visit = 2", "visit = 77")
+    assert "BROKEN states no goal" in run_check(tmp_path / "theirs.toml", never).output
 
 
-def test_a_mistake_of_a_command_for_both_pools_is_named_once():
+def test_a_mistake_in_a_command_for_training_and_tests_is_reported_once():
     with pytest.raises(InvalidValueError) as caught:
         parse_wordings(f"{HEAD}[commands]\nall = ['Très {{color}} {{repeats}}.']", "words.toml")
     assert str(caught.value).count("printable ASCII") == 1
 
 
-def test_the_length_of_foreign_words_is_the_same_everywhere_and_a_bound_without_a_tokenizer(
-    tmp_path, monkeypatch
-):
+def test_words_outside_our_table_have_an_exact_length_with_a_tokenizer_only(tmp_path, monkeypatch):
+    """*Juggle* is in no table of token counts; without a tokenizer the length is "at most".
+
+    The check and the command that shows an episode must print the same length.
+    """
     file = tmp_path / "mine.toml"
     text = f'{HEAD}[commands]\nall = ["Juggle {{color}} {{repeats}}."]'
     shown = ["show", "PickXtimes", "3", "--words", "--wordings", str(file)]
@@ -209,14 +219,14 @@ def test_the_length_of_foreign_words_is_the_same_everywhere_and_a_bound_without_
         if not has_tokenizer:
             monkeypatch.setattr(token_counts, "_tokenizer", lambda: None)
             token_counts.tokens_of.cache_clear()
-        longest = re.search(r"  (.*) of 64 tokens; states", check(file, text).output)[1]
+        longest = re.search(r"  (.*) of 64 tokens; states", run_check(file, text).output)[1]
         assert re.fullmatch(rf"{bound}\d+", longest)
         explicit = CliRunner().invoke(cli.app, [*shown, "--settings", "explicit"]).output
         assert f"({longest} tokens)" in explicit
     token_counts.tokens_of.cache_clear()
 
 
-def test_the_check_finds_a_setting_without_a_scenario_for_some_scenes(tmp_path):
+def test_the_check_reports_scenes_that_no_scenario_of_the_file_fits(tmp_path):
     """Such an episode is refused in a run; the command that the check prints shows why."""
     file = tmp_path / "mine.toml"
     file.write_text(HEAD + SCENARIO)
@@ -234,7 +244,7 @@ def test_the_check_finds_a_setting_without_a_scenario_for_some_scenes(tmp_path):
     assert re.search(f"spatial cannot express the episode: .*{why}", shown)
 
 
-def test_the_check_finds_a_command_that_lacks_a_field_or_hides_its_value(tmp_path):
+def test_the_check_reports_a_command_that_does_not_state_the_goal(tmp_path):
     file = tmp_path / "mine.toml"
     for command, complaint in (
         ('["Lift {color}."]', "has no command of PickXtimes with {color} and {repeats}"),
@@ -247,8 +257,8 @@ def test_the_check_finds_a_command_that_lacks_a_field_or_hides_its_value(tmp_pat
 
 
 @pytest.mark.parametrize("pool", POOLS)
-def test_scenarios_of_ones_own_replace_ours_setting_by_setting_and_move_no_draw(pool):
-    identity = opened(HEAD + SCENARIO)
+def test_a_user_s_spatial_scenario_changes_the_spatial_setting_only(pool):
+    identity = identity_of(HEAD + SCENARIO)
     split = {"train": "train", "test": "test"}[pool]
     for index in range(12):
         episode = get_episode("PickXtimes", split, index)
@@ -265,23 +275,24 @@ def test_scenarios_of_ones_own_replace_ours_setting_by_setting_and_move_no_draw(
                 assert (said.turns, said.mentions) == (own.turns, own.mentions)
 
 
-def test_a_scenario_with_a_pool_is_said_in_this_one_only():
-    identity = opened(HEAD + SCENARIO.replace("setting", 'pool = "train"\nsetting'))
+def test_a_scenario_for_training_is_not_said_in_test_episodes():
+    identity = identity_of(HEAD + SCENARIO.replace("setting", 'pool = "train"\nsetting'))
     options = InstructionOptions("spatial", wordings=identity)
     assert "no spatial scenario for it in the pool test" in find_refusal(
         get_episode("PickXtimes", "test", 0), options
     )
 
 
-def test_stated_values_of_ones_own_leave_the_others_ours():
-    identity = opened(HEAD + '[stated.PickXtimes]\ncolor = "our {color} cube"\n')
+def test_a_user_s_phrase_for_the_color_leaves_the_one_for_the_number():
+    identity = identity_of(HEAD + '[stated.PickXtimes]\ncolor = "our {color} cube"\n')
     said = instruct(episode_with("PickXtimes", color="red", repeats=3), wordings=identity).text
 
     assert "our red cube" in said
     assert "three times" in said
 
 
-def test_the_digest_of_words_is_of_what_is_said():
+def test_the_digest_of_a_wording_file_changes_with_what_is_said_only():
+    """A comment or another task changes nothing; a sentence, command or pool does."""
     ours = words_digest("PickXtimes", "test")
     pool = SCENARIO.replace("setting", 'pool = "train"\nsetting', 1)
     texts = {
@@ -289,11 +300,11 @@ def test_the_digest_of_words_is_of_what_is_said():
         "comment": HEAD + "# mine\n" + SCENARIO,
         "dust": HEAD + SCENARIO.replace("dusty {", "full of dust {"),
         "command": HEAD + SCENARIO + '[commands]\nall = ["Do {color} {repeats}."]\n',
-        "sentences": LITERALS,
+        "sentences": SIX_SENTENCES,
         "pool": HEAD + pool,
     }
     found = {
-        name: words_digest("PickXtimes", "test", "explicit", opened(text))
+        name: words_digest("PickXtimes", "test", "explicit", identity_of(text))
         for name, text in texts.items()
     }
 
@@ -301,16 +312,16 @@ def test_the_digest_of_words_is_of_what_is_said():
     assert len({ours, *found.values()}) == len(found) + 1
 
     other = texts["dust"].replace('"PickXtimes"', '"PickXtimes", "SwingXtimes"')
-    assert words_digest("PickXtimes", "test", "explicit", opened(other)) == found["dust"]
+    assert words_digest("PickXtimes", "test", "explicit", identity_of(other)) == found["dust"]
     assert words_digest("PickXtimes", "test") == ours
 
-    identity = opened(texts["same"])
+    identity = identity_of(texts["same"])
     said = instruct(get_episode("PickXtimes", "test", 0), wordings=identity)
     assert said.metadata["words"] == words_of("PickXtimes", "test", wordings=identity)
 
 
-def test_what_a_file_cannot_serve_is_refused_in_a_sentence():
-    spoken = opened(HEAD + SCENARIO)
+def test_a_task_that_the_wording_file_lacks_is_refused_with_the_option_to_use():
+    spoken = identity_of(HEAD + SCENARIO)
     episode = episode_with("PickXtimes")
     stop = episode_with("StopCube")
     lacking = f"^The wording file {spoken} has no words of StopCube; name .*: --tasks PickXtimes"
@@ -391,7 +402,7 @@ OLD = '[PickXtimes]\nown = ["direct"]\n[[PickXtimes.commands]]\ntext = "lift {co
          "literal 1: There is no task 'StopCube'; known"),
     ],
 )  # fmt: skip
-def test_a_bad_file_is_refused_by_name_field_value_and_what_would_be_right(text, complaint):
+def test_a_bad_wording_file_is_refused_in_one_line_with_the_faulty_field(text, complaint):
     with pytest.raises(InvalidValueError) as caught:
         parse_wordings(text, "words.toml")
     assert complaint in str(caught.value)
@@ -399,7 +410,7 @@ def test_a_bad_file_is_refused_by_name_field_value_and_what_would_be_right(text,
     assert "\n" not in str(caught.value)
 
 
-def test_an_empty_table_of_commands_is_no_command_of_ours():
+def test_an_empty_table_of_commands_is_refused_and_not_filled_with_ours():
     with pytest.raises(InvalidValueError) as caught:
         parse_wordings(f"{HEAD}[commands.PickXtimes]\n{SCENARIO}", "words.toml")
     lines = [f"words.toml has no commands of PickXtimes in the pool {pool}." for pool in POOLS]
@@ -415,7 +426,7 @@ def test_an_empty_table_of_commands_is_no_command_of_ours():
         "[[scenario]]\n" * 5000,
     ],
 )
-def test_complaints_of_a_large_file_stay_short(wrong):
+def test_error_messages_about_a_huge_file_stay_short(wrong):
     text = f'{HEAD}[[scenario]]\nframe = "{"A" * 200_000}"\nsetting = "direct"\n{wrong}'
     with pytest.raises(InvalidValueError) as caught:
         parse_wordings(text, "words.toml")
@@ -423,33 +434,34 @@ def test_complaints_of_a_large_file_stay_short(wrong):
     assert max(map(len, str(caught.value).splitlines())) <= 2_000
 
 
-def test_a_file_with_a_byte_order_mark_is_the_same_wordings(tmp_path):
+def test_a_byte_order_mark_does_not_change_the_identity_of_a_file(tmp_path):
+    """Editors on Windows add such a mark to the beginning of a text file."""
     path = tmp_path / "words.toml"
-    path.write_text(LITERALS)
+    path.write_text(SIX_SENTENCES)
     usual = open_wordings(path)
-    path.write_text(LITERALS, encoding="utf-8-sig")
+    path.write_text(SIX_SENTENCES, encoding="utf-8-sig")
 
     assert open_wordings(path) == usual
 
 
-def test_a_task_named_twice_has_its_words_once():
+def test_naming_a_task_twice_does_not_change_the_digest():
     twice = HEAD.replace('"PickXtimes"', '"PickXtimes", "PickXtimes"')
     needing = SCENARIO + 'needs.tasks = ["PickXtimes", "PickXtimes"]\n'
 
     digests = [
-        words_digest("PickXtimes", "test", "spatial", opened(text))
+        words_digest("PickXtimes", "test", "spatial", identity_of(text))
         for text in (HEAD + SCENARIO, twice + SCENARIO, twice + needing)
     ]
 
     assert len(set(digests)) == 1
 
 
-BIN = 'name = "bin"\ntasks = ["BinFill"]\n'
+BIN_HEAD = 'name = "bin"\ntasks = ["BinFill"]\n'
 
 
 def bin_literals(goals, step):
     """Return a sentence for each goal, with its colors from the first to the last or back."""
-    tables = [BIN]
+    tables = [BIN_HEAD]
     for goal in goals:
         colors = list(goal["colors"])[::step]
         counts = list(goal["counts"])[::step]
@@ -460,11 +472,12 @@ def bin_literals(goals, step):
 
 
 @pytest.mark.parametrize("step", [1, -1])
-def test_a_sentence_of_amounts_is_found_in_any_order_of_colors(step):
+def test_a_sentence_for_amounts_is_found_whatever_the_order_of_its_colors(step):
+    """`step` -1 writes the colors of each BinFill goal in reverse."""
     episodes = [get_episode("BinFill", "test", index) for index in range(12)]
     goals = {goal for episode in episodes for goal in goals_of(episode)}
 
-    identity = opened(bin_literals(goals, step))
+    identity = identity_of(bin_literals(goals, step))
 
     assert max(len(episode.goal["colors"]) for episode in episodes) > 1
     for episode in episodes:
@@ -472,16 +485,17 @@ def test_a_sentence_of_amounts_is_found_in_any_order_of_colors(step):
         assert understood_goals(said, episode) == (episode.goal,)
 
 
-def test_the_check_names_a_sentence_for_a_goal_that_no_scene_has(tmp_path):
+def test_the_check_reports_a_sentence_for_an_impossible_goal(tmp_path):
+    """The cube of StopCube visits its target at most five times."""
     file = tmp_path / "theirs.toml"
-    file.write_text(WHOLE.replace("visit = 2", "visit = 99"))
+    file.write_text(SENTENCE_FILE_OF_THE_PAGE.replace("visit = 2", "visit = 99"))
 
     checked = CliRunner().invoke(cli.app, ["language", "check-scenarios", str(file)])
 
     assert "  No scene has the goal of a sentence: on visit 99\n" in checked.output
 
 
-LED = """
+PAINT_SCENARIO = """
 [[scenario]]
 frame = "paint"
 setting = "direct"
@@ -505,8 +519,8 @@ say.color = ["<it color: it>"]
         ("If you can, lift {color} {repeats}.", "So if you can, lift it"),
     ],
 )
-def test_a_command_after_a_lead_keeps_its_capitals_where_english_does(command, begun):
-    identity = opened(f'{HEAD}[commands]\nall = ["{command}"]\n{LED}')
+def test_so_before_a_command_lowers_its_first_letter_except_in_i_and_leds(command, begun):
+    identity = identity_of(f'{HEAD}[commands]\nall = ["{command}"]\n{PAINT_SCENARIO}')
     said = instruct(get_episode("PickXtimes", "test", 3), "direct", wordings=identity)
     assert said.command.startswith(begun)
 
@@ -515,18 +529,19 @@ def test_a_command_after_a_lead_keeps_its_capitals_where_english_does(command, b
     ("before", "after"),
     [('lead = "So "', 'lead = "Take the {color} one: "'), ("it>", "it>, the {color} one,")],
 )
-def test_a_field_whose_value_the_command_names_is_settled_whatever_points_back(before, after):
+def test_a_command_that_names_the_color_leaves_one_goal_even_if_it_also_says_it(before, after):
+    """With *it* alone three colors are open, and one value is hidden; named, none is."""
     episode = get_episode("PickXtimes", "test", 3)
     said = [
-        instruct(episode, "direct", wordings=opened(HEAD + text))
-        for text in (LED, LED.replace(before, after))
+        instruct(episode, "direct", wordings=identity_of(HEAD + text))
+        for text in (PAINT_SCENARIO, PAINT_SCENARIO.replace(before, after))
     ]
 
     assert [len(command_goals(instruction.meaning, episode)) for instruction in said] == [3, 1]
     assert [instruction.metadata["hidden_slots"] for instruction in said] == [1, 0]
 
 
-def test_the_terms_of_a_meaning_stand_in_the_order_of_the_goal():
+def test_the_declared_meaning_lists_values_in_the_order_of_the_goal():
     for task in ("PickXtimes", "BinFill", "VideoUnmask"):
         episode = get_episode(task, "test", 3)
         fields = [value.field for value in values_of_goal(episode.goal)]
@@ -542,10 +557,11 @@ def test_the_terms_of_a_meaning_stand_in_the_order_of_the_goal():
         ('["<it color: it>"]', '["{rank}, <it color: it>"]', "direct", "'rank'"),
     ],
 )
-def test_a_scenario_that_speaks_of_what_is_not_there_is_refused_by_file_and_frame(
+def test_a_scenario_with_a_mark_that_has_no_value_is_refused_by_file_and_name(
     before, after, setting, lacking
 ):
-    identity = opened(HEAD + LED.replace(before, after))
+    """`{excluded}` needs a rule that excludes colors, and `{rank}` needs a list."""
+    identity = identity_of(HEAD + PAINT_SCENARIO.replace(before, after))
     episode = get_episode("PickXtimes", "test", 3)
     sentence = f"words.toml, scenario 'paint', lacks {lacking}"
     options = {"stages": (1, 2, 3, 5), "distractor": "competing"} if setting == "contextual" else {}
@@ -554,9 +570,10 @@ def test_a_scenario_that_speaks_of_what_is_not_there_is_refused_by_file_and_fram
         instruct(episode, setting, wordings=identity, **options)
 
 
-def test_a_list_of_a_slot_that_only_another_task_has_fits_no_episode():
+def test_a_scenario_that_lists_values_of_another_task_fits_no_episode():
+    """PickXtimes has no visits; the file also serves StopCube, which has."""
     head = HEAD.replace('"PickXtimes"', '"PickXtimes", "StopCube"')
-    identity = opened(head + LED + 'list = "visit"\n')
+    identity = identity_of(head + PAINT_SCENARIO + 'list = "visit"\n')
     options = InstructionOptions("direct", wordings=identity)
 
     refused = find_refusal(get_episode("PickXtimes", "test", 3), options)
@@ -564,9 +581,9 @@ def test_a_list_of_a_slot_that_only_another_task_has_fits_no_episode():
     assert "has no direct scenario for it in the pool test" in refused
 
 
-PIECES = st.sampled_from(
+PIECES_OF_FILES = st.sampled_from(
     [
-        *re.split(r"(\s|[\[\]{}=.,])", LITERALS + SCENARIO),
+        *re.split(r"(\s|[\[\]{}=.,])", SIX_SENTENCES + SCENARIO),
         "[[",
         "{a=",
         "\0",
@@ -577,24 +594,26 @@ PIECES = st.sampled_from(
 )
 
 
-@given(st.lists(st.one_of(PIECES, st.text(max_size=3)), max_size=40).map("".join))
-def test_any_text_is_a_file_or_refused(text):
+@given(st.lists(st.one_of(PIECES_OF_FILES, st.text(max_size=3)), max_size=40).map("".join))
+def test_any_text_is_read_as_a_wording_file_or_refused(text):
+    """Pieces of real files in random order: no other error may come out."""
     with contextlib.suppress(InvalidValueError):
         parse_wordings(HEAD + text, "words.toml")
 
 
 @pytest.mark.parametrize("name", ["missing.toml", "nul\0.toml", "bytes.toml", ""])
-def test_a_file_that_cannot_be_read_is_refused(tmp_path, name):
+def test_a_missing_or_binary_wording_file_is_refused(tmp_path, name):
     (tmp_path / "bytes.toml").write_bytes(b"\xff")
     with pytest.raises(InvalidValueError, match="cannot be read"):
         read_wordings(tmp_path / name)
 
 
-def test_a_changed_file_is_other_wordings(tmp_path):
+def test_a_wording_file_that_changed_no_longer_serves_episodes_of_its_old_version(tmp_path):
+    """The identity is the file's name and a digest. What was open once stays so in this process."""
     path = tmp_path / "words.toml"
-    path.write_text(LITERALS)
+    path.write_text(SIX_SENTENCES)
     identity = open_wordings(path)
-    path.write_text(LITERALS.replace("lift", "take"))
+    path.write_text(SIX_SENTENCES.replace("lift", "take"))
     changed = open_wordings(path)
 
     assert changed != identity

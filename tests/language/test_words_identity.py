@@ -13,7 +13,7 @@ from roboirg.language.scenarios.scenario import General
 from roboirg.language.scenarios.scenario_file import general, read_task_scenarios
 from roboirg.tasks.splits.splits import get_episode
 
-HEAD = """
+COMMANDS = """
 tasks = ["PickXtimes"]
 [commands.all]
 train = ["Pick up {color} {repeats}.", "Lift {color} {repeats}."]
@@ -22,7 +22,7 @@ test = ["Take {color} {repeats}."]
 color = "the {color} cube"
 repeats = "{repeats:times}"
 """
-SPATIAL = """
+SCENARIO = """
 [[scenario]]
 frame = "%s"
 pool = "train"
@@ -30,8 +30,8 @@ setting = "spatial"
 introduction = "Look %s."
 say.color = ["<it color: it>", "<one color: the one I mentioned>"]
 """
-NEAR = SPATIAL % ("near", "{place:spot}")
-FAR = SPATIAL % ("far", "{place}")
+NEAR_SCENARIO = SCENARIO % ("near", "{place:spot}")
+FAR_SCENARIO = SCENARIO % ("far", "{place}")
 OTHER_TASK = (
     """
 [commands.SwingXtimes]
@@ -39,13 +39,13 @@ train = ["Swing {color} {repeats}."]
 [stated.SwingXtimes]
 color = "that {color} cube"
 """
-    + (SPATIAL + 'needs.tasks = ["SwingXtimes"]\n') % ("over there", "{place}")
+    + (SCENARIO + 'needs.tasks = ["SwingXtimes"]\n') % ("over there", "{place}")
 )
-OTHER_POOL = SPATIAL.replace('"train"', '"test"') % ("other", "here, {place:spot}")
-FILE = HEAD + NEAR + FAR + OTHER_POOL
+TEST_POOL_SCENARIO = SCENARIO.replace('"train"', '"test"') % ("other", "here, {place:spot}")
+WORDS_FILE = COMMANDS + NEAR_SCENARIO + FAR_SCENARIO + TEST_POOL_SCENARIO
 
 
-def digest(
+def digest_of_words(
     monkeypatch: pytest.MonkeyPatch, text: str, pool: PoolName = "train", **shared: object
 ) -> str:
     """Return the digest of a file's words, with other people or remarks of all tasks."""
@@ -56,58 +56,72 @@ def digest(
     return identity.words_digest.__wrapped__("PickXtimes", pool)
 
 
-def test_comments_and_the_order_of_scenarios_and_fields_are_no_other_words(monkeypatch):
-    usual = digest(monkeypatch, FILE)
-    lines = NEAR.strip().splitlines()
+def test_comments_and_the_order_in_a_file_do_not_change_its_digest(monkeypatch):
+    """Also without effect: words of another task, and a task that needs its own name."""
+    usual = digest_of_words(monkeypatch, WORDS_FILE)
+    lines = NEAR_SCENARIO.strip().splitlines()
     turned = "\n".join([lines[0], *reversed(lines[1:])])
 
     for text in (
-        FILE.replace("[commands.all]", "# Commands.\n[commands.all]"),
-        HEAD + OTHER_POOL + FAR + NEAR,
-        HEAD + turned + FAR + OTHER_POOL,
-        FILE.replace('["PickXtimes"]', '["PickXtimes", "SwingXtimes"]', 1) + OTHER_TASK,
-        FILE.replace("\nsetting", '\nneeds.tasks = ["PickXtimes"]\nsetting'),
+        WORDS_FILE.replace("[commands.all]", "# Commands.\n[commands.all]"),
+        COMMANDS + TEST_POOL_SCENARIO + FAR_SCENARIO + NEAR_SCENARIO,
+        COMMANDS + turned + FAR_SCENARIO + TEST_POOL_SCENARIO,
+        WORDS_FILE.replace('["PickXtimes"]', '["PickXtimes", "SwingXtimes"]', 1) + OTHER_TASK,
+        WORDS_FILE.replace("\nsetting", '\nneeds.tasks = ["PickXtimes"]\nsetting'),
     ):
-        assert digest(monkeypatch, text) == usual
+        assert digest_of_words(monkeypatch, text) == usual
 
 
-def test_each_change_of_what_is_said_is_other_words_of_its_pool_only(monkeypatch):
-    found = {digest(monkeypatch, FILE)}
+def test_any_change_of_what_is_said_changes_the_digest_of_its_pool_only(monkeypatch):
+    """A pool is a set of wordings, "train" or "test"; a file has words for both."""
+    found = {digest_of_words(monkeypatch, WORDS_FILE)}
     changes = [
         ("Look {place}.", "Look there, {place}."),
         ("Lift {color}", "Hold {color}"),
         ("the {color} cube", "that {color} cube"),
         ("<one color: the one I mentioned>", "<that color: that cube>"),
-        (HEAD.splitlines()[3], 'train = ["Lift {color} {repeats}.", "Pick up {color} {repeats}."]'),
+        (
+            COMMANDS.splitlines()[3],
+            'train = ["Lift {color} {repeats}.", "Pick up {color} {repeats}."]',
+        ),
     ]
     for before, after in changes:
-        assert before in FILE
-        found.add(digest(monkeypatch, FILE.replace(before, after)))
-    found.add(digest(monkeypatch, FILE, people={"he": ("Leo",), "she": ("Mia",)}))
+        assert before in WORDS_FILE
+        found.add(digest_of_words(monkeypatch, WORDS_FILE.replace(before, after)))
+    found.add(digest_of_words(monkeypatch, WORDS_FILE, people={"he": ("Leo",), "she": ("Mia",)}))
     remarks = general().distractors
-    found.add(digest(monkeypatch, FILE, distractors={**remarks, "train": ("Well.",)}))
+    found.add(
+        digest_of_words(monkeypatch, WORDS_FILE, distractors={**remarks, "train": ("Well.",)})
+    )
 
-    assert len(found) == len(changes) + 3
+    assert len(found) == len(changes) + 3  # the file itself, other people and other remarks
 
-    elsewhere = FILE.replace("here, ", "over there, ").replace("Take {color}", "Grab {color}")
+    # Changes in the pool "test" leave the digest of the pool "train".
+    elsewhere = WORDS_FILE.replace("here, ", "over there, ").replace("Take {color}", "Grab {color}")
     remarks = {**remarks, "test": ("Well.",)}
-    assert digest(monkeypatch, elsewhere, distractors=remarks) == digest(monkeypatch, FILE)
-    assert digest(monkeypatch, elsewhere, "test") != digest(monkeypatch, FILE, "test")
+    assert digest_of_words(monkeypatch, elsewhere, distractors=remarks) == digest_of_words(
+        monkeypatch, WORDS_FILE
+    )
+    assert digest_of_words(monkeypatch, elsewhere, "test") != digest_of_words(
+        monkeypatch, WORDS_FILE, "test"
+    )
 
 
-def test_the_order_in_which_people_are_drawn_is_part_of_the_words(monkeypatch):
-    usual = digest(monkeypatch, FILE)
+def test_another_order_of_the_people_in_stories_changes_the_digest(monkeypatch):
+    """Names are drawn by their place in the list, so another order gives other texts."""
+    usual = digest_of_words(monkeypatch, WORDS_FILE)
     people = dict(reversed(general().people.items()))
-    assert digest(monkeypatch, FILE, people=people) != usual
+    assert digest_of_words(monkeypatch, WORDS_FILE, people=people) != usual
 
 
-def test_a_word_is_not_taken_for_the_slot_of_its_name(monkeypatch):
-    word = FILE.replace('"{repeats:times}"', '"repeats"')
-    slot = FILE.replace('"{repeats:times}"', '"{repeats}"')
-    assert digest(monkeypatch, word) != digest(monkeypatch, slot)
+def test_the_word_repeats_and_the_placeholder_repeats_have_different_digests(monkeypatch):
+    word = WORDS_FILE.replace('"{repeats:times}"', '"repeats"')
+    slot = WORDS_FILE.replace('"{repeats:times}"', '"{repeats}"')
+    assert digest_of_words(monkeypatch, word) != digest_of_words(monkeypatch, slot)
 
 
-def test_words_have_the_digest_of_their_task_and_pool():
+def test_each_task_and_pool_has_a_digest_of_its_own_in_the_language_label():
+    """A task without words has "none" in the place of the digest."""
     tasks = ("PickXtimes", "StopCube", "Gone")
     found = {words_of(task, pool) for task in tasks for pool in POOLS}
     assert len(found) == len(tasks) * len(POOLS)
@@ -119,8 +133,8 @@ def test_words_have_the_digest_of_their_task_and_pool():
 
 
 @pytest.mark.parametrize("pool", POOLS)
-def test_instructions_and_their_rows_say_which_words_they_have(pool):
-    """In the pool that was chosen, if one was."""
+def test_an_instruction_and_its_exported_row_name_the_digest_of_their_words(pool):
+    """The digest is that of the pool of wordings that was chosen."""
     episode = get_episode("PickXtimes", "test", 0)
     words = words_of("PickXtimes", pool)
 

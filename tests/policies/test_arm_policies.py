@@ -20,14 +20,14 @@ from roboirg.tasks.other_goals import begins_with
 from roboirg.tasks.splits.splits import get_episode
 
 SETTING = "direct"
-COUNT = 6
+EPISODES = 6
 """Episodes of each task."""
 ALL_ARMS = ("told", "other-goal", "silent", "scrambled", "paraphrase-1", "paraphrase-2")
 Scene = tuple[str, int]
 
 
 @functools.cache
-def scenes(count: int = COUNT) -> tuple[Scene, ...]:
+def scenes(count: int = EPISODES) -> tuple[Scene, ...]:
     return tuple(
         (task, index)
         for task in all_tasks()
@@ -37,7 +37,7 @@ def scenes(count: int = COUNT) -> tuple[Scene, ...]:
 
 
 @functools.cache
-def words(task: str, index: int, arm: str) -> ArmWords | None:
+def words_of_control(task: str, index: int, arm: str) -> ArmWords | None:
     episode = get_episode(task, "test", index)
     options = InstructionOptions(SETTING)
     try:
@@ -46,7 +46,7 @@ def words(task: str, index: int, arm: str) -> ArmWords | None:
         return None
 
 
-def chosen(policy: str, said: ArmWords, seed: int = 0) -> Goal | None:
+def goal_chosen_by(policy: str, said: ArmWords, seed: int = 0) -> Goal | None:
     env = SimpleNamespace(
         episode=said.episode, original=said.original, instruction=said.instruction
     )
@@ -56,34 +56,39 @@ def chosen(policy: str, said: ArmWords, seed: int = 0) -> Goal | None:
 
 def succeeds(policy: str, scene: Scene, arm: str, seed: int = 0) -> bool | None:
     """Return whether the goal that a policy chooses would succeed; None without the arm."""
-    said = words(*scene, arm)
+    said = words_of_control(*scene, arm)
     if said is None:
         return None
-    goal = chosen(policy, said, seed)
+    goal = goal_chosen_by(policy, said, seed)
     stages = () if goal is None else with_goal(said.episode, goal).stages
     return goal is not None and begins_with(stages, said.episode.stages)
 
 
-def rate(policy: str, *arms: str) -> float:
+def share_won_in_all(policy: str, *arms: str) -> float:
     """Return the share of scenes with all arms in which a policy succeeds in all of them."""
     wins = []
     for scene in scenes():
         successes = {succeeds(policy, scene, arm) for arm in arms}
         if None not in successes:
             wins.append(successes == {True})
-    assert len(wins) > COUNT
+    assert len(wins) > EPISODES
     return sum(wins) / len(wins)
 
 
-def test_language_use_of_who_listens_and_who_does_not():
-    assert rate("oracle", "told", "other-goal") == 1.0
-    assert rate("listener", "told", "other-goal") == 1.0
+def test_only_policies_that_listen_succeed_both_at_the_goal_and_at_another_one():
+    """*Told* commands the true goal, *other-goal* another one of the same scene.
+
+    The policies "habit" and "previous-goal" ignore the words. The oracle needs none.
+    """
+    assert share_won_in_all("oracle", "told", "other-goal") == 1.0
+    assert share_won_in_all("listener", "told", "other-goal") == 1.0
     for policy in ("habit", "previous-goal"):
-        assert rate(policy, "told", "other-goal") == 0.0
-    assert rate("oracle", "silent") == 1.0
+        assert share_won_in_all(policy, "told", "other-goal") == 0.0
+    assert share_won_in_all("oracle", "silent") == 1.0
 
 
-def test_in_silence_who_listens_is_at_chance():
+def test_without_a_command_a_listening_policy_succeeds_as_often_as_by_chance():
+    """Chance is computed per scene; it has to lie in the interval of the measured rate."""
     won = [succeeds("listener", scene, "silent") for scene in scenes(15)]
     low, high = wilson_interval(sum(map(bool, won)), len(won))
 
@@ -102,14 +107,17 @@ def test_in_silence_who_listens_is_at_chance():
         ("forgetful", "paraphrase-1"),  # guesses anew at each text
     ],
 )
-def test_each_arm_has_a_policy_that_fails_it(policy, arm):
-    assert rate(policy, arm) < 0.7
-    assert rate("oracle", arm) == 1.0
+def test_each_control_run_has_a_policy_with_a_known_fault_that_fails_it(policy, arm):
+    """A control ("arm") replaces the command: by another goal, silence, or other words."""
+    assert share_won_in_all(policy, arm) < 0.7
+    assert share_won_in_all("oracle", arm) == 1.0
 
 
-def test_the_planted_cheats_are_found_by_the_arms_alone():
+def test_policies_with_a_planted_fault_are_exposed_by_control_runs_only():
+    """ "habit" knows each scene's goal by heart, "forgetful" guesses anew for each text."""
     # Told, habit is as good as the oracle; nothing but another goal tells them apart.
-    assert rate("habit", *(arm for arm in ALL_ARMS if arm != "other-goal")) == 1.0
+    assert share_won_in_all("habit", *(arm for arm in ALL_ARMS if arm != "other-goal")) == 1.0
     # All paraphrases at once are harder than one for who guesses.
-    both = rate("forgetful", "paraphrase-1", "paraphrase-2")
-    assert both < min(rate("forgetful", f"paraphrase-{number}") for number in (1, 2))
+    # (It has to guess right twice.)
+    both = share_won_in_all("forgetful", "paraphrase-1", "paraphrase-2")
+    assert both < min(share_won_in_all("forgetful", f"paraphrase-{number}") for number in (1, 2))

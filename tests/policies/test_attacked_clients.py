@@ -22,7 +22,7 @@ from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import ModelOptions, ModelQuery, make_model
 
 MIB = 1 << 20
-BIG = b"\x81\xa1a\xc6" + struct.pack(">I", 50 * MIB) + b"\x80" * (50 * MIB)
+LARGE_MESSAGE = b"\x81\xa1a\xc6" + struct.pack(">I", 50 * MIB) + b"\x80" * (50 * MIB)
 MANY_AXES = msgpack.packb(
     {
         "actions": {
@@ -34,7 +34,7 @@ MANY_AXES = msgpack.packb(
 ESCAPES = "Error: \x1b[2J\x1b]0;owned\x07 \x9b2J \u202e gpj.exe"
 
 
-def says(data, opcode=2):
+def sends_instead_of_metadata(data, opcode=2):
     """Shake hands and send one frame instead of the metadata."""
 
     def answer(peer):
@@ -45,7 +45,7 @@ def says(data, opcode=2):
     return answer
 
 
-def replies(data, opcode=2):
+def sends_in_reply(data, opcode=2):
     """Send the metadata, and one frame in reply to the first message."""
 
     def answer(peer):
@@ -58,21 +58,21 @@ def replies(data, opcode=2):
     return answer
 
 
-def pings(peer):
+def floods_with_pings(peer):
     shake_hands(peer)
     peer.sendall(frame(b"\x80"))
     while True:  # and read none of the answers
         peer.sendall(frame(b"x" * 125, 9) * 100)
 
 
-def chunks(peer):
+def sends_endless_chunks(peer):
     read_head(peer)
     peer.sendall(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n")
     while True:
         peer.sendall(b"10000\r\n" + b"\x80" * 65536 + b"\r\n")
 
 
-def answers(text):
+def sends_text(text):
     def answer(peer):
         read_head(peer)
         peer.sendall(text)
@@ -89,14 +89,20 @@ QUICK = "?connect=1&timeout=1"
 PATIENT = "?connect=60&timeout=60"
 # Name, behavior, options, error, part of the message.
 ATTACKS = [
-    ("large", says(BIG), PATIENT, REPLY, "max_reply_mib"),
-    ("axes", replies(MANY_AXES), PATIENT, REPLY, "an array |u1 of shape"),
-    ("traceback", replies(b"a\n" * (25 * MIB), 1), PATIENT + LARGE, REPLY, "error: a."),
-    ("escapes", replies(ESCAPES.encode(), 1), PATIENT, REPLY, r"error: Error: \x1b[2J\x1b]0;"),
-    ("pings", pings, QUICK, TIMEOUT, "within 1 s"),
+    ("large", sends_instead_of_metadata(LARGE_MESSAGE), PATIENT, REPLY, "max_reply_mib"),
+    ("axes", sends_in_reply(MANY_AXES), PATIENT, REPLY, "an array |u1 of shape"),
+    ("traceback", sends_in_reply(b"a\n" * (25 * MIB), 1), PATIENT + LARGE, REPLY, "error: a."),
+    (
+        "escapes",
+        sends_in_reply(ESCAPES.encode(), 1),
+        PATIENT,
+        REPLY,
+        r"error: Error: \x1b[2J\x1b]0;",
+    ),
+    ("pings", floods_with_pings, QUICK, TIMEOUT, "within 1 s"),
     (
         "redirect",
-        answers(b"HTTP/1.1 302 Go\r\nLocation: ws://127.0.0.1:9/\r\nContent-Length: 0\r\n\r\n"),
+        sends_text(b"HTTP/1.1 302 Go\r\nLocation: ws://127.0.0.1:9/\r\nContent-Length: 0\r\n\r\n"),
         PATIENT,
         CONNECTION,
         "follow",
@@ -117,7 +123,10 @@ def clients():
 
 
 @pytest.mark.parametrize("attack", ATTACKS, ids=[attack[0] for attack in ATTACKS])
-def test_a_bad_server_is_an_error_in_time_and_within_memory(attack, clients, good):
+def test_a_hostile_policy_server_ends_in_a_named_error_without_filling_memory(
+    attack, clients, good
+):
+    """Attacks: huge messages, huge arrays, terminal escapes, floods of pings, a redirect."""
     _, answer, options, kind, words = attack
     with answering(answer) as place:
         error, message, mib = clients.play(f"openpi://{place}{options}", good)
@@ -134,25 +143,26 @@ def test_a_bad_server_is_an_error_in_time_and_within_memory(attack, clients, goo
 
 
 ZIPPED = gzip.compress(b"{}")
-GZIP = answers(
+COMPRESSED_ANSWER = sends_text(
     b"HTTP/1.1 200 OK\r\nContent-Encoding: gzip\r\nContent-Length: %d\r\n\r\n" % len(ZIPPED)
     + ZIPPED
 )
-ESCAPED = answers(b"HTTP/1.1 400 No\r\nContent-Length: 4\r\n\r\n\x1b[2J")
+ANSWER_WITH_ESCAPE = sends_text(b"HTTP/1.1 400 No\r\nContent-Length: 4\r\n\r\n\x1b[2J")
 
 
 @pytest.mark.parametrize(
     ("provider", "answer", "words"),
     [
-        ("openai", GZIP, "replied with something else"),
-        ("google", GZIP, "replied with something else"),
-        ("openai", chunks, "the response has more than 64 MiB"),
-        ("openai", ESCAPED, "refused or failed"),
-        ("google", ESCAPED, "refused or failed"),
+        ("openai", COMPRESSED_ANSWER, "replied with something else"),
+        ("google", COMPRESSED_ANSWER, "replied with something else"),
+        ("openai", sends_endless_chunks, "the response has more than 64 MiB"),
+        ("openai", ANSWER_WITH_ESCAPE, "refused or failed"),
+        ("google", ANSWER_WITH_ESCAPE, "refused or failed"),
     ],
     ids=["openai-gzip", "google-gzip", "chunks", "openai-escapes", "google-escapes"],
 )
-def test_a_bad_model_endpoint_is_a_named_error(provider, answer, words):
+def test_a_hostile_model_endpoint_ends_in_a_named_error(provider, answer, words):
+    """Attacks: a compressed answer, an endless one, and terminal escapes in an error."""
     with answering(answer) as place:
         options = ModelOptions(
             provider=provider,
@@ -169,7 +179,8 @@ def test_a_bad_model_endpoint_is_a_named_error(provider, answer, words):
     assert str(caught.value).isprintable()
 
 
-def test_only_what_is_printable_is_printed():
+def test_control_characters_of_a_server_are_printed_as_escapes():
+    """Line breaks, accents and Chinese stay; codes that clear a screen or reverse text do not."""
     assert printable("naïve 你好 – ok\n\tend") == "naïve 你好 – ok\n\tend"
     assert printable(ESCAPES) == (r"Error: \x1b[2J\x1b]0;owned\x07 \x9b2J \u202e gpj.exe")
     assert printable("\ud800") == r"\ud800"

@@ -19,12 +19,13 @@ from roboirg.policies.remote.websocket_server import ServerOptions
 
 
 @pytest.fixture(scope="module")
-def lenient():
+def server_without_key():
     with serving("openpi", ROBOIRG_HOST_NAMES="Robot-Lab") as server:
         yield server
 
 
-def test_a_body_without_a_key_is_not_read():
+def test_a_client_without_the_key_cannot_fill_the_memory_of_the_server():
+    """It sends 1 GiB; the server answers 401 or cuts the connection, and lives."""
     with serving("openpi", "--api-key-env", "KEY", KEY="sesame") as server:
         raw = server.connect(opening())
 
@@ -46,8 +47,9 @@ def test_a_body_without_a_key_is_not_read():
         assert server.is_healthy()
 
 
-def test_pages_of_other_sites_are_refused(lenient):
-    port = lenient.port
+def test_requests_from_web_pages_of_other_sites_are_refused_with_403(server_without_key):
+    """Rows are host, more headers, and whether the request is welcome."""
+    port = server_without_key.port
     for host, headers, welcome in (
         ("localhost:9", "", True),  # through a tunnel
         ("192.0.2.7", "", True),
@@ -60,19 +62,19 @@ def test_pages_of_other_sites_are_refused(lenient):
         ("127.0.0.1:x", "", False),
         ("", "", False),
     ):
-        with lenient.connect(opening(host, headers)) as raw:
+        with server_without_key.connect(opening(host, headers)) as raw:
             status = int(raw.recv(65536).split()[1])
         assert (status == 403) is not welcome, (host, headers, status)
 
 
-def test_a_silent_connection_ends():
+def test_a_connection_that_sends_nothing_is_closed_after_the_timeout():
     with serving("challenge", "--timeout-s", "2") as server:
         with server.connect(opening()) as raw:
             read_all(raw)  # ends
         assert server.is_healthy()
 
 
-def test_a_server_that_stops_by_itself_is_an_error(monkeypatch):
+def test_the_command_serve_fails_if_its_server_stops_by_itself(monkeypatch):
     stopped = SimpleNamespace(serve_forever=lambda: None)
     monkeypatch.setattr(
         policy_server, "open_server", lambda *_, **__: PolicyServer(stopped, "openpi://here:1")
@@ -85,12 +87,13 @@ def test_a_server_that_stops_by_itself_is_an_error(monkeypatch):
     assert "openpi://here:1 has stopped by itself" in str(result.exception)
 
 
-def test_a_key_is_not_shown():
+def test_the_key_of_a_server_is_not_in_the_text_of_its_options():
     assert "sesame" not in repr(ServerOptions(key="sesame"))
 
 
 @pytest.mark.parametrize("scheme", ["challenge", "mme-vla"])
-def test_a_message_is_as_large_as_a_video_needs_and_no_larger(scheme):
+def test_the_largest_message_allowed_fits_the_longest_video_and_not_much_more(scheme):
+    """The longest video has 1,187 moments; at most 30 % more is accepted."""
     # All of the longest video with the fields that the protocol can carry, as its client packs.
     step = moment(0, size=256, sensors=scheme == "challenge")
     if scheme == "mme-vla":
@@ -101,12 +104,13 @@ def test_a_message_is_as_large_as_a_video_needs_and_no_larger(scheme):
     assert longest < protocols_by_scheme()[scheme].service.max_request_bytes < 1.3 * longest
 
 
-def test_a_larger_message_is_refused(lenient):
+def test_a_message_above_64_mib_is_refused_from_its_header(server_without_key):
+    """Close code 1009 means that a message is too big."""
     header = struct.pack("!BBQ", 0x82, 0xFF, (64 << 20) + 1) + b"\0\0\0\0"
-    with lenient.connect(opening()) as raw:
+    with server_without_key.connect(opening()) as raw:
         assert raw.recv(65536).startswith(b"HTTP/1.1 101 ")
         raw.sendall(header)
         assert struct.pack("!H", 1009) in read_all(raw)
 
-    assert lenient.grown_mib() <= MAX_MIB
-    assert lenient.is_healthy()
+    assert server_without_key.grown_mib() <= MAX_MIB
+    assert server_without_key.is_healthy()

@@ -23,7 +23,7 @@ from roboirg.util.reply_reading import (
     with_thoughts,
 )
 
-QUERY = ModelQuery("system", (ChatTurn("user", ("words",)),))
+SOME_QUERY = ModelQuery("system", (ChatTurn("user", ("words",)),))
 
 
 def reply_of(styled):
@@ -52,11 +52,11 @@ def same_json(reading):
 
 
 @pytest.mark.parametrize("styled", FORTY, ids=lambda styled: styled.style)
-def test_each_reply_is_read_right_or_counted_as_unreadable(styled):
+def test_forty_styles_of_replies_are_read_right_or_counted_as_unreadable(styled):
     """A model that answers so is asked twice; what it means comes out, or the count is one more."""
     connect = lambda _: SimpleNamespace(answer=lambda _query: reply_of(styled))  # noqa: E731
     vlm = VLMQuery(ModelOptions(model="m"), Template("$why"), connect)
-    found = vlm.ask(QUERY, READERS[styled.question])
+    found = vlm.ask(SOME_QUERY, READERS[styled.question])
     wanted = styled.reading
 
     if styled.question == "goal" and wanted is not None:
@@ -68,7 +68,7 @@ def test_each_reply_is_read_right_or_counted_as_unreadable(styled):
 
 
 @pytest.mark.parametrize("styled", FORTY, ids=lambda styled: styled.style)
-def test_thoughts_are_kept_with_the_reply(styled):
+def test_the_stored_text_of_a_reply_includes_the_model_s_thoughts(styled):
     """All words that the server sent are in the text that is stored."""
     kept = reply_of(styled).text
     for words in _words(styled.content) + _words(styled.more.get("reasoning_content")):
@@ -85,19 +85,19 @@ def _words(sent):
     return []
 
 
-def test_a_rejected_reply_is_quoted_without_its_thoughts():
+def test_a_model_asked_again_sees_its_rejected_reply_without_its_thoughts():
     with fake_vlm(["<think>so many words</think>no idea"]) as server:
-        VLMQuery(model_options(server), Template("$why")).ask(QUERY, goal_in)
+        VLMQuery(model_options(server), Template("$why")).ask(SOME_QUERY, goal_in)
         assert server.requests[1]["messages"][2]["content"] == "no idea"
 
 
 @pytest.mark.parametrize("tag", ["<think>", "</think>"])
-def test_a_tag_that_ends_a_text_in_json_cuts_no_answer(tag):
+def test_a_think_tag_inside_a_json_text_does_not_hide_the_answer(tag):
     assert letter_in(f'<think>A</think>{{"answer": "C", "note": "{tag}"}}') == "C"
 
 
 @pytest.mark.parametrize("thoughts", [["</think> B"], [{"a": "<think>"}], []])
-def test_tags_in_thoughts_end_nothing(thoughts):
+def test_think_tags_inside_separate_thoughts_do_not_change_the_answer(thoughts):
     assert answer_of(with_thoughts("A", thoughts)) == "A"
 
 
@@ -123,7 +123,8 @@ def test_tags_in_thoughts_end_nothing(thoughts):
         ("D", None),  # there are three
     ],
 )
-def test_a_letter_counts_where_it_is_given_as_the_answer(reply, letter):
+def test_a_letter_is_read_where_it_is_given_as_the_answer(reply, letter):
+    """Choices are A, B and C; None stands for a reply that has to be asked again."""
     if letter is not None:
         assert letter_in(reply) == letter
     else:
@@ -174,7 +175,8 @@ def test_a_letter_that_is_denied_questioned_or_next_to_another_is_no_answer(repl
         '{"answer": "B", "answer": "C"}',
     ],
 )
-def test_no_object_is_read_next_to_a_malformed_one(read, later):
+def test_a_reply_with_a_good_and_a_malformed_json_object_is_unreadable(read, later):
+    """The malformed one may be a correction, so the good one must not count."""
     good = '{"answer": "C", "color": "green", "repeats": 3}'
     read(good)
     for reply in (f"{good}\n{later}", f"{later}\n{good}", f"{{{good}}}"):
@@ -192,12 +194,12 @@ def test_no_object_is_read_next_to_a_malformed_one(read, later):
         "[" + '{"a":' * 9,
     ],
 )
-def test_an_object_that_breaks_off_is_not_replaced_by_an_earlier_one(text):
+def test_a_json_object_that_breaks_off_is_not_replaced_by_an_earlier_one(text):
     with pytest.raises(UnparsableReplyError, match="breaks off or is malformed"):
         json_object(text)
 
 
-def test_an_object_may_have_line_breaks_in_texts_and_braces_around_it():
+def test_a_json_object_may_have_line_breaks_in_texts_and_words_in_braces_around_it():
     assert json_object('{so} {"a": "b\nc } {"} {there}') == {"a": "b\nc } {"}
 
 
@@ -206,7 +208,7 @@ def test_an_object_may_have_line_breaks_in_texts_and_braces_around_it():
     ["</s>" * 20_000 + "x", '{"a":' * 50_000, "[{" * 50_000, "answer" + " " * 200_000,
      "\n" * 200_000, "answer A " * 20_000, "{" + "a" * 200_000],
 )  # fmt: skip
-def test_no_reply_is_read_for_long(text):
+def test_long_repetitive_replies_are_read_quickly(text):
     """A quadratic reading would take minutes."""
     for read in (letter_in, last_json):
         try:
@@ -220,12 +222,12 @@ def test_no_reply_is_read_for_long(text):
     [(3, 3), (3.0, 3), ("3", 3), (-0.0, 0), (10**400, 10**400), (True, None), (2.5, None),
      ("two", None), ("9" * 5000, None), (float("inf"), None), (None, None), ([3], None)],
 )  # fmt: skip
-def test_a_whole_number_of_json_is_read_and_nothing_else(value, number):
+def test_json_values_that_are_whole_numbers_are_read_and_others_give_none(value, number):
     found = whole_number(value)
     assert (found, type(found)) == (number, type(number))
 
 
-def body_with(provider, usage):
+def reply_with_usage(provider, usage):
     """A good reply whose service reports this usage."""
     if provider == "google":
         parts = {"content": {"parts": [{"text": "fine"}]}}
@@ -241,35 +243,42 @@ NAMES = {
 }
 
 
-def ask_with(provider, usage, **prices):
-    with fake_vlm([body_with(provider, usage)]) as server:
+def usage_after_a_reply_with(provider, usage, **prices):
+    with fake_vlm([reply_with_usage(provider, usage)]) as server:
         vlm = VLMQuery(model_options(server, provider, **prices), Template(""))
-        assert vlm.ask(QUERY, str) == "fine"
+        assert vlm.ask(SOME_QUERY, str) == "fine"
         return vlm.usage()
 
 
 @pytest.mark.parametrize("provider", NAMES)
 @pytest.mark.parametrize("count", [None, "many", True, 1.5, [], {}, -(10**6), 10**9, 10**400])
-def test_an_answer_is_not_lost_if_its_tokens_are_unknown(provider, count):
+def test_an_answer_counts_though_its_number_of_tokens_makes_no_sense(provider, count):
+    """What is unknown is NaN, which is different from itself."""
     sent, received = NAMES[provider]
-    usage = ask_with(provider, {sent: 5, received: count}, input_price=2.0, output_price=3.0)
+    usage = usage_after_a_reply_with(
+        provider, {sent: 5, received: count}, input_price=2.0, output_price=3.0
+    )
     assert usage["input_tokens"] == 5
     assert usage["output_tokens"] != usage["output_tokens"]
     assert usage["cost_usd"] != usage["cost_usd"]
 
     # Tokens without a price do not make the cost unknown.
-    usage = ask_with(provider, {sent: 5, received: count}, input_price=2.0)
+    usage = usage_after_a_reply_with(provider, {sent: 5, received: count}, input_price=2.0)
     assert usage["cost_usd"] == pytest.approx(1e-5)
 
 
 @pytest.mark.parametrize("provider", NAMES)
 @pytest.mark.parametrize("usage", [None, [], "none", 3, {}])
-def test_an_answer_is_not_lost_if_there_is_no_usage(provider, usage):
-    found = ask_with(provider, usage)
+def test_an_answer_counts_though_the_service_reports_no_tokens(provider, usage):
+    """What is unknown is NaN, which is different from itself."""
+    found = usage_after_a_reply_with(provider, usage)
     assert found["input_tokens"] != found["input_tokens"]
 
 
 @pytest.mark.parametrize("provider", NAMES)
 @pytest.mark.parametrize("count", [7, 7.0, "7"])
-def test_tokens_may_be_written_in_any_form_of_a_whole_number(provider, count):
-    assert ask_with(provider, dict.fromkeys(NAMES[provider], count))["output_tokens"] == 7
+def test_numbers_of_tokens_may_be_integers_floats_or_texts(provider, count):
+    assert (
+        usage_after_a_reply_with(provider, dict.fromkeys(NAMES[provider], count))["output_tokens"]
+        == 7
+    )

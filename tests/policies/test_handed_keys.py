@@ -32,7 +32,7 @@ from roboirg.util.proxies import proxy_of
 KEY = 'k7-"X/+secret\\of~ours'
 VARIABLE = "KEY_OF_A_TEST"
 ENCODED = [base64.b64encode(f"{before}{KEY}".encode()).decode() for before in ("", "u:", "me:")]
-SPELLINGS = [
+SPELLINGS_OF_KEY = [
     KEY,
     quote(KEY, safe=""),
     quote(KEY, safe="").lower(),
@@ -53,22 +53,24 @@ def key(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, KEY)
 
 
-@pytest.mark.parametrize("spelling", SPELLINGS)
-def test_a_key_is_found_however_software_writes_it(spelling):
+@pytest.mark.parametrize("spelling", SPELLINGS_OF_KEY)
+def test_a_key_is_masked_in_all_its_encodings(spelling):
+    """Such as URL encoding, JSON or HTML escapes, and Base64 with a user's name before it."""
     handed_keys.remember_key(KEY)
     cleaned = printable(f"Error: no key {spelling} here")
     # What stands before a key in Base64 may stay.
     assert re.fullmatch(r"Error: no key (\w{0,5})\*{20,} here", cleaned)
 
 
-def test_the_key_behind_its_scheme_is_found_alone():
+def test_a_key_remembered_with_bearer_is_masked_also_without_it():
     handed_keys.remember_key(f"Bearer {KEY}")
     assert KEY not in printable(f"401: {KEY}")
     assert printable("Bearer") == "Bearer"
 
 
 @pytest.mark.parametrize("letters", ["\\", "s", "\\s", "sk-", "&amp;", "%73", "=\n"])
-def test_what_looks_like_a_key_over_and_over_is_searched_to_its_end(letters):
+def test_a_long_text_full_of_almost_keys_is_searched_in_linear_time(letters):
+    """With a quadratic search this would not end; nothing in it is a key."""
     handed_keys.remember_key("\\" * 20)
     handed_keys.remember_key("sk-" * 20)
 
@@ -77,24 +79,24 @@ def test_what_looks_like_a_key_over_and_over_is_searched_to_its_end(letters):
     assert len(printable(text)) >= len(text)
 
 
-def test_a_short_text_is_no_key():
+def test_a_key_too_short_to_be_a_secret_masks_nothing():
     handed_keys.remember_key("none")
     assert printable("none of the cubes") == "none of the cubes"
 
 
 METADATA = msgpack.packb({"version": KEY, "seen": {"Authorization": [f"Api-Key {KEY}"]}})
-SAYS = {
+MESSAGES_WITH_KEY = {
     "metadata": frame(METADATA),
     "an error": frame(f"Traceback …\nValueError: {'x' * 280}{KEY}".encode(), 1),
     "the reason of a close": frame(struct.pack(">H", 1008) + f"no {KEY}".encode(), 8),
 }
 
 
-@pytest.mark.parametrize("place_of_key", SAYS)
-def test_a_key_that_a_policy_server_sends_back_is_not_kept(place_of_key):
+@pytest.mark.parametrize("place_of_key", MESSAGES_WITH_KEY)
+def test_a_key_that_a_policy_server_sends_back_is_masked_in_records_and_errors(place_of_key):
     def answer(peer: object) -> None:
         shake_hands(peer)
-        peer.sendall(SAYS[place_of_key])  # type: ignore[attr-defined]
+        peer.sendall(MESSAGES_WITH_KEY[place_of_key])  # type: ignore[attr-defined]
         wait_for_end(peer)
 
     with answering(answer) as place:
@@ -113,7 +115,8 @@ def test_a_key_that_a_policy_server_sends_back_is_not_kept(place_of_key):
     assert KEY[-6:] not in kept
 
 
-def test_a_key_in_the_reply_of_a_model_is_neither_shown_nor_stored(tmp_path):
+def test_a_key_in_the_reply_of_a_model_is_masked_when_shown_and_stored(tmp_path):
+    """A model may repeat the key that the client sent in its header."""
     query = ModelQuery("system", (ChatTurn("user", ("words",)),))
     with fake_vlm([f"my key is {KEY}"]) as server:
         vlm = VLMQuery(model_options(server, api_key_env=VARIABLE), Template("$why"))
@@ -126,14 +129,14 @@ def test_a_key_in_the_reply_of_a_model_is_neither_shown_nor_stored(tmp_path):
     assert shown == stored == f"my key is {'*' * len(KEY)}"
 
 
-def test_a_key_that_a_library_prints_is_not_in_the_log(tmp_path):
+def test_a_key_that_a_library_prints_is_masked_in_the_log(tmp_path):
     handed_keys.remember_key(KEY)
     with EpisodeLog(tmp_path / "log.txt") as log:
         log.path.write_text(f"closed: {KEY}\n")
     assert (tmp_path / "log.txt").read_text() == f"closed: {'*' * len(KEY)}\n"
 
 
-def test_the_password_of_a_proxy_is_removed_from_what_it_sends(monkeypatch):
+def test_the_password_of_a_proxy_is_masked_in_plain_and_base64_text(monkeypatch):
     monkeypatch.delenv("NO_PROXY", raising=False)
     monkeypatch.delenv("no_proxy", raising=False)
     monkeypatch.setenv("HTTPS_PROXY", "http://me:pass%21word@proxy.example:3128")
@@ -154,7 +157,8 @@ def test_the_password_of_a_proxy_is_removed_from_what_it_sends(monkeypatch):
         "openpi://host:8000?token={key}",
     ],
 )
-def test_a_policy_that_is_named_with_a_key_is_refused_without_showing_it(spec):
+def test_a_policy_name_that_contains_a_key_is_refused_without_printing_it(spec):
+    """Names of policies are printed and recorded, so keys belong into environment variables."""
     with pytest.raises(InvalidValueError, match="holds a key or password") as caught:
         make_policy(spec.format(key="hunter2hunter2"), 0)
     assert "hunter2" not in str(caught.value)

@@ -32,9 +32,11 @@ def _secrets(monkeypatch):
         ("lerobot://some/checkpoint", {"HF_TOKEN"}),
     ],
 )
-def test_a_hosted_policy_has_the_keys_that_our_own_parts_of_it_read_and_those_that_are_named(
-    spec, kept
-):
+def test_a_policy_process_gets_only_the_secrets_that_it_needs_or_that_a_user_names(spec, kept):
+    """Code of others ("mine:It") gets none; our model clients and LeRobot get their own key.
+
+    MY_PASSWORD is the one that the user names.
+    """
     found = environment_for(read_policy(spec).hosted_part, ("MY_PASSWORD",))
     assert found.keys() & set(SECRETS) == {*kept, "MY_PASSWORD"}
     assert found["PATH"] == os.environ["PATH"]

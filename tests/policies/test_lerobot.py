@@ -23,7 +23,7 @@ FRONT = "observation.images.front"
 WRIST = "observation.images.wrist"
 
 
-def test_a_url_is_checked_without_loading(tmp_path):
+def test_a_lerobot_url_is_checked_without_loading_the_checkpoint(tmp_path):
     find_policy("lerobot://lerobot/some-checkpoint?device=cpu&execute=8")
     folder = write_checkpoint(tmp_path / "last")
 
@@ -36,10 +36,10 @@ def test_a_url_is_checked_without_loading(tmp_path):
         find_policy("lerobot://x/y?devise=cpu")
 
 
-def test_without_lerobot_one_sentence_says_so(monkeypatch):
+def test_a_lerobot_policy_without_lerobot_installed_fails_with_instructions(monkeypatch):
     monkeypatch.setitem(sys.modules, "lerobot.configs.policies", None)
     with pytest.raises(MissingDependencyError, match=r"Python 3\.12: see docs/training.md"):
-        begun()
+        policy_after_reset()
 
 
 class Processor:
@@ -154,7 +154,7 @@ def checkpoint(monkeypatch):
     return SimpleNamespace(model=model, config=config, before=before)
 
 
-def begun(seed=0, options=""):
+def policy_after_reset(seed=0, options=""):
     """Return a policy whose episode has begun, with the checkpoint loaded for it."""
     spec = f"lerobot://x/y{options}"
     forget_batched(spec)
@@ -163,9 +163,10 @@ def begun(seed=0, options=""):
     return policy
 
 
-def test_a_checkpoint_is_fed_its_own_names(checkpoint):
+def test_a_checkpoint_gets_pictures_and_state_under_lerobot_s_names(checkpoint):
+    """Also: metadata name its processors, and its noise depends on the seed of the policy."""
     checkpoint.config.is_noisy = True
-    policy = begun(5, "?execute=4")
+    policy = policy_after_reset(5, "?execute=4")
     first = policy.act(moment(1))
     assert first.shape == (4, 8)
 
@@ -183,15 +184,15 @@ def test_a_checkpoint_is_fed_its_own_names(checkpoint):
     shown = batch[FRONT][0].permute(1, 2, 0).numpy() * 255
     assert np.allclose(shown, moment(1)["front_rgb"])
     assert set(batch) == {"task", STATE, FRONT, WRIST}
-    assert np.array_equal(begun(5, "?execute=4").act(moment(1)), first)
-    assert not np.array_equal(begun(6, "?execute=4").act(moment(1)), first)
+    assert np.array_equal(policy_after_reset(5, "?execute=4").act(moment(1)), first)
+    assert not np.array_equal(policy_after_reset(6, "?execute=4").act(moment(1)), first)
     assert len(checkpoint.model.resets) == 3
 
 
-def test_pictures_have_the_checkpoint_s_size(checkpoint):
+def test_pictures_are_resized_to_what_the_checkpoint_declares(checkpoint):
     sized = SimpleNamespace(shape=(3, 4, 4))
     checkpoint.config.input_features = {STATE: None, FRONT: sized}
-    begun().act(moment(1))
+    policy_after_reset().act(moment(1))
     batch = checkpoint.model.batches[0]
 
     assert set(batch) == {"task", STATE, FRONT}
@@ -201,11 +202,11 @@ def test_pictures_have_the_checkpoint_s_size(checkpoint):
     assert np.allclose(shown, means, atol=0.51)
 
     checkpoint.config.input_features = {FRONT: SimpleNamespace(shape=(3, 4, 6))}
-    begun().act(moment(1))
+    policy_after_reset().act(moment(1))
     assert checkpoint.model.batches[1][FRONT].shape == (1, 3, 8, 8)  # what is no square stays
 
 
-def looped(model, length):
+def actions_of_lerobot_s_loop(model, length):
     """Return the actions of LeRobot's loop: one for each observation, (length, 8)."""
     model.reset()
     torch = sys.modules["torch"]
@@ -225,23 +226,25 @@ def looped(model, length):
     steps=st.integers(1, 6),
     ensembles=st.booleans(),
 )
-def test_actions_are_those_of_lerobot_s_own_loop(checkpoint, kind, remembered, steps, ensembles):
+def test_two_interleaved_episodes_get_the_actions_of_lerobot_s_own_loop(
+    checkpoint, kind, remembered, steps, ensembles
+):
     config = checkpoint.config
     config.type = kind
     config.n_obs_steps = remembered
     config.n_action_steps = 1 if ensembles else steps
     config.temporal_ensemble_coeff = 0.01 if ensembles else None
-    expected = looped(checkpoint.model, 24)
+    expected = actions_of_lerobot_s_loop(checkpoint.model, 24)
     checkpoint.model.batches.clear()
 
-    played = act_in_turns([begun(), begun()], len(expected))
+    played = act_in_turns([policy_after_reset(), policy_after_reset()], len(expected))
 
     for rows in played:
         assert np.allclose(np.stack(rows)[: len(expected)], expected, atol=1e-6)
     calls = math.ceil(len(expected) / config.n_action_steps)
     assert len(checkpoint.model.batches) <= 2 * calls
     if kind != "somebody_s_plugin" and not ensembles:
-        assert len(begun().act(moment(0))) == max(1, steps - remembered + 1)
+        assert len(policy_after_reset().act(moment(0))) == max(1, steps - remembered + 1)
 
 
 def act_in_turns(episodes, length):
@@ -254,48 +257,51 @@ def act_in_turns(episodes, length):
     return played
 
 
-def test_an_option_executes_more_or_fewer_actions(checkpoint):
+def test_the_option_execute_changes_how_many_actions_of_a_chunk_are_played(checkpoint):
+    """The checkpoint plans six actions, and says that two are to be played."""
     checkpoint.config.n_action_steps = 2
-    assert len(begun().act(moment(1))) == 2
-    assert len(begun(options="?execute=5").act(moment(1))) == 5
+    assert len(policy_after_reset().act(moment(1))) == 2
+    assert len(policy_after_reset(options="?execute=5").act(moment(1))) == 5
 
     checkpoint.config.temporal_ensemble_coeff = 0.01
-    assert len(begun(options="?execute=3").act(moment(1))) == 3
+    assert len(policy_after_reset(options="?execute=3").act(moment(1))) == 3
     with pytest.raises(InvalidValueError, match=r"loaded: ValueError: The chunk size is the upper"):
-        begun(options="?execute=7")
+        policy_after_reset(options="?execute=7")
 
 
 @pytest.mark.parametrize(("kind", "reads"), [("act", "no, "), ("groot", "")])
-def test_a_checkpoint_without_a_tokenizer_may_have_one_inside(checkpoint, kind, reads):
+def test_a_checkpoint_without_a_tokenizer_is_noted_as_not_reading_text(checkpoint, kind, reads):
+    """Groot has a tokenizer inside, ACT has none."""
     checkpoint.config.type = kind
     checkpoint.before.steps = ()
 
-    policy = begun()
+    policy = policy_after_reset()
 
     assert policy.metadata.get("reads_text", "").startswith(reads)
     assert ("reads_text" in policy.metadata) == bool(reads)
 
 
-def test_rows_of_a_batch_depend_on_their_own_episode(checkpoint):
+def test_episodes_in_a_batch_get_the_actions_that_they_get_alone(checkpoint):
+    """Five episodes in batches of four, of which the second is filled up."""
     checkpoint.config.max_action_dim = 32
     moments = [moment(number) for number in range(5)]
 
-    episodes = [begun(seed, "?batch=4") for seed in range(5)]
+    episodes = [policy_after_reset(seed, "?batch=4") for seed in range(5)]
     together = episodes[0].act_together(episodes, moments)
     assert [len(batch["task"]) for batch in checkpoint.model.batches] == [4, 4]  # always as many
 
-    alone = [begun(seed, "?batch=4") for seed in range(5)]
+    alone = [policy_after_reset(seed, "?batch=4") for seed in range(5)]
     for policy, now, expected in zip(alone, moments, together, strict=True):
         assert np.array_equal(policy.act(now), expected)
     assert not np.array_equal(alone[0].act(moments[0]), together[0])  # other noise in each call
 
 
 @pytest.mark.parametrize("changes", [{"type": "diffusion"}, {"temporal_ensemble_coeff": 0.01}])
-def test_checkpoints_that_remember_are_asked_one_by_one(checkpoint, changes):
+def test_checkpoints_with_memory_are_not_batched(checkpoint, changes):
     vars(checkpoint.config).update(changes, is_noisy=True)
-    episodes = [begun(seed, "?batch=4") for seed in range(3)]
+    episodes = [policy_after_reset(seed, "?batch=4") for seed in range(3)]
 
     together = episodes[0].act_together(episodes, [moment(1)] * 3)
 
     assert [len(batch["task"]) for batch in checkpoint.model.batches] == [1, 1, 1]
-    assert np.array_equal(begun(2, "?batch=4").act(moment(1)), together[2])
+    assert np.array_equal(policy_after_reset(2, "?batch=4").act(moment(1)), together[2])

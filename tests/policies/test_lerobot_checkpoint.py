@@ -10,7 +10,7 @@ from roboirg.policies.lerobot.checkpoint_facts import UNKNOWN, read_facts
 SQUARE = [3, 96, 96]
 
 
-def test_a_checkpoint_asks_for_its_own_cameras_and_sizes(tmp_path):
+def test_cameras_and_sizes_are_read_from_the_checkpoint_s_configuration(tmp_path):
     one = write_checkpoint(tmp_path / "one", pictures(front=SQUARE), tokenizer_max_length=48)
     both = write_checkpoint(tmp_path / "both", pictures(wrist=[3, 256, 256], front=SQUARE))
 
@@ -23,7 +23,7 @@ def test_a_checkpoint_asks_for_its_own_cameras_and_sizes(tmp_path):
     assert find_policy("lerobot://somebody/elsewhere").needs.cameras == ("front", "wrist")
 
 
-def test_an_input_that_does_not_exist_is_named(tmp_path):
+def test_a_checkpoint_that_needs_an_unknown_camera_is_refused_by_name(tmp_path):
     write_checkpoint(tmp_path / "laptop", pictures(laptop=SQUARE))
     said = "needs 'observation.images.laptop'; there are observation.state, obs"
     with pytest.raises(InvalidValueError, match=said):
@@ -33,13 +33,14 @@ def test_an_input_that_does_not_exist_is_named(tmp_path):
 @pytest.mark.parametrize(
     "content", ["{", "[]", "{}", "null", '{"type": 3, "input_features": null}']
 )
-def test_what_is_no_configuration_is_left_to_lerobot(tmp_path, content):
+def test_a_broken_configuration_file_counts_as_unknown(tmp_path, content):
+    """LeRobot itself reports what is wrong when it loads the checkpoint."""
     folder = write_checkpoint(tmp_path / "act")
     (folder / "config.json").write_text(content)
     assert read_facts(str(folder)) == UNKNOWN
 
 
 @pytest.mark.parametrize("shape", [None, [3], [3, "a", 9], "wide", [3, 0, 0], 7])
-def test_sizes_that_make_no_sense_are_unknown(tmp_path, shape):
+def test_a_picture_shape_that_makes_no_sense_counts_as_unknown(tmp_path, shape):
     folder = write_checkpoint(tmp_path / "act", pictures(front=shape))
     assert read_facts(str(folder)).sizes == {"front": None}

@@ -27,20 +27,20 @@ MESSAGES = st.dictionaries(
 )
 
 
-def same(first, other):
+def are_same(first, other):
     if isinstance(first, np.ndarray):
         return first.dtype == other.dtype and first.tobytes() == other.tobytes()
     if isinstance(first, dict):
-        return list(first) == list(other) and all(same(first[key], other[key]) for key in first)
+        return list(first) == list(other) and all(are_same(first[key], other[key]) for key in first)
     if isinstance(first, list):
-        return len(first) == len(other) and all(map(same, first, other))
+        return len(first) == len(other) and all(map(are_same, first, other))
     return type(first) is type(other) and first == other
 
 
 @settings(max_examples=50)
 @given(MESSAGES)
-def test_what_is_written_is_read(message):
-    assert same(unpack(pack(message)), message)
+def test_any_message_is_decoded_as_it_was_encoded(message):
+    assert are_same(unpack(pack(message)), message)
 
 
 @settings(max_examples=50)
@@ -58,7 +58,7 @@ def test_any_bytes_are_a_message_or_refused(data):
         | st.sampled_from(["|u1", "<f8", "O", "V8", "<M8[s]", "|S0", "i4,i4", "(2,3)u1", ",", "<"]),
     )
 )
-def test_any_description_of_an_array_is_one_or_refused(described):
+def test_a_random_description_of_an_array_is_decoded_read_only_or_refused(described):
     try:
         found = unpack(msgpack.packb({"x": described}))["x"]
     except CodecError:
@@ -67,7 +67,7 @@ def test_any_description_of_an_array_is_one_or_refused(described):
         assert not found.flags.writeable
 
 
-def test_arrays_are_read_only_and_in_c_order():
+def test_decoded_arrays_are_read_only_and_keep_their_values_in_any_memory_order():
     array = np.asfortranarray(np.arange(6).reshape(2, 3))[:, ::-1]
     found = unpack(pack({"x": array}))["x"]
 
@@ -96,7 +96,7 @@ def test_numpy_scalars_keep_their_type():
         2**80,
     ],
 )
-def test_what_must_not_be_sent_is_refused(value):
+def test_objects_complex_numbers_and_sets_are_refused_by_the_encoder(value):
     with pytest.raises(CodecError, match="cannot be encoded"):
         pack({"x": value})
 
@@ -114,13 +114,16 @@ def test_what_must_not_be_sent_is_refused(value):
         (None, "|u1", [4], "is NoneType, not bytes"),
     ],
 )
-def test_hostile_arrays_are_refused(data, dtype, shape, words):
+def test_an_array_with_wrong_size_or_unsafe_type_is_refused_by_the_decoder(
+    data, dtype, shape, words
+):
     described = {b"__ndarray__": True, b"data": data, b"dtype": dtype, b"shape": shape}
     with pytest.raises(CodecError, match=words):
         unpack(msgpack.packb({"x": described}))
 
 
-def test_arrays_of_other_dialects_are_read():
+def test_arrays_encoded_by_other_packages_are_decoded():
+    """One has keys of text, another has the short keys of msgpack-numpy; pickles stay encoded."""
     array = np.arange(6, dtype=np.float32).reshape(2, 3)
     described = {"data": array.tobytes(), "shape": (2, 3)}
     text = {"__ndarray__": True, "dtype": "<f4", **described}
@@ -134,14 +137,14 @@ def test_arrays_of_other_dialects_are_read():
     sent = {"x": text, "y": numpy, "z": {b"nd": False, b"type": "<f4", b"data": b"\0\0\0\x3f"}}
     found = unpack(msgpack.packb(sent))
 
-    assert same([found["x"], found["y"]], [array, array])
+    assert are_same([found["x"], found["y"]], [array, array])
     assert found["z"] == 0.5
 
     pickled = {**numpy, b"type": "O", b"kind": b"O"}
     assert list(unpack(msgpack.packb({"x": pickled}))["x"]) == list(pickled)
 
 
-def test_arrays_have_keys_of_text_where_they_must():
+def test_arrays_can_be_encoded_with_text_keys_for_servers_that_need_them():
     array = np.arange(6, dtype=np.float32).reshape(2, 3)
     data = pack({"x": array, "y": np.float32(0.5), "z": np.bool_(True)}, text_keys=True)
     assert msgpack.unpackb(data) == {
@@ -150,6 +153,6 @@ def test_arrays_have_keys_of_text_where_they_must():
     }  # fmt: skip
 
 
-def test_a_deep_nest_is_refused():
+def test_a_list_nested_100000_times_is_refused():
     with pytest.raises(CodecError):
         unpack(b"\x81\xa1x" + b"\x91" * 100_000 + b"\x00")

@@ -44,25 +44,25 @@ from roboirg.tasks.splits.splits import get_episode, split_episodes
 from roboirg.util.reply_reading import UnparsableReplyError
 
 
-def heard(body):
+def instruction_in(body):
     """The instruction in a request."""
     return re.search(r"What was said to the robot, in full:\n(.*)", words_of(body))[1]
 
 
-def hearing(episode, setting="explicit"):
+def answers_with_the_meant_goal(episode, setting="explicit"):
     """Answers with the goal that the words of the request mean."""
     instruction = instruct(episode, setting)
     goal, *_ = understood_goals(instruction, episode)
 
     def answer(body):
-        assert heard(body) == instruction.text
+        assert instruction_in(body) == instruction.text
         return goal_schema(episode.task).answers[goal]
 
     return answer
 
 
 @pytest.mark.parametrize("task", every_task())
-def test_every_goal_of_every_split_can_be_answered_and_nothing_else(task):
+def test_the_schema_for_a_model_s_answer_has_exactly_the_goals_that_occur(task):
     slots = goal_schema(task)
     possible = set()
     for episode in split_episodes([task], SPLITS):
@@ -74,7 +74,7 @@ def test_every_goal_of_every_split_can_be_answered_and_nothing_else(task):
 
 
 @pytest.mark.parametrize("task", every_task())
-def test_every_answer_fits_the_schema(task):
+def test_the_answer_for_each_goal_is_valid_by_the_json_schema(task):
     slots = goal_schema(task)
     fields = slots.schema()["properties"]
     for answer in slots.answers.values():
@@ -101,7 +101,7 @@ def test_every_answer_fits_the_schema(task):
         ),
     )
 )
-def test_any_reply_is_a_goal_or_unparsable(reply):
+def test_any_json_reply_is_read_as_a_goal_or_refused(reply):
     for task in every_task():
         slots = goal_schema(task)
         with contextlib.suppress(UnparsableReplyError):
@@ -123,25 +123,25 @@ def test_any_reply_is_a_goal_or_unparsable(reply):
         ("VideoUnmask", '{"colors": ["red", "red"]}', "meant together"),
     ],
 )
-def test_wrong_replies_are_explained(task, reply, words):
+def test_a_wrong_reply_is_refused_with_what_would_be_right(task, reply, words):
     with pytest.raises(UnparsableReplyError, match=words):
         goal_schema(task).read(reply)
 
 
-def test_a_listener_that_is_told_the_truth_decides_on_the_true_goal_in_all_settings():
-    """Nothing else than the words of the request tells it."""
+def test_a_model_that_knows_what_the_words_mean_finds_the_goal_in_all_settings():
+    """The model is a stand-in, and reads the words from the request that it gets."""
     with fake_vlm(["{}"]) as server:
         policy = make_listener(server)
         for task, known in every_task().items():
             episode = get_episode(task, "test", 0)
             for setting in plain_settings(known):
                 env = stand_in(episode, setting)
-                server.answer = hearing(episode, setting)
+                server.answer = answers_with_the_meant_goal(episode, setting)
                 assert is_right(policy.decide(env, env.instruction.text), episode)
     assert len(server.requests) == policy.usage()["calls"] > len(every_task())
 
 
-def test_a_listener_tells_what_a_policy_may_know_and_nothing_of_the_scene():
+def test_a_request_to_a_model_contains_nothing_of_the_scene_but_pictures_and_words():
     """The same words get the same request in every scene of a task that looks alike."""
     requests = set()
     with fake_vlm(["{}"]) as server:
@@ -153,14 +153,15 @@ def test_a_listener_tells_what_a_policy_may_know_and_nothing_of_the_scene():
     assert len(requests) == 1
 
 
-def test_unparsable_replies_are_retried_once_then_counted():
+def test_an_unreadable_reply_is_asked_again_once_and_then_counted():
+    """First the second reply is good; then both are unreadable, and a third is not asked for."""
     env = stand_in(get_episode("PickXtimes", "test", 0))
     goal = env.episode.goal
     good = goal_schema("PickXtimes").answers[goal]
     with fake_vlm(["no idea", good]) as server:
         policy = make_listener(server)
         assert policy.decide(env, "Do it.") == goal
-        assert spent(policy) == usage(calls=2)
+        assert spent(policy) == usage_of(calls=2)
         first, second = server.requests
         *same, said, complaint = second["messages"]
         assert same == first["messages"]
@@ -169,10 +170,10 @@ def test_unparsable_replies_are_retried_once_then_counted():
     with fake_vlm(["no idea", "", good]) as server:
         policy = make_listener(server)
         assert policy.decide(env, "Do it.") is None
-        assert spent(policy) == usage(calls=2, unparsed=1)
+        assert spent(policy) == usage_of(calls=2, unparsed=1)
 
 
-def test_a_prompt_that_google_blocks_is_an_empty_reply():
+def test_a_prompt_that_google_blocks_counts_as_an_unreadable_reply():
     with fake_vlm([Garbage(b'{"promptFeedback": {"blockReason": "OTHER"}}')]) as server:
         policy = make_listener(server, "google")
         assert policy.decide(stand_in(get_episode("StopCube", "test", 0)), "Stop.") is None
@@ -180,7 +181,7 @@ def test_a_prompt_that_google_blocks_is_an_empty_reply():
     assert "(no answer)" in words_of(server.requests[1])
 
 
-def usage(calls, unparsed=0, impossible=0):
+def usage_of(calls, unparsed=0, impossible=0):
     return {
         "calls": calls,
         "input_tokens": calls * TOKENS[0],
@@ -190,7 +191,8 @@ def usage(calls, unparsed=0, impossible=0):
     }
 
 
-def test_what_is_not_in_the_scene_is_counted_and_nothing_is_done():
+def test_a_goal_that_the_scene_lacks_is_counted_as_impossible():
+    """The model answers with a red cube; the scene has a green one only."""
     with fake_vlm(['{"color": "red", "repeats": 1}']) as server:
         policy = make_listener(server)
         policy.make_primitives = lambda env: None  # there is no arm here
@@ -198,7 +200,7 @@ def test_what_is_not_in_the_scene_is_counted_and_nothing_is_done():
 
         policy.reset("Do it.", {})
 
-        assert spent(policy) == usage(calls=1, impossible=1)
+        assert spent(policy) == usage_of(calls=1, impossible=1)
         assert policy.metadata["understood"] == {"color": "red", "repeats": 1}
 
 
@@ -216,7 +218,7 @@ def test_a_model_that_reads_text_only_gets_no_picture():
         assert make_listener(server).version != policy.version
 
 
-MISHAPS = [
+FAULTS_OF_ANY_SERVICE = [
     (Status(401, f"bad key {KEY}"), PolicyReplyError, r"bad key \*+\W"),
     (Status(503), PolicyConnectionError, "not available"),
     (Late(30), PolicyTimeoutError, "did not answer within 0.5 s"),
@@ -224,7 +226,7 @@ MISHAPS = [
     (Garbage(b'[{"candidates": 1, "choices": 1}]'), PolicyReplyError, "something else"),
 ]
 """Those whose replies each service reports in its own way."""
-OTHERS = [
+FAULTS_OF_OPENAI = [
     (Status(400), PolicyReplyError, "something went wrong"),
     (Status(307, headers={"Location": "http://127.0.0.1:9"}), PolicyReplyError, "status 307"),
     (Status(429), PolicyConnectionError, "not available"),
@@ -236,10 +238,13 @@ OTHERS = [
 
 @pytest.mark.parametrize(
     ("provider", "mishap", "error", "words"),
-    [("openai", *mishap) for mishap in MISHAPS + OTHERS]
-    + [("google", *mishap) for mishap in MISHAPS],
+    [("openai", *mishap) for mishap in FAULTS_OF_ANY_SERVICE + FAULTS_OF_OPENAI]
+    + [("google", *mishap) for mishap in FAULTS_OF_ANY_SERVICE],
 )
-def test_mishaps_have_their_own_errors(provider, mishap, error, words, monkeypatch):
+def test_each_fault_of_a_model_service_has_its_own_error_without_the_key(
+    provider, mishap, error, words, monkeypatch
+):
+    """`mishap` is what the stand-in service does instead of answering."""
     monkeypatch.setenv(KEY_VARIABLE, KEY)
     # Only what is late may end by the time: a busy machine takes its time for the others, too.
     timeout_s = 0.5 if isinstance(mishap, Late) else 300.0
@@ -262,11 +267,11 @@ def test_an_absent_service_is_a_connection_error(provider):
         policy.decide(stand_in(get_episode("StopCube", "test", 0)), "Stop.")
 
 
-def test_a_key_goes_only_where_it_is_meant_to_and_never_into_records(monkeypatch):
+def test_the_key_of_the_environment_is_not_sent_to_other_servers_nor_recorded(monkeypatch):
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
     monkeypatch.setenv(KEY_VARIABLE, KEY)
     episode = get_episode("StopCube", "test", 0)
-    with fake_vlm(hearing(episode)) as server:
+    with fake_vlm(answers_with_the_meant_goal(episode)) as server:
         env = stand_in(episode)
         make_listener(server).decide(env, env.instruction.text)
         assert KEY not in json.dumps(server.headers)
@@ -278,7 +283,7 @@ def test_a_key_goes_only_where_it_is_meant_to_and_never_into_records(monkeypatch
     assert server.url in told
 
 
-def test_a_missing_key_stops_the_run_in_one_sentence(monkeypatch):
+def test_a_missing_key_is_reported_with_the_name_of_its_variable(monkeypatch):
     monkeypatch.delenv(KEY_VARIABLE, raising=False)
     monkeypatch.delenv("GOOGLE_API_KEY", raising=False)
     for options, name in [
@@ -289,7 +294,8 @@ def test_a_missing_key_stops_the_run_in_one_sentence(monkeypatch):
             options.key()
 
 
-def test_versions_tell_words_and_options_apart_but_not_addresses():
+def test_the_version_of_a_policy_changes_with_its_options_but_not_its_address():
+    """Records are compared by version; what changes no answer must not change it."""
     with fake_vlm(["{}"]) as server:
         version = make_listener(server).version
         assert version.startswith("fake ")
@@ -307,13 +313,14 @@ def video(steps):
 
 @pytest.mark.parametrize("provider", ["openai", "google"])
 @pytest.mark.parametrize("shown", [0, 100])
-def test_requests_are_as_captured(provider, shown):
+def test_requests_to_models_are_equal_to_the_stored_ones(provider, shown):
+    """With a video of 100 steps and without one."""
     episode = get_episode("VideoPlaceOrder", "test", 0)
-    with fake_vlm(hearing(episode, "direct")) as server:
+    with fake_vlm(answers_with_the_meant_goal(episode, "direct")) as server:
         policy = make_listener(server, provider, frames=4, reasoning=True)
         policy._demonstration = video(shown)
         policy.decide(stand_in(episode, shade=9), instruct(episode, "direct").text)
-    assert spent(policy) == usage(1)
+    assert spent(policy) == usage_of(1)
 
     name = f"listener-{provider}-{'video' if shown else 'none'}"
     check_capture(name, golden(server.requests[0]))
@@ -324,9 +331,9 @@ def test_requests_are_as_captured(provider, shown):
     ("task", "setting"),
     [("VideoUnmask", "spatial"), ("StopCube", "reasoning")],
 )
-def test_the_expert_executes_what_the_model_understood(task, setting):
+def test_a_policy_with_a_stand_in_model_solves_an_episode(task, setting):
     episode = get_episode(task, "test", 0)
-    with fake_vlm(hearing(episode, setting)) as server:
+    with fake_vlm(answers_with_the_meant_goal(episode, setting)) as server:
         policy = make_listener(server, frames=2, frames_every=20)
         env = roboirg.make(task, setting=setting, cameras=policy.cameras, demonstration_frames=20)
         assert play(env, policy)["status"] == "success"
@@ -334,7 +341,8 @@ def test_the_expert_executes_what_the_model_understood(task, setting):
         assert policy.usage()["calls"] == 1
 
 
-def test_a_model_is_asked_once_the_command_was_heard():
+def test_the_model_is_asked_only_after_the_last_sentence_was_heard():
+    """The first of two sentences comes at the reset, the second at step 20."""
     episode = get_episode("PickXtimes", "test", 0)
     said = instruct(episode, "direct").turns
     with fake_vlm([goal_schema("PickXtimes").answers[episode.goal]]) as server:
@@ -348,4 +356,4 @@ def test_a_model_is_asked_once_the_command_was_heard():
             policy.hear(said[1], 20)
             assert policy.usage()["calls"] == 1
             assert policy.understood == episode.goal
-        assert [heard(body) for body in server.requests] == [" ".join(said)] * 2
+        assert [instruction_in(body) for body in server.requests] == [" ".join(said)] * 2

@@ -47,7 +47,7 @@ PROMPTS = ("listener", "qwen", "gemini", "memer", "subgoals")
     ],
 )
 @given(st.lists(st.tuples(thousandths, thousandths), max_size=5))
-def test_points_are_scaled_row_first_all_at_once(point, reply, points):
+def test_points_in_thousandths_are_converted_to_pixels_with_the_row_first(point, reply, points):
     """One pass: what is a pixel already is not taken for a thousandth again."""
     said = " and ".join(point.format(y, x) for y, x in points)
     expected = " and ".join(f"at <{to_pixel(y)}, {to_pixel(x)}>" for y, x in points)
@@ -55,7 +55,7 @@ def test_points_are_scaled_row_first_all_at_once(point, reply, points):
 
 
 @given(thousandths)
-def test_a_pixel_is_floored_and_stays_in_the_picture(value):
+def test_thousandths_become_pixels_rounded_down_and_within_the_picture(value):
     assert to_pixel(value) == min(int(Fraction(PICTURE_SIZE * value, 1000)), PICTURE_SIZE - 1)
 
 
@@ -66,13 +66,14 @@ def test_a_pixel_is_floored_and_stays_in_the_picture(value):
         *("<y, x>", "x" * (MOST_SUBGOAL_LETTERS + 1), "go at (1001,3)", "go \ud800"),
     ],
 )
-def test_broken_subgoals_are_unparsable(text):
+def test_subgoals_with_a_broken_point_or_too_many_letters_are_refused(text):
     with pytest.raises(UnparsableReplyError):
         parse_points(text)
 
 
 @given(st.lists(st.integers(0, 200)), st.integers(0, 20))
-def test_merged_key_frames_are_one_of_each_chain_of_near_ones(steps, near):
+def test_key_frames_closer_than_a_gap_are_merged_into_one(steps, near):
+    """A chain is a series of steps, each at most `near` after the one before; one of it is kept."""
     kept = merge_keyframes(steps, near)
 
     assert set(kept) <= set(steps)
@@ -87,7 +88,7 @@ def test_merged_key_frames_are_one_of_each_chain_of_near_ones(steps, near):
     assert len(kept) == chains
 
 
-def test_every_subgoal_of_every_task_has_a_form_that_planners_know():
+def test_the_list_of_subgoal_forms_for_planners_covers_all_tasks_and_nothing_else():
     forms = load_prompts("subgoals").lines("forms")
     patterns = [_pattern(form) for form in forms]
     used = set()
@@ -118,7 +119,7 @@ def _pattern(form):
 
 
 @given(st.integers(1, 60), st.integers(1, 12))
-def test_chosen_frames_are_spread_evenly(length, most):
+def test_frames_sampled_from_a_video_are_spread_evenly_with_both_ends(length, most):
     frames = np.arange(length, dtype=np.uint8)[:, None, None, None]
     kept = sample_evenly(frames, most).ravel().tolist()
     assert len(kept) == min(length, most)
@@ -132,7 +133,8 @@ def test_chosen_frames_are_spread_evenly(length, most):
     assert len(kept) / clip.rate == Fraction(length, 30)
 
 
-def test_a_sheet_shows_frames_in_reading_order_each_with_its_label():
+def test_a_contact_sheet_shows_frames_in_reading_order_each_with_its_label():
+    """18 frames of different shades on sheets of four by four; one has the label "x"."""
     shades = [10 * number for number in range(18)]
     frames = [np.full((128, 128, 3), shade, np.uint8) for shade in shades]
     labels = ["x" if shade == 50 else "" for shade in shades]
@@ -147,12 +149,12 @@ def test_a_sheet_shows_frames_in_reading_order_each_with_its_label():
 
 
 @pytest.mark.parametrize("value", [None, 3, "", " ", ["x"]])
-def test_a_field_without_words_is_unparsable(value):
+def test_a_reply_field_that_must_hold_words_is_refused_without_any(value):
     with pytest.raises(UnparsableReplyError, match="'a' has to hold words"):
         text_of({"a": value}, "a")
 
 
-def test_prompts_are_versioned_and_can_be_replaced(tmp_path):
+def test_a_user_s_prompt_file_replaces_ours_and_has_another_fingerprint(tmp_path):
     assert len({load_prompts(name).fingerprint for name in PROMPTS}) == len(PROMPTS)
 
     file = tmp_path / "mine.toml"
@@ -174,7 +176,8 @@ wishes = st.sampled_from(["all", "none"]) | st.integers(1, 12)
 
 
 @given(wishes, wishes, st.integers(0, 40))
-def test_each_sees_the_pictures_of_the_video_that_it_asked_for(one, other, steps):
+def test_planner_and_policy_each_get_the_video_frames_that_they_asked_for(one, other, steps):
+    """The environment draws frames for both wishes; each then sees its own part."""
     drawn = merge_demonstration_frames(one, other)
     assert drawn == merge_demonstration_frames(other, one)
 
@@ -196,7 +199,7 @@ def test_each_sees_the_pictures_of_the_video_that_it_asked_for(one, other, steps
     st.none() | st.integers(1, 6),
     st.lists(st.integers(1, 20), max_size=6),
 )
-def test_each_sees_the_moments_that_it_asked_for(one, other, chunks):
+def test_planner_and_policy_each_get_the_observations_of_their_own_period(one, other, chunks):
     every = merge_observe_every(one, other)
     assert every == merge_observe_every(other, one)
 

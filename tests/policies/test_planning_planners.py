@@ -31,18 +31,18 @@ from roboirg.policies.planners.query_schedule import MOST_USELESS
 from roboirg.policies.vlm.models import ModelOptions
 
 CHUNK = 16
-GO = "pick up the red cube at <|box_start|>(500,250)<|box_end|>"
+REPLY = "pick up the red cube at <|box_start|>(500,250)<|box_end|>"
 SUBGOAL = f"pick up the red cube at <{to_pixel(500)}, {to_pixel(250)}>"
 KINDS = ("qwen", "gemini", "memer")
-ANSWERS = {
-    "qwen": GO,
+REPLY_OF = {
+    "qwen": REPLY,
     "gemini": json.dumps({"description": "x", "subgoal_sequence": [], "subgoal":
                           "Pick up the red cube at <500, 250>"}),
-    "memer": json.dumps({"current_subtask": GO, "keyframe_positions": []}),
+    "memer": json.dumps({"current_subtask": REPLY, "keyframe_positions": []}),
 }  # fmt: skip
 
 
-class Follower:
+class PolicyThatStandsStill:
     """Returns still actions, a given number of rows per chunk."""
 
     cameras = ()
@@ -77,14 +77,14 @@ def make_planner(kind, server, provider="openai", **more):
     return make_by_kind(kind, {"model": model, **own}, "the test")
 
 
-def moment(step, size=64):
+def observation_at(step, size=64):
     """What is seen at a step: its number as a shade of grey."""
     return {"front_rgb": np.full((size, size, 3), step % 256, np.uint8)}
 
 
 def video(steps, size=64):
     return {
-        "front_rgb": np.stack([moment(step, size)["front_rgb"] for step in range(steps)]),
+        "front_rgb": np.stack([observation_at(step, size)["front_rgb"] for step in range(steps)]),
         "joint_positions": np.zeros((steps, 7)),
     }
 
@@ -92,16 +92,18 @@ def video(steps, size=64):
 NO_VIDEO = {"front_rgb": np.zeros((0, 64, 64, 3), np.uint8), "joint_positions": np.zeros((0, 7))}
 
 
-def drive(planner, steps, chunk=CHUNK, demonstration=NO_VIDEO, instruction="Do it.", size=64):
+def play_in_chunks(
+    planner, steps, chunk=CHUNK, demonstration=NO_VIDEO, instruction="Do it.", size=64
+):
     """Play an episode in chunks; return the subgoal at each chunk's first step."""
-    policy = HierarchicalPolicy(planner, Follower(chunk))
+    policy = HierarchicalPolicy(planner, PolicyThatStandsStill(chunk))
     policy.reset(instruction, demonstration)
     every = policy.observe_every
     for step in range(0, steps + 1, chunk):
-        observation = moment(step, size)
+        observation = observation_at(step, size)
         if every is not None:
             observation["history"] = tuple(
-                moment(at, size)
+                observation_at(at, size)
                 for at in range(max(step - chunk + 1, 1), step + 1)
                 if at % every == 0 and step
             )
@@ -120,7 +122,7 @@ def asked_at(server, kind, answer, steps, chunk=CHUNK, **options):
         return plan(observation, step)
 
     planner.plan = watched
-    drive(planner, steps, chunk)
+    play_in_chunks(planner, steps, chunk)
     return at
 
 
@@ -145,30 +147,34 @@ def clip(body):
 @pytest.mark.parametrize(
     ("kind", "answer", "options", "steps"),
     [
-        ("qwen", GO, {}, range(0, 321, 16)),
-        ("qwen", GO, {"asked": "every 40 steps"}, [0, 48, 80, 128, 160, 208, 240, 288, 320]),
-        ("qwen", GO, {"asked": "every 7 steps"}, range(0, 321, 16)),  # two periods in a chunk
+        ("qwen", REPLY, {}, range(0, 321, 16)),
+        ("qwen", REPLY, {"asked": "every 40 steps"}, [0, 48, 80, 128, 160, 208, 240, 288, 320]),
+        ("qwen", REPLY, {"asked": "every 7 steps"}, range(0, 321, 16)),  # two periods in a chunk
         ("qwen", "press the button at (3,4) to stop", {}, range(0, 321, 16)),
         # The last step of a hold belongs to it.
         ("qwen", "press the button at (3,4)", {"chunk": 10}, [0, *range(100, 321, 10)]),
         ("qwen", "press the first button", {"chunk": 10}, [0, *range(110, 321, 10)]),
         ("qwen", "press the second button", {"chunk": 10}, [0, *range(260, 321, 10)]),
-        ("memer", ANSWERS["memer"], {}, range(0, 321, 16)),
-        ("gemini", ANSWERS["gemini"], {}, [0, 96, 144, 192, 240, 288]),
-        ("gemini", ANSWERS["gemini"], {"first_pause": 0}, range(0, 321, 48)),
-        ("gemini", ANSWERS["gemini"], {"first_pause": 144}, [0, 144, 192, 240, 288]),
+        ("memer", REPLY_OF["memer"], {}, range(0, 321, 16)),
+        ("gemini", REPLY_OF["gemini"], {}, [0, 96, 144, 192, 240, 288]),
+        ("gemini", REPLY_OF["gemini"], {"first_pause": 0}, range(0, 321, 48)),
+        ("gemini", REPLY_OF["gemini"], {"first_pause": 144}, [0, 144, 192, 240, 288]),
     ],
 )
-def test_planners_ask_when_the_facts_say_so(kind, answer, options, steps):
+def test_each_planner_asks_its_model_at_the_steps_that_its_options_set(
+    kind, answer, options, steps
+):
+    """`steps` are those at which it asks in 320 steps, which the policy plays in chunks of 16."""
     with fake_vlm(["x"]) as server:
         assert asked_at(server, kind, answer, 320, **options) == list(steps)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_useless_reply_leaves_the_last_subgoal(kind):
-    with fake_vlm(["{}", "{}", ANSWERS[kind], "{}"]) as server:
+def test_after_an_unreadable_reply_the_last_subgoal_stays(kind):
+    """A reply is unreadable after a second try; replies are {}, {}, a good one, then {} only."""
+    with fake_vlm(["{}", "{}", REPLY_OF[kind], "{}"]) as server:
         planner = make_planner(kind, server, **({"first_pause": 0} if kind == "gemini" else {}))
-        policy = drive(planner, 64)
+        policy = play_in_chunks(planner, 64)  # five chunks of 16, from step 0
         assert policy.policy.told == [SUBGOAL] * 4  # none at first
 
         usage = planner.usage()
@@ -176,36 +182,37 @@ def test_a_useless_reply_leaves_the_last_subgoal(kind):
         assert usage["calls"] == len(server.requests) == 1 + 2 * usage["unparsed"]
 
 
-def test_one_that_waits_asks_again_after_a_useless_reply_but_not_for_ever():
-    with fake_vlm([GO, "{}"]) as server:
+def test_a_planner_that_waits_for_a_subgoal_s_end_repeats_an_unreadable_question():
+    with fake_vlm([REPLY, "{}"]) as server:
         planner = make_planner("qwen", server, asked="when-done")
         planner.reset("Do it.", NO_VIDEO)
-        assert planner.plan(moment(0), 0) == SUBGOAL
+        assert planner.plan(observation_at(0), 0) == SUBGOAL
 
         planner.hear("Now.", 1)
         for step in range(CHUNK, 20 * CHUNK, CHUNK):
-            planner.plan(moment(step), step)
+            planner.plan(observation_at(step), step)
         assert len(server.requests) == 1 + 2 * MOST_USELESS
 
 
-def test_qwen_shows_what_was_done_and_a_picture_of_now():
-    answers = [GO, GO.replace("500", "700"), "put it down", GO]
+def test_the_qwen_planner_sends_the_subgoals_so_far_and_the_current_picture():
+    """Pictures have their step as their shade of grey."""
+    answers = [REPLY, REPLY.replace("500", "700"), "put it down", REPLY]
     with fake_vlm(answers) as server:
-        drive(make_planner("qwen", server, video="mp4"), 48, demonstration=video(60))
+        play_in_chunks(make_planner("qwen", server, video="mp4"), 48, demonstration=video(60))
         assert [pictures(body) for body in server.requests] == [[0], [16], [32], [48]]
 
     told = [body["messages"][1]["content"][3]["text"] for body in server.requests]
 
     assert "nothing has been done" in told[0]
     # The same words at another place are not another subgoal.
-    assert told[1] == told[2] == f"Subgoals so far, in order: 1. {GO}"
-    assert told[3] == f"Subgoals so far, in order: 1. {GO}; 2. put it down"
+    assert told[1] == told[2] == f"Subgoals so far, in order: 1. {REPLY}"
+    assert told[3] == f"Subgoals so far, in order: 1. {REPLY}; 2. put it down"
 
 
-def test_gemini_converses_in_clips():
-    with fake_vlm([ANSWERS["gemini"]]) as server:
+def test_the_gemini_planner_sends_a_video_clip_in_each_turn_of_a_conversation():
+    with fake_vlm([REPLY_OF["gemini"]]) as server:
         options = {"sampling_fps": 5, "observe_every": 2}
-        policy = drive(make_planner("gemini", server, "google", **options), 144,
+        policy = play_in_chunks(make_planner("gemini", server, "google", **options), 144,
                        demonstration=video(20))  # fmt: skip
         first, second, third = server.requests
     assert server.paths[0].endswith("models/fake:generateContent")
@@ -221,31 +228,32 @@ def test_gemini_converses_in_clips():
     assert len(clip(third)[0]) == 24
 
 
-def test_gemini_shows_a_picture_where_there_is_no_clip():
-    with fake_vlm([ANSWERS["gemini"]]) as server:
+def test_the_gemini_planner_sends_pictures_to_a_service_that_takes_no_clips():
+    with fake_vlm([REPLY_OF["gemini"]]) as server:
         options = {"asked": "every 3 steps", "first_pause": 0, "observe_every": 2}
-        drive(make_planner("gemini", server, **options), 6, chunk=3)
+        play_in_chunks(make_planner("gemini", server, **options), 6, chunk=3)
         assert [pictures(body) for body in server.requests] == [[0], [0, 3], [0, 3, 6]]
 
 
-def test_gemini_shows_what_an_unusable_answer_missed_once_more():
-    answers = [ANSWERS["gemini"], "?", "?", ANSWERS["gemini"]]
+def test_the_gemini_planner_repeats_the_clip_after_an_unreadable_answer():
+    """The frames since the last answer of use are sent once more."""
+    answers = [REPLY_OF["gemini"], "?", "?", REPLY_OF["gemini"]]
     with fake_vlm(answers) as server:
-        policy = drive(make_planner("gemini", server, "google", first_pause=0), 96)
+        policy = play_in_chunks(make_planner("gemini", server, "google", first_pause=0), 96)
         assert "unreadable" not in policy.usage()  # the last reply was of use
         assert len(clip(server.requests[-1])[0]) == 96
         assert len(server.requests[-1]["contents"]) == 3
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_planners_forget_the_last_episode(kind):
+def test_planners_send_nothing_of_the_last_episode_in_the_next_one(kind):
     """Its words, video, pictures and subgoals."""
-    with fake_vlm([ANSWERS[kind].replace("[]", "[1]")]) as server:
+    with fake_vlm([REPLY_OF[kind].replace("[]", "[1]")]) as server:
         planner = make_planner(kind, server, clip_frames=2)
-        drive(planner, 112, instruction="First.", demonstration=video(20))
+        play_in_chunks(planner, 112, instruction="First.", demonstration=video(20))
         before = len(server.requests)
         again = {name: frames[7:] for name, frames in video(10).items()}
-        drive(planner, 0, instruction="Second.", demonstration=again)
+        play_in_chunks(planner, 0, instruction="Second.", demonstration=again)
 
         (body,) = server.requests[before:]
 
@@ -254,7 +262,7 @@ def test_planners_forget_the_last_episode(kind):
         assert planner.usage()["calls"] == 1
 
 
-class Refusing(Follower):
+class Refusing(PolicyThatStandsStill):
     """Refuses every subgoal."""
 
     endings = property(
@@ -268,16 +276,16 @@ class Refusing(Follower):
 
 
 @pytest.mark.parametrize("when", ["when-done", "every 99 steps"])
-def test_a_planner_is_asked_five_times_for_what_is_refused_in_each_episode(when):
-    """What a subgoal meant in the world stays hidden from it."""
-    with fake_vlm([GO]) as server:
+def test_a_planner_whose_subgoals_are_refused_asks_five_times_in_an_episode(when):
+    """The planner learns that a subgoal was refused, not what it meant in the world."""
+    with fake_vlm([REPLY]) as server:
         planner = make_planner("stateless", server, asked=when)
         policy = HierarchicalPolicy(planner, Refusing())
         for asked in (5, 10):
             policy.reset("Do it.", NO_VIDEO)
             assert (policy.subgoal, policy.endings) == (None, [])
             for step in (0, CHUNK):
-                policy.act({**moment(step), "history": ()})
+                policy.act({**observation_at(step), "history": ()})
             assert len(server.requests) == asked
             assert planner.ends == [SubgoalEnd(SUBGOAL, "refused", "no")]
 
@@ -289,7 +297,8 @@ def test_a_planner_is_asked_five_times_for_what_is_refused_in_each_episode(when)
         ("refused", [3]),
     ],
 )
-def test_a_planner_of_goals_repeats_what_failed_from_the_pick_and_only_three_times(ends, stages):
+def test_a_failed_stage_is_repeated_from_its_pick_and_at_most_three_times(ends, stages):
+    """Stages are 0 hover, 1 pick and 2 drop; `stages` are those due after each end."""
     planner = make_policy("planner:listener", 3).planner
     assert planner._decider.seed == 3  # by which it guesses
 
@@ -307,24 +316,24 @@ def test_a_planner_of_goals_repeats_what_failed_from_the_pick_and_only_three_tim
 
 
 @pytest.mark.parametrize("last", ["all tasks completed", "the task is complete", "it is done"])
-def test_gemini_keeps_the_last_subgoal_where_the_model_says_all_is_done(last):
+def test_all_is_done_from_the_gemini_model_leaves_the_last_subgoal(last):
     done = json.dumps({"description": "x", "subgoal": last})
-    with fake_vlm([ANSWERS["gemini"], done]) as server:
-        assert set(drive(make_planner("gemini", server), 144).policy.told) == {SUBGOAL}
+    with fake_vlm([REPLY_OF["gemini"], done]) as server:
+        assert set(play_in_chunks(make_planner("gemini", server), 144).policy.told) == {SUBGOAL}
 
 
-def test_memer_shows_recent_frames_and_remembers_what_it_chose():
+def test_the_memer_planner_sends_recent_frames_and_the_key_frames_it_chose():
     """In an episode after another one, of which nothing is shown."""
 
     def choose(*positions):
-        return json.dumps({"current_subtask": GO, "keyframe_positions": positions})
+        return json.dumps({"current_subtask": REPLY, "keyframe_positions": positions})
 
     before = [choose(1), choose(2)]
     answers = [choose(1), choose(8, 2), choose(1), choose(), choose(8)]
     with fake_vlm([*before, *answers]) as server:
         planner = make_planner("memer", server)
-        drive(planner, 16)
-        policy = drive(planner, 64).policy
+        play_in_chunks(planner, 16)
+        policy = play_in_chunks(planner, 64).policy
         shown = [pictures(body) for body in server.requests[len(before) :]]
 
     # 0; 0, 4, 16 make 4 and 16, where 16 and 18 make 18; then 64 besides.
@@ -337,46 +346,52 @@ def test_memer_shows_recent_frames_and_remembers_what_it_chose():
     ]
     assert list(planner.frames) == [4, 18, 64]
     # The policy sees the moments of its own period.
-    seen = [moment["front_rgb"][0, 0, 0] for view in policy.seen for moment in view["history"]]
+    seen = [
+        observation["front_rgb"][0, 0, 0] for view in policy.seen for observation in view["history"]
+    ]
     assert seen == list(range(3, 65, 3))
 
 
 @pytest.mark.parametrize("positions", [[0], [9], ["one"], [1.5], [True], "1", None])
-def test_memer_refuses_positions_that_there_are_not(positions):
-    with fake_vlm([json.dumps({"current_subtask": GO, "keyframe_positions": positions})]) as server:
+def test_key_frame_positions_that_do_not_exist_make_a_memer_reply_unreadable(positions):
+    with fake_vlm(
+        [json.dumps({"current_subtask": REPLY, "keyframe_positions": positions})]
+    ) as server:
         planner = make_planner("memer", server)
-        drive(planner, 16)
+        play_in_chunks(planner, 16)
 
         assert planner.usage()["unparsed"] == 2
         assert planner.frames == {}
 
 
 @pytest.mark.parametrize(("option", "kept"), [({"most": 2}, [66, 82]), ({"near": 16}, [82])])
-def test_memer_may_be_told_to_keep_the_newest_key_frames_only(option, kept):
-    choose = json.dumps({"current_subtask": GO, "keyframe_positions": [1]})
+def test_options_of_the_memer_planner_limit_the_key_frames_it_keeps(option, kept):
+    """In each reply the model chooses the first of the frames that it sees."""
+    choose = json.dumps({"current_subtask": REPLY, "keyframe_positions": [1]})
     with fake_vlm([choose]) as server:
         planner = make_planner("memer", server, **option)
-        drive(planner, 96)
+        play_in_chunks(planner, 96)
         assert list(planner.frames) == kept
 
 
 @pytest.mark.parametrize("subgoals", ["simple", "grounded"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_requests_are_as_captured(kind, subgoals):
+def test_requests_of_planners_are_equal_to_the_stored_ones(kind, subgoals):
     provider = "google" if kind == "gemini" else "openai"
-    with fake_vlm([ANSWERS[kind]]) as server:
+    with fake_vlm([REPLY_OF[kind]]) as server:
         planner = make_planner(
             kind, server, provider, subgoals=subgoals, video="mp4", max_output_tokens=128
         )
-        drive(planner, 96 if kind == "gemini" else 16, demonstration=video(60, 256),
+        play_in_chunks(planner, 96 if kind == "gemini" else 16, demonstration=video(60, 256),
               instruction="Put the red one into the bin.", size=256)  # fmt: skip
         name = f"planner-{kind}-{subgoals}"
         check_capture(name, [golden(server.requests[0]), golden(server.requests[-1])])
 
 
-def test_together_they_are_a_policy_and_costs_add_up():
-    with fake_vlm([GO]) as server:
-        policy = drive(make_planner("qwen", server, input_price=1.0), 32)
+def test_planner_and_policy_form_a_policy_whose_costs_are_summed():
+    """Three questions to the planner's model, and one call at 0.5 US dollars by the policy."""
+    with fake_vlm([REPLY]) as server:
+        policy = play_in_chunks(make_planner("qwen", server, input_price=1.0), 32)
         assert isinstance(policy, Policy)
         assert not isinstance(policy, PrivilegedPolicy)
         assert spent(policy) == {
@@ -392,20 +407,20 @@ def test_together_they_are_a_policy_and_costs_add_up():
         policy.close()
 
 
-def test_the_oracle_needs_an_environment_that_names_pixels():
-    policy = HierarchicalPolicy(OraclePlanner(), Follower())
+def test_the_oracle_planner_refuses_an_environment_without_pixel_positions():
+    policy = HierarchicalPolicy(OraclePlanner(), PolicyThatStandsStill())
     assert isinstance(policy, PrivilegedPolicy)
     with pytest.raises(InvalidValueError, match="grounded=True"):
         policy.attach(roboirg.make("PickXtimes", cameras=()))
 
 
 @pytest.mark.parametrize("kind", ["qwen", "gemini", "memer"])
-def test_a_query_after_an_utterance_quotes_everything_that_was_said(kind):
-    with fake_vlm([ANSWERS[kind]]) as server:
-        policy = HierarchicalPolicy(make_planner(kind, server), Follower(CHUNK))
+def test_a_planner_quotes_also_the_sentence_that_was_said_during_the_episode(kind):
+    with fake_vlm([REPLY_OF[kind]]) as server:
+        policy = HierarchicalPolicy(make_planner(kind, server), PolicyThatStandsStill(CHUNK))
         policy.reset("This one is red.", NO_VIDEO)
         for step in range(0, 200, CHUNK):
-            policy.act({**moment(step), "history": ()})
+            policy.act({**observation_at(step), "history": ()})
             if step == CHUNK:
                 policy.hear("Take it.", step)
         first, *_, last = map(json.dumps, server.requests)
@@ -429,7 +444,7 @@ class Silent:
 
 
 @pytest.mark.sim
-def test_a_planner_that_knows_the_order_sees_what_silent_hands_have_done():
+def test_a_planner_moves_on_with_hands_that_do_not_report_the_end_of_a_subgoal():
     policy = HierarchicalPolicy(make_by_kind("listener", {}, "test"), Silent())
     assert not policy.reports
 

@@ -17,9 +17,11 @@ from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.planners.systems import all_systems, find_system
 
-PAPER = ("FrameS-Modul", "GroundSG-Gemini", "GroundSG-QwenVL", "GroundSG-oracle", "MemER",
-         "TTT-Expert", "pi0.5")  # fmt: skip
-PLANNERS = {
+SYSTEMS_OF_THE_PAPER = (
+    "FrameS-Modul", "GroundSG-Gemini", "GroundSG-QwenVL", "GroundSG-oracle", "MemER",
+    "TTT-Expert", "pi0.5",
+)  # fmt: skip
+PLANNER_OF = {
     "GroundSG-Gemini": "gemini",
     "GroundSG-QwenVL": "qwen",
     "GroundSG-oracle": "oracle",
@@ -34,29 +36,29 @@ def load_system(name, overrides=None, seed=0):
     )
 
 
-def test_the_papers_systems_are_at_hand():
-    assert all_systems() == PAPER
+def test_all_systems_of_the_paper_are_known_by_name():
+    assert all_systems() == SYSTEMS_OF_THE_PAPER
 
 
-@pytest.mark.parametrize("name", PAPER)
-def test_a_system_is_a_policy_offline(name):
+@pytest.mark.parametrize("name", SYSTEMS_OF_THE_PAPER)
+def test_each_system_of_the_paper_can_be_made_without_a_server(name):
     policy = load_system(name)
     assert isinstance(policy, Policy)
     assert isinstance(policy, PrivilegedPolicy) == (name == "GroundSG-oracle")
-    assert isinstance(policy, HierarchicalPolicy) == (name in PLANNERS)
-    if name in PLANNERS:
-        assert policy.metadata["planner"]["kind"] == PLANNERS[name]
+    assert isinstance(policy, HierarchicalPolicy) == (name in PLANNER_OF)
+    if name in PLANNER_OF:
+        assert policy.metadata["planner"]["kind"] == PLANNER_OF[name]
         assert policy.grounded == (name == "GroundSG-oracle")
         assert policy.policy.options.subgoals == "grounded"
 
-    low = policy.policy if name in PLANNERS else policy
+    low = policy.policy if name in PLANNER_OF else policy
     assert low.options.history == (name in {"TTT-Expert", "FrameS-Modul"})
     assert low.options.execute == 16
 
     policy.close()
 
 
-def test_a_spec_overrides_entries():
+def test_options_in_a_system_s_name_override_its_configuration():
     spec = (
         "system:GroundSG-QwenVL?server=gpu:9001&vlm=http://other:8000/v1&model=mine"
         "&video_frames=2&timeout_s=7.5&policy.execute=8"
@@ -72,8 +74,8 @@ def test_a_spec_overrides_entries():
     assert policy.metadata["system"] == "GroundSG-QwenVL"
 
 
-@pytest.mark.parametrize("spec", [*(f"system:{name}" for name in PAPER), LISTENER])
-def test_what_a_policy_needs_is_known_from_its_name(spec):
+@pytest.mark.parametrize("spec", [*(f"system:{name}" for name in SYSTEMS_OF_THE_PAPER), LISTENER])
+def test_needs_and_version_of_a_system_are_known_without_making_it(spec):
     known = read_policy(spec)
     policy = make_policy(spec, 5)
 
@@ -138,12 +140,13 @@ def test_what_a_policy_needs_is_known_from_its_name(spec):
         ),
     ],
 )
-def test_wrong_specs_are_explained(spec, error, words):
+def test_a_wrong_system_or_planner_name_is_refused_with_what_would_be_right(spec, error, words):
     with pytest.raises(error, match=words):
         find_policy(spec)
 
 
-def test_own_systems_are_files(tmp_path):
+def test_a_user_s_system_is_a_toml_file(tmp_path):
+    """Needed are a name and a policy that can follow subgoals, if there is a planner."""
     file = tmp_path / "mine.toml"
     file.write_text('name = "mine"\npolicy = "random"\n[planner]\nkind = "oracle"\n')
     with pytest.raises(InvalidValueError, match="RandomPolicy has no method follow"):
@@ -159,7 +162,8 @@ def test_own_systems_are_files(tmp_path):
         load_system(str(file))
 
 
-def test_nothing_is_asked_of_libraries_before_the_first_question():
+def test_systems_can_be_made_without_network_video_or_simulation_libraries():
+    """Only the first question to a model needs them; the error names the extra to install."""
     program = (
         "import sys\n"
         "class Refuse:\n"
@@ -189,7 +193,7 @@ def test_nothing_is_asked_of_libraries_before_the_first_question():
     assert done.stdout.count("[vlm]'") == 2
 
 
-class NoMemory(MmeVlaServer):
+class ServerWithoutMemory(MmeVlaServer):
     """The baseline and the symbolic models do not look at what was buffered."""
 
     def infer(self, message):
@@ -221,7 +225,7 @@ class NoMemory(MmeVlaServer):
 def test_every_system_plays_a_whole_episode(name, answer, calls, subgoal):
     """Against a policy server and a model's server on real sockets, each by its own protocol."""
     remembers = name == "TTT-Expert"
-    server = MmeVlaServer() if remembers else NoMemory()
+    server = MmeVlaServer() if remembers else ServerWithoutMemory()
     with server, fake_vlm([answer]) as vlm:
         overrides = {"server": server.place, "policy.timeout": "300"}
         if answer:
@@ -236,7 +240,7 @@ def test_every_system_plays_a_whole_episode(name, answer, calls, subgoal):
     assert info["status"] == "timeout"
     messages = [unpack(data) for data in server.messages]
     prompts = [message for message in messages if "prompt" in message]
-    assert len(prompts) == 3
+    assert len(prompts) == 3  # 40 steps in chunks of 16
     for message in prompts:
         assert re.fullmatch(subgoal, str(message.get("grounded_subgoal")))
     assert any("add_buffer" in message for message in messages) == remembers

@@ -21,7 +21,7 @@ from roboirg.tasks.splits.splits import get_episode
 
 
 @pytest.mark.parametrize("name", BUILTIN)
-def test_built_in_policies_fulfil_the_contract(name):
+def test_built_in_policies_have_the_methods_of_a_policy(name):
     policy = make_policy(name, 3)
     assert isinstance(policy, Policy)
     assert isinstance(policy, PrivilegedPolicy) == (name != "random")
@@ -31,6 +31,7 @@ def test_costs_that_are_unknown_or_beyond_reason_are_left_out_of_a_record():
     """Also one that no float can hold; and what is unknown in a part makes the sum unknown."""
     planner = SimpleNamespace(usage=lambda: {"calls": 1, "input_tokens": math.nan})
     policy = SimpleNamespace(usage=lambda: {"calls": 1, "input_tokens": 5, "x": 10**400, "y": -1})
+    # 1 and 1 calls; tokens, x and y are left out.
     assert policy_usage(PlannerParts(planner, policy)) == {"calls": 2.0}
 
 
@@ -59,9 +60,8 @@ def test_random_actions_are_valid_and_depend_on_seed_and_instruction_alone():
         ([0, 0, 0, 0], "hover hover hover hover"),
     ],
 )
-def test_what_the_expert_missed_is_tried_again_and_only_three_times(
-    monkeypatch, completed, executed
-):
+def test_the_expert_repeats_a_failed_motion_at_most_three_times(monkeypatch, completed, executed):
+    """`completed` is how many stages are complete each time that it looks."""
     kinds = ("hover", "pick_cube", "drop_into")
     stages = tuple(SimpleNamespace(primitive=Primitive(kind, "cube")) for kind in kinds)
     primitives = SimpleNamespace(execute=lambda primitive: [primitive.kind])
@@ -77,7 +77,8 @@ def test_what_the_expert_missed_is_tried_again_and_only_three_times(
     ("task", "numbers"),
     [("VideoUnmask", (0, 49)), ("PickXtimes", (1, 0)), ("PickXtimes", (5,))],
 )
-def test_the_previous_goal_is_that_of_the_episode_before_if_the_scene_has_it(task, numbers):
+def test_the_policy_previous_goal_takes_the_goal_of_the_episode_before(task, numbers):
+    """Numbers are the episode's, then the one's whose goal is taken, or none."""
     episode, *before = (get_episode(task, "test", number) for number in numbers)
     goal = PreviousGoalPolicy().decide(SimpleNamespace(episode=episode), "")
     assert goal == (before[0].goal if before else None)
@@ -133,7 +134,7 @@ class Numb(Silent):
         (f"{__name__}:Numb", InvalidValueError, r"class Numb has no method act\(\)"),
     ],
 )
-def test_wrong_specs_are_explained(spec, error, words):
+def test_a_wrong_policy_name_is_refused_with_what_would_be_right(spec, error, words):
     with pytest.raises(error, match=words):
         find_policy(spec)
 
@@ -153,7 +154,10 @@ def test_wrong_specs_are_explained(spec, error, words):
         ("calibration", "yes", "calibration is 'yes'; it must be True or False"),
     ],
 )
-def test_a_wrong_need_is_told_before_anything_starts(monkeypatch, attribute, wish, words):
+def test_a_policy_that_declares_a_wrong_need_is_refused_when_it_is_looked_up(
+    monkeypatch, attribute, wish, words
+):
+    """Needs are attributes such as the cameras that a policy wants."""
     monkeypatch.setattr(Silent, attribute, wish, raising=False)
     with pytest.raises(InvalidValueError, match=f"{__name__}:Silent'.*{words}"):
         find_policy(f"{__name__}:Silent")
@@ -166,7 +170,8 @@ def guesses_in(setting, count):
 
 
 @pytest.mark.sim
-def test_guesses_are_uniform_over_the_goals_that_fit():
+def test_the_forgetful_policy_guesses_evenly_among_goals_that_fit_the_words():
+    """An explicit command leaves one goal, a direct one without its introduction leaves three."""
     assert set(guesses_in("explicit", 20)) == {get_episode("VideoUnmask", "test", 0).goal}
 
     guesses = guesses_in("direct", 300)

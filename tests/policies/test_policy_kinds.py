@@ -13,7 +13,7 @@ from roboirg.policies.by_name.finding import read_policy
 
 
 @pytest.fixture
-def lab(tmp_path, monkeypatch):
+def installed_recipe(tmp_path, monkeypatch):
     """Install the recipe as a package of its own, next to an entry point without its module."""
     for cached in (policy_kinds.find_kind, policy_kinds.known_kinds):
         cached.cache_clear()
@@ -26,8 +26,8 @@ def lab(tmp_path, monkeypatch):
         cached.cache_clear()
 
 
-@pytest.mark.usefixtures("lab")
-def test_the_recipe_makes_policies_in_a_process_of_their_own():
+@pytest.mark.usefixtures("installed_recipe")
+def test_the_documentation_s_new_kind_of_policy_works_in_its_own_process():
     assert isinstance(make_policy("lab:walk?fast=yes", 3), RandomPolicy)
     assert read_policy("lab:walk").is_foreign
     assert read_policy("lab:walk").is_hosted
@@ -35,8 +35,8 @@ def test_the_recipe_makes_policies_in_a_process_of_their_own():
         make_policy("nothing", 0)
 
 
-@pytest.mark.usefixtures("lab")
-def test_a_kind_is_imported_only_when_it_is_named():
+@pytest.mark.usefixtures("installed_recipe")
+def test_a_broken_kind_of_policy_is_reported_only_when_it_is_named():
     make_policy("lab:walk", 0)
     with pytest.raises(InvalidValueError, match=r"'gone' .* of add-protocol .* cannot be loaded"):
         make_policy("gone:anything", 0)

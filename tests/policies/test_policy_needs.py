@@ -39,7 +39,7 @@ class Guide:
     def plan(self, observation, step): ...
 
 
-def test_every_need_is_read_and_survives_a_message():
+def test_all_needs_of_a_policy_are_read_and_survive_json():
     needs = PolicyNeeds.of(Demanding())
     assert all(getattr(needs, field.name) != field.default for field in fields(needs))
     assert needs.cameras == ("wrist", "front")
@@ -64,12 +64,12 @@ def test_every_need_is_read_and_survives_a_message():
         ({"touch": True}, TypeError, "touch"),
     ],
 )
-def test_a_message_is_checked_like_a_policy(needs, error, words):
+def test_needs_with_a_wrong_value_are_refused(needs, error, words):
     with pytest.raises(error, match=words):
         PolicyNeeds(**needs)
 
 
-def test_properties_count_for_objects_only():
+def test_needs_given_as_properties_are_read_from_objects_and_not_from_classes():
     class Late(Demanding):
         actions = property(lambda _self: "waypoint")
         prompt_tokens = property(lambda _self: 9)
@@ -83,7 +83,8 @@ def test_properties_count_for_objects_only():
     assert PolicyNeeds.of(Late(), "actions") == PolicyNeeds(actions="waypoint")
 
 
-def test_a_planner_needs_what_it_declares_and_its_model_is_its_own():
+def test_needs_of_a_planner_and_of_its_policy_are_merged():
+    """Cameras are united, tasks intersected; actions and limits of prompts are the policy's."""
     assert PolicyNeeds.of_planner(object()) == PolicyNeeds(cameras=(), demonstration_frames="none")
 
     guide = Guide()
@@ -99,7 +100,7 @@ def test_a_planner_needs_what_it_declares_and_its_model_is_its_own():
     assert both.trained_tasks == both.merge(PolicyNeeds()).trained_tasks == ("BinFill",)
 
 
-def test_a_tokenizer_that_is_no_path_matters_where_prompts_are_counted():
+def test_a_tokenizer_object_is_refused_for_counting_but_not_for_playing():
     thinking = Demanding()
     thinking.tokenizer = object()
 

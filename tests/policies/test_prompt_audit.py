@@ -24,7 +24,7 @@ from roboirg.policies.prompt_length.prompt_audit import (
 from roboirg.policies.prompt_length.tokenizer_file import prompt_limit, read_tokenizer
 
 WORDS = ["Put", "the", "red", "cube", "into", "bin.", "Remember:", "green_one", "Zürich", "quokka"]
-TEXTS = st.lists(st.sampled_from(WORDS), min_size=1, max_size=30).map(" ".join)
+SOME_TEXTS = st.lists(st.sampled_from(WORDS), min_size=1, max_size=30).map(" ".join)
 LIMITS = st.integers(1, 80)
 
 
@@ -32,7 +32,7 @@ def prompt_limit_of(spec):
     return prompt_limit(find_policy(spec).needs)
 
 
-def halves(text):
+def two_tokens_a_word(text):
     """A tokenizer that splits every word in two."""
     ends = []
     place = 0
@@ -43,19 +43,22 @@ def halves(text):
     return Tokens(1, tuple(ends), 1)
 
 
-TOKENIZERS = st.sampled_from([None, halves, most_tokens, fewest_tokens])
+TOKENIZERS = st.sampled_from([None, two_tokens_a_word, most_tokens, fewest_tokens])
 
 
-def audit(text, limit):
+def audit_and_reach(text, limit):
     """Audit of one message, and how many of its characters arrive."""
     found = audit_instruction([[text]], limit)
     return found, found.reached[0]
 
 
 @settings(max_examples=30)
-@given(TEXTS, LIMITS, st.integers(0, 30), TOKENIZERS)
-def test_bounds_are_in_order_and_verdicts_follow_from_them(text, tokens, added, tokenize):
-    found, reached = audit(text, PromptLimit(tokens, added, tokenize))
+@given(SOME_TEXTS, LIMITS, st.integers(0, 30), TOKENIZERS)
+def test_a_prompt_is_heard_if_its_most_tokens_fit_and_cut_if_its_fewest_do_not(
+    text, tokens, added, tokenize
+):
+    """Without the model's tokenizer only bounds are known, and between them nothing is certain."""
+    found, reached = audit_and_reach(text, PromptLimit(tokens, added, tokenize))
     assert 0 < found.least <= found.most
     assert (found.verdict == "heard") == (found.most <= tokens)
     assert (found.verdict == "cut") == (found.least > tokens)
@@ -63,10 +66,10 @@ def test_bounds_are_in_order_and_verdicts_follow_from_them(text, tokens, added, 
 
 
 @settings(max_examples=30)
-@given(TEXTS, LIMITS)
+@given(SOME_TEXTS, LIMITS)
 def test_what_is_read_is_the_prefix_that_its_tokens_spell(text, tokens):
-    found, reached = audit(text, PromptLimit(tokens, 0, halves))
-    spelled = halves(clean_prompt(text))
+    found, reached = audit_and_reach(text, PromptLimit(tokens, 0, two_tokens_a_word))
+    spelled = two_tokens_a_word(clean_prompt(text))
 
     assert found.least == found.most == spelled.total
     # The line break behind the words may be all that is lost.
@@ -74,11 +77,11 @@ def test_what_is_read_is_the_prefix_that_its_tokens_spell(text, tokens):
 
 
 @settings(max_examples=30)
-@given(st.lists(st.lists(TEXTS, min_size=1, max_size=4), max_size=4), LIMITS, TOKENIZERS)
+@given(st.lists(st.lists(SOME_TEXTS, min_size=1, max_size=4), max_size=4), LIMITS, TOKENIZERS)
 def test_every_message_is_read_from_its_own_beginning(messages, tokens, tokenize):
     limit = PromptLimit(tokens, 0, tokenize)
     texts = [" ".join(turns) for turns in messages]
-    alone = [audit(text, limit) for text in texts]
+    alone = [audit_and_reach(text, limit) for text in texts]
     verdicts = [share.verdict for share, _ in alone]
 
     found = audit_instruction(messages, limit)
@@ -93,13 +96,14 @@ def test_every_message_is_read_from_its_own_beginning(messages, tokens, tokenize
     assert not heard
 
 
-def test_mentions_beyond_the_cut_are_lost_and_others_not():
+def test_mentions_behind_the_token_limit_of_a_prompt_are_reported_as_lost():
+    """A mention is a span (turn, end); "halves" counts two tokens a word."""
     turns = ("Look at the red cube.", "Put it into the bin.")
-    limit = PromptLimit(1 + 2 * 6, 0, halves)  # the beginning, five words and "Put"
+    limit = PromptLimit(1 + 2 * 6, 0, two_tokens_a_word)  # the beginning, five words and "Put"
     found = audit_instruction([turns], limit)
-    assert found.reached == (21, 3)
+    assert found.reached == (21, 3)  # characters: all of the first turn, and "Put"
 
-    spans = [(0, 20), (1, 3), (1, 6), (1, 19)]
+    spans = [(0, 20), (1, 3), (1, 6), (1, 19)]  # turn, and where the mention ends in it
     assert found.lost(spans) == (2, 3)
     assert audit_instruction([turns], limit._replace(tokens=99)).lost(spans) == ()
     # The second is not said yet: it is not lost.
@@ -109,18 +113,18 @@ def test_mentions_beyond_the_cut_are_lost_and_others_not():
 def test_prompts_are_stripped_and_underscores_and_line_breaks_are_blanks():
     assert clean_prompt("  Put_the\ncube.\n") == "Put the cube."
     assert clean_prompt("Put İt", lowers=True) == "put İt"
-    assert audit("   red cube", PromptLimit(3, 0, halves))[1] == 3 + len("red")
+    assert audit_and_reach("   red cube", PromptLimit(3, 0, two_tokens_a_word))[1] == 3 + len("red")
 
 
-def test_a_state_behind_the_words_shares_their_budget():
-    assert audit("red cube", PromptLimit(6, 0, halves))[0].verdict == "heard"
-    crowded = audit_instruction([["red cube"]], PromptLimit(6, 10, halves))
+def test_tokens_that_a_model_adds_behind_the_words_make_their_fate_unknown():
+    assert audit_and_reach("red cube", PromptLimit(6, 0, two_tokens_a_word))[0].verdict == "heard"
+    crowded = audit_instruction([["red cube"]], PromptLimit(6, 10, two_tokens_a_word))
     assert crowded == (6, 16, (len("red cube"),), "unknown")
 
 
 @settings(max_examples=30)
-@given(TEXTS)
-def test_the_upper_bound_is_the_count_of_the_language(text):
+@given(SOME_TEXTS)
+def test_the_upper_bound_of_tokens_is_our_own_count_of_instructions(text):
     ascii_text = clean_prompt(text.replace("ü", "u"))
     assert most_tokens(ascii_text).total == count_tokens(ascii_text)
     assert fewest_tokens(ascii_text).total <= count_tokens(ascii_text)
@@ -155,7 +159,7 @@ def test_a_json_tokenizer_is_read(tmp_path):
     assert read_tokenizer(str(path))("put the cube.") == Tokens(1, (3, 7, 12, 13), 1)
 
 
-def test_tokenizers_that_cannot_be_read(tmp_path, monkeypatch):
+def test_a_tokenizer_file_that_cannot_be_read_is_refused_with_the_reason(tmp_path, monkeypatch):
     with pytest.raises(InvalidValueError, match="is not a file"):
         read_tokenizer(str(tmp_path / "none.model"))
 
@@ -177,7 +181,7 @@ def test_tokenizers_that_cannot_be_read(tmp_path, monkeypatch):
             read_tokenizer(str(tmp_path / name))
 
 
-def test_limits_are_parameters_of_remote_policies(sentencepiece_file):
+def test_the_token_limit_of_a_remote_policy_is_read_from_its_url(sentencepiece_file):
     url = f"openpi://localhost:1?prompt_tokens=48&prompt_added=7&tokenizer={sentencepiece_file}"
     limit = prompt_limit_of(url)._replace(tokenize=None)
 
@@ -187,7 +191,7 @@ def test_limits_are_parameters_of_remote_policies(sentencepiece_file):
     assert prompt_limit_of("oracle") is None
 
 
-def test_the_systems_of_the_paper_have_limits():
+def test_each_system_of_the_paper_declares_its_token_limit():
     limits = {name: prompt_limit_of(f"system:{name}") for name in all_systems()}
     assert len(limits) == 7
     for name, limit in limits.items():
@@ -198,7 +202,7 @@ def test_the_systems_of_the_paper_have_limits():
     assert prompt_limit_of("system:pi0.5?policy.prompt_tokens=48").tokens == 48
 
 
-def test_a_lerobot_checkpoint_says_its_limit_itself(tmp_path):
+def test_the_token_limit_of_a_lerobot_checkpoint_is_read_from_its_configuration(tmp_path):
     write_checkpoint(tmp_path, tokenizer_max_length=48)
     assert LeRobotPolicy(f"lerobot://{tmp_path}").prompt_tokens == 48
     assert prompt_limit_of(f"lerobot://{tmp_path}?prompt_tokens=9").tokens == 9

@@ -29,7 +29,7 @@ def _fresh_registry():
 
 
 @pytest.fixture
-def _tiny_package(tmp_path, monkeypatch, _fresh_registry):
+def _installed_recipe(tmp_path, monkeypatch, _fresh_registry):
     """The recipe of the docs page, installed as a package of its own."""
     install(tmp_path, "add-protocol", "protocols")
     monkeypatch.syspath_prepend(tmp_path)
@@ -37,8 +37,8 @@ def _tiny_package(tmp_path, monkeypatch, _fresh_registry):
     sys.modules.pop("tiny_protocol", None)
 
 
-@pytest.mark.usefixtures("_tiny_package")
-def test_the_recipe_serves_and_plays_over_loopback():
+@pytest.mark.usefixtures("_installed_recipe")
+def test_the_documentation_s_new_protocol_serves_a_policy_over_a_socket():
     assert "tiny" in url_classes()
     with served("random", "tiny") as url:
         assert url.startswith("tiny://127.0.0.1:")
@@ -52,12 +52,12 @@ def test_the_recipe_serves_and_plays_over_loopback():
         client.close()
 
 
-def test_the_page_lists_every_scheme():
+def test_the_documentation_lists_every_protocol():
     listed = re.findall(r"^\| `(.*)://host:port` \|", PAGE, flags=re.MULTILINE)
     assert sorted(listed) == sorted(protocols_by_scheme())
 
 
-def test_the_page_explains_every_option():
+def test_the_documentation_explains_every_option_of_each_protocol():
     common = PAGE.split("Options of all protocols")[1].split("Options of some")
     tables = {"common": common[0], "own": common[1].split("**One server")[0]}
     for protocol in protocols_by_scheme().values():

@@ -19,7 +19,7 @@ from roboirg.core.errors import (
 )
 from roboirg.policies import make_policy
 
-MALFORMED = [
+MALFORMED_REPLIES = [
     ("Traceback …\nValueError: the weights melted\n", "error: ValueError: the weights melted."),
     ("", "error: an empty text"),
     (b"\xc1\xff\x00", "something other than a message: the bytes are not a msgpack"),
@@ -44,58 +44,64 @@ PROTOCOLS = {
 }
 
 
-def episode(policy, *, steps=1):
+def play_episode(policy, *, steps=1):
     policy.reset(INSTRUCTION, video(2))
     return [policy.act(moment(2 + n, history=(moment(2 + n),) * n)) for n in range(steps)]
 
 
-def before_inference(protocol):
+def messages_before_inference(protocol):
     """Messages of an episode before the first request for actions."""
     return {"openpi": 0, "mme-vla": 2}.get(protocol, 1)
 
 
 @pytest.mark.parametrize(
     ("protocol", "reply", "words"),
-    [("openpi", *fault) for fault in MALFORMED]
-    + [(protocol, *fault) for protocol in ("mme-vla", "challenge") for fault in MALFORMED[::4]],
+    [("openpi", *fault) for fault in MALFORMED_REPLIES]
+    + [
+        (protocol, *fault)
+        for protocol in ("mme-vla", "challenge")
+        for fault in MALFORMED_REPLIES[::4]
+    ],
 )
 def test_a_malformed_reply_is_reported_and_the_next_episode_works(protocol, reply, words):
-    faults = [None] * before_inference(protocol) + [reply]
+    """`reply` takes the place of the server's answer to the first request for actions."""
+    faults = [None] * messages_before_inference(protocol) + [reply]
     with PROTOCOLS[protocol](faults=faults) as server:
         with client_of(server, protocol, "?max_reply_mib=1") as policy:
             with pytest.raises(PolicyReplyError, match=words) as caught:
-                episode(policy)
+                play_episode(policy)
             assert server.place in str(caught.value)
         with client_of(server, protocol) as following:
-            assert len(episode(following)) == 1
+            assert len(play_episode(following)) == 1
 
 
 @pytest.mark.parametrize("protocol", ["mme-vla", "challenge"])
-def test_a_reset_has_to_be_confirmed(protocol):
+def test_a_server_that_does_not_confirm_a_reset_is_an_error(protocol):
     with (
         PROTOCOLS[protocol](faults=[{"reset_finished": False}]) as server,
         client_of(server, protocol) as policy,
     ):
         with pytest.raises(PolicyReplyError, match="did not confirm 'reset'"):
-            episode(policy)
-        episode(policy)
+            play_episode(policy)
+        play_episode(policy)
 
 
 @pytest.mark.parametrize("protocol", ["openpi", "mme-vla"])
-def test_a_server_that_answers_late_is_not_waited_for(protocol):
+def test_a_late_reply_is_a_timeout_and_not_taken_for_the_next_one(protocol):
+    """The server takes five seconds, the client waits for two."""
     with (
-        PROTOCOLS[protocol](faults=[None] * before_inference(protocol) + [5.0]) as server,
+        PROTOCOLS[protocol](faults=[None] * messages_before_inference(protocol) + [5.0]) as server,
         client_of(server, protocol, "?timeout=2") as policy,
     ):
         start = time.monotonic()
         with pytest.raises(PolicyTimeoutError, match="within 2 s"):
-            episode(policy)
+            play_episode(policy)
         assert time.monotonic() - start < 300  # and not for ever
 
         time.sleep(3)
         # The late answer must not become the next one's.
         following = make_policy(f"{protocol}://{server.place}", 0)
-        first = episode(following)[0]
+        first = play_episode(following)[0]
         following.close()
 
         assert np.array_equal(first, _played_in_time(policy)[0])
@@ -105,21 +111,24 @@ def _played_in_time(policy):
     """Return an episode's rows; with two seconds for a reply a busy machine may be late itself."""
     for _ in range(20):
         with contextlib.suppress(PolicyTimeoutError):
-            return episode(policy)
+            return play_episode(policy)
     raise AssertionError("the server is always late")
 
 
 @pytest.mark.parametrize("protocol", ["openpi", "mme-vla", "challenge"])
-def test_a_server_that_dies_ends_the_episode(protocol):
+def test_a_server_that_dies_ends_its_episode_and_the_next_reset_connects_again(protocol):
+    """The server ends the connection at the first request for actions."""
     with (
-        PROTOCOLS[protocol](faults=[None] * before_inference(protocol) + ["die"]) as server,
+        PROTOCOLS[protocol](
+            faults=[None] * messages_before_inference(protocol) + ["die"]
+        ) as server,
         client_of(server, protocol) as policy,
     ):
         with pytest.raises(PolicyConnectionError, match="ended the connection"):
-            episode(policy)
+            play_episode(policy)
         with pytest.raises(PolicyConnectionError, match=r"call reset\(\)"):
             policy.act(moment(0, history=()))
-        assert len(episode(policy, steps=2)) == 2
+        assert len(play_episode(policy, steps=2)) == 2
 
 
 @pytest.mark.parametrize(
@@ -129,7 +138,7 @@ def test_a_server_that_dies_ends_the_episode(protocol):
         (frame(pack({})), "timeout=0.5", r"did not take in a message within 0\.5 s"),
     ],
 )
-def test_a_server_that_stalls_is_given_up(sent, options, words):
+def test_a_server_that_stops_sending_or_reading_is_given_up_after_the_timeout(sent, options, words):
     over = threading.Event()
 
     def stall(peer):
@@ -150,7 +159,8 @@ def test_a_server_that_stalls_is_given_up(sent, options, words):
         over.set()
 
 
-def test_a_surplus_reply_is_not_taken_for_the_next():
+def test_a_second_reply_to_one_request_is_an_error():
+    """Otherwise each later request would get the reply to the one before it."""
     said_twice = threading.Event()
 
     class Twice(MmeVlaServer):
@@ -169,20 +179,21 @@ def test_a_surplus_reply_is_not_taken_for_the_next():
             policy.act(moment(0, history=()))
 
 
-def test_a_server_that_starts_late_or_again_is_found():
+def test_a_client_waits_for_a_server_that_starts_late_and_finds_it_after_a_restart():
     port = 20_000 + os.getpid() % 10_000  # below those that the kernel gives away
     policy = make_policy(f"mme-vla://127.0.0.1:{port}?connect=300", 0)
     server = MmeVlaServer(port=port)
     timer = threading.Timer(0.5, server.__enter__)
     timer.start()
-    episode(policy)
+    play_episode(policy)
     timer.join()
     server.__exit__()
 
     with pytest.raises(PolicyConnectionError):
         policy.act(moment(3, history=(moment(3),)))
+    # It was stopped, and another one starts at the same port.
     with MmeVlaServer(port=port) as again:
-        assert episode(policy)[0][0, :2].tolist() == [3, 2]
+        assert play_episode(policy)[0][0, :2].tolist() == [3, 2]
         assert again.connections == 1
 
     policy.close()
@@ -198,11 +209,12 @@ def test_an_absent_server_is_reported_in_one_sentence():
         policy.reset(INSTRUCTION, {})
 
 
-def test_connections_are_closed_and_none_is_left_over():
+def test_closing_a_policy_closes_its_connection():
+    """Three policies are closed, each of them twice."""
     with WireServer() as server:
         for _ in range(3):
             policy = make_policy(f"openpi://{server.place}", 0)
-            episode(policy)
+            play_episode(policy)
             policy.close()
             policy.close()
         deadline = time.monotonic() + 300

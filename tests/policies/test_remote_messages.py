@@ -18,26 +18,26 @@ from roboirg.policies.contract.base import SubgoalFollower
 CAPTURES = Path(__file__).with_name("captures")
 PAGE = (Path(__file__).parents[2] / "docs" / "servers.md").read_text()
 NOW = moment(3, history=())
-LATEST = moment(5, history=(moment(4), moment(5)))
+TWO_STEPS_LATER = moment(5, history=(moment(4), moment(5)))
 
 
-def captured(protocol):
+def stored_messages(protocol):
     found = sorted(CAPTURES.glob(f"{protocol}-[0-9]*.msgpack"))
     assert found
     return [path.read_bytes() for path in found]
 
 
 @pytest.mark.parametrize("protocol", ["openpi", "mme-vla", "challenge", "challenge-sensors"])
-def test_the_page_has_type_and_shape_of_every_key_that_is_sent(protocol):
-    for data in captured(protocol):
+def test_the_documentation_has_the_type_and_shape_of_every_message_key(protocol):
+    for data in stored_messages(protocol):
         for key, value in unpack(data).items():
-            assert re.search(rf"`{key}`.* \| {re.escape(described(value))}[: ]", PAGE)
+            assert re.search(rf"`{key}`.* \| {re.escape(type_and_shape_of(value))}[: ]", PAGE)
 
 
-def described(value):
+def type_and_shape_of(value):
     """Return type and shape of a value of a message, as the page has them."""
     if isinstance(value, list):
-        return f"list of {described(value[0])}"
+        return f"list of {type_and_shape_of(value[0])}"
     kind = str(getattr(value, "dtype", type(value).__name__))
     if not np.shape(value):
         return kind
@@ -46,22 +46,22 @@ def described(value):
     return f"{kind} {shape.replace('8, 8, ', '256, 256, ')}"
 
 
-def test_openpi_sends_these_bytes():
+def test_openpi_messages_are_byte_for_byte_the_stored_ones():
     with WireServer() as server, client_of(server, "openpi", "?version=mine") as policy:
         policy.reset(INSTRUCTION, video(3))
         assert (policy.act(moment(3)).shape, policy.version) == ((20, 8), "mine")
-        assert server.messages == captured("openpi")
+        assert server.messages == stored_messages("openpi")
 
 
-def test_mme_vla_sends_these_bytes():
+def test_mme_vla_messages_are_byte_for_byte_the_stored_ones():
     with MmeVlaServer() as server, client_of(server, "mme-vla", "?part=2&execute=2") as policy:
         policy.reset(INSTRUCTION, video(3))
         first = policy.act(NOW)
         policy.follow("Pick up the red cube at <12, 34>")
-        second = policy.act(LATEST)
-        assert server.messages == captured("mme-vla")
+        second = policy.act(TWO_STEPS_LATER)
+        assert server.messages == stored_messages("mme-vla")
     # Frames in memory, start of the turn, brightness of the newest frame, inferences, row.
-    brightness = [NOW["front_rgb"].mean(), LATEST["front_rgb"].mean()]
+    brightness = [NOW["front_rgb"].mean(), TWO_STEPS_LATER["front_rgb"].mean()]
 
     assert first[:, :5].tolist() == [[4, 3, brightness[0], 1, row] for row in range(2)]
     assert second[:, :5].tolist() == [[6, 3, brightness[1], 2, row] for row in range(2)]
@@ -71,7 +71,7 @@ def test_mme_vla_sends_these_bytes():
     ("name", "options"),
     [("challenge", ""), ("challenge-sensors", "?depth=yes&calibration=1")],
 )
-def test_challenge_sends_these_bytes(name, options):
+def test_challenge_messages_are_byte_for_byte_the_stored_ones(name, options):
     sensors = options != ""
     now, later, latest = (moment(number, sensors=sensors) for number in (3, 4, 5))
     with ChallengeServer() as server, client_of(server, "challenge", options) as policy:
@@ -86,10 +86,10 @@ def test_challenge_sends_these_bytes(name, options):
             "execute": "all",
         }
         assert policy.version == "phase-1"
-        assert server.messages == captured(name)
+        assert server.messages == stored_messages(name)
 
 
-def test_without_history_mme_vla_is_sent_no_frames():
+def test_with_history_no_mme_vla_gets_the_current_frame_only():
     class Baseline(MmeVlaServer):
         def infer(self, message):
             return {"actions": np.ones((20, 8), np.float32)}
@@ -109,7 +109,7 @@ def test_without_history_mme_vla_is_sent_no_frames():
     ("option", "sent"),
     [("simple", ("pick up the cube", None)), ("grounded", (None, "pick up the cube"))],
 )
-def test_a_subgoal_goes_where_the_checkpoint_expects_it(option, sent):
+def test_a_subgoal_is_sent_under_the_key_that_the_checkpoint_expects(option, sent):
     with (
         MmeVlaServer() as server,
         client_of(server, "mme-vla", f"?subgoals={option}") as policy,
@@ -128,7 +128,8 @@ def test_a_subgoal_goes_where_the_checkpoint_expects_it(option, sent):
 @pytest.mark.parametrize(
     ("length", "parts"), [(0, [1]), (15, [16]), (16, [16, 1]), (40, [16, 16, 9])]
 )
-def test_a_video_arrives_in_parts_with_the_acting_frame(length, parts):
+def test_a_video_is_sent_in_parts_of_16_frames_with_the_current_frame_last(length, parts):
+    """15 frames and the current one make a part of 16."""
     with MmeVlaServer() as server, client_of(server, "mme-vla") as policy:
         policy.reset(INSTRUCTION, video(length))
         rows = policy.act(moment(length, history=()))
@@ -138,6 +139,7 @@ def test_a_video_arrives_in_parts_with_the_acting_frame(length, parts):
 
 
 def test_a_history_longer_than_a_part_is_sent_in_parts():
+    """Nine frames in parts of four, after the first frame alone."""
     with MmeVlaServer() as server, client_of(server, "mme-vla", "?part=4&execute=9") as policy:
         policy.reset(INSTRUCTION, video(0))
         policy.act(moment(0, history=()))
@@ -147,7 +149,7 @@ def test_a_history_longer_than_a_part_is_sent_in_parts():
         assert server.parts == [1, 4, 4, 1]
 
 
-def test_keys_and_cameras_of_an_openpi_checkpoint_can_be_named():
+def test_url_options_rename_the_message_keys_of_an_openpi_checkpoint():
     with (
         WireServer() as server,
         client_of(server, "openpi", "?front=base&wrist=&state=q&prompt=say&execute=3") as policy,
@@ -159,7 +161,7 @@ def test_keys_and_cameras_of_an_openpi_checkpoint_can_be_named():
         assert list(unpack(server.messages[0])) == ["base", "q", "say"]
 
 
-def test_a_server_may_be_at_a_path():
+def test_a_policy_server_may_have_a_path_in_its_url():
     with WireServer() as server:
         place = f"{server.place}/v1/realtime/robot/openpi"
         policy = make_policy(f"openpi://{place}/", 0)
@@ -170,6 +172,6 @@ def test_a_server_may_be_at_a_path():
 
 
 @pytest.mark.parametrize("place", ["host", "host:0", "host:x", "host:1,", "host:1#a", "ho st:1"])
-def test_what_is_no_server_is_refused(place):
+def test_an_address_that_is_no_host_and_port_is_refused(place):
     with pytest.raises(InvalidValueError, match="is not a server; write openpi://host:port"):
         make_policy(f"openpi://{place}", 0)

@@ -40,57 +40,61 @@ from roboirg.util.media import Clip, Picture
 PRICES = {"input_price": 100_000.0, "output_price": 0.0}
 BUSY = ModelBusyError("busy")
 LOST = PolicyConnectionError("lost")
-COST = TOKENS[0] * PRICES["input_price"] / 1_000_000
+COST_OF_A_REPLY = TOKENS[0] * PRICES["input_price"] / 1_000_000
 """US dollars of each reply."""
 
 
-def query(words: str, shade: int | None = None) -> ModelQuery:
+def query_of(words: str, shade: int | None = None) -> ModelQuery:
     picture = () if shade is None else (Picture(np.full((2, 2, 3), shade, np.uint8)),)
     return ModelQuery("system", (ChatTurn("user", (words, *picture)),))
 
 
-def play(server, settings: ReplySettings | None, episode: str, *words: str, shade=None, **options):
+def ask_in_episode(
+    server, settings: ReplySettings | None, episode: str, *words: str, shade=None, **options
+):
     """Ask the questions of an episode, as a policy does; returns replies and what they cost."""
     vlm = VLMQuery(model_options(server, **options), Template("$why"))
     with use_replies(settings, episode):
-        replies = [vlm.ask(query(word, shade), str) for word in words]
+        replies = [vlm.ask(query_of(word, shade), str) for word in words]
     return replies, Counter(vlm.usage())
 
 
-def test_an_episode_that_is_played_again_asks_nothing_again(tmp_path):
+def test_replies_stored_for_an_episode_are_used_when_it_is_played_again(tmp_path):
+    """So that an interrupted run pays no call of a model twice."""
     settings = ReplySettings(tmp_path)
     with fake_vlm(["one", "two", "never"]) as server:
-        first, counts = play(server, settings, "a", "first", "second")
+        # Episode "a" asks two questions, and asks both again when it is played again.
+        first, counts = ask_in_episode(server, settings, "a", "first", "second")
         assert (first, counts["stored"]) == (["one", "two"], 0)
-        again, counts = play(server, settings, "a", "first", "second")
+        again, counts = ask_in_episode(server, settings, "a", "first", "second")
         assert (again, counts["stored"]) == (["one", "two"], 2)
         assert len(server.requests) == 2
         # Another episode, and the same words asked a second time, are calls of their own.
-        play(server, settings, "b", "first")
-        play(server, settings, "a", "first", "first")
+        ask_in_episode(server, settings, "b", "first")
+        ask_in_episode(server, settings, "a", "first", "first")
         assert len(server.requests) == 4
         # So is everything in a run that measures the spread, or that stores nothing.
         for passing in (ReplySettings(tmp_path, anew=True), None):
-            replies, counts = play(server, passing, "a", "first")
+            replies, counts = ask_in_episode(server, passing, "a", "first")
             assert (replies, counts["stored"], counts["anew"]) == (["never"], 0, 0)
         assert len(server.requests) == 6
 
 
-def test_what_is_sent_decides_and_differences_are_counted(tmp_path):
+def test_a_stored_reply_is_used_only_for_the_same_words_pictures_and_options(tmp_path):
     """Pictures may differ in a bit on another machine; another temperature is another question."""
     settings = ReplySettings(tmp_path)
     with fake_vlm(["one", "two", "three"]) as server:
-        play(server, settings, "a", "words", shade=1)
-        replies, counts = play(server, settings, "a", "words", shade=2)
+        ask_in_episode(server, settings, "a", "words", shade=1)
+        replies, counts = ask_in_episode(server, settings, "a", "words", shade=2)
         assert (replies, counts["anew"]) == (["two"], 1)
-        play(server, settings, "a", "words", shade=1, temperature=0.5)
+        ask_in_episode(server, settings, "a", "words", shade=1, temperature=0.5)
         # Patience, prices and time limits change no reply.
-        replies, _ = play(server, settings, "a", "words", shade=1, patience_s=7, **PRICES)
+        replies, _ = ask_in_episode(server, settings, "a", "words", shade=1, patience_s=7, **PRICES)
         assert (replies, len(server.requests)) == (["one"], 3)
 
 
-def test_all_that_is_sent_is_in_the_digest():
-    asked = query("words")
+def test_the_digest_of_a_question_changes_with_everything_that_is_sent():
+    asked = query_of("words")
     frames = np.zeros((2, 4, 4, 3), np.uint8)
     clips = Clip(frames, Fraction(30)), Clip(frames + 1, Fraction(30)), Clip(frames, Fraction(15))
     queries = [
@@ -107,13 +111,18 @@ def test_all_that_is_sent_is_in_the_digest():
     assert len({reply_store.digest(each, options) for each in queries}) == len(queries)
 
 
-def test_a_run_ends_when_it_has_spent_what_it_may_and_can_go_on_with_more(tmp_path):
+def test_a_run_stops_at_its_budget_and_goes_on_with_a_larger_one(tmp_path):
+    """Four questions; the first budget is that of two replies."""
     with fake_vlm(lambda body: words_of(body)[-1]) as server:
         with pytest.raises(BudgetError, match=r"have cost 20\.00 of at most 20\.00 US dollars"):
-            play(server, ReplySettings(tmp_path, 2 * COST), "a", *"0123", **PRICES)
+            ask_in_episode(
+                server, ReplySettings(tmp_path, 2 * COST_OF_A_REPLY), "a", *"0123", **PRICES
+            )
         assert len(server.requests) == 2
 
-        replies, counts = play(server, ReplySettings(tmp_path, 9 * COST), "a", *"0123", **PRICES)
+        replies, counts = ask_in_episode(
+            server, ReplySettings(tmp_path, 9 * COST_OF_A_REPLY), "a", *"0123", **PRICES
+        )
         assert (replies, counts["stored"]) == (list("0123"), 2)
         assert len(server.requests) == 4
 
@@ -133,12 +142,15 @@ NO_CHOICES = Garbage(json.dumps({"choices": [], "usage": {"prompt_tokens": 7}}).
 @pytest.mark.parametrize(
     "reply", [without_tokens("one"), with_tokens(10**9), with_tokens(-(10**5))]
 )
-def test_costs_that_are_unknown_end_a_run_with_a_limit_and_no_reply_is_lost(tmp_path, reply):
-    limited = ReplySettings(tmp_path, 9 * COST)
+def test_a_reply_of_unknown_cost_stops_a_run_with_a_budget_but_is_stored(tmp_path, reply):
+    """A service may report no tokens, or a number that makes no sense."""
+    limited = ReplySettings(tmp_path, 9 * COST_OF_A_REPLY)
     with fake_vlm([reply, "two"]) as server:
         with pytest.raises(BudgetError, match=r"what 1 reply cost is unknown, .* of model 'fake'"):
-            play(server, limited, "a", "first", "second", **PRICES)
-        replies, counts = play(server, ReplySettings(tmp_path), "a", "first", "second", **PRICES)
+            ask_in_episode(server, limited, "a", "first", "second", **PRICES)
+        replies, counts = ask_in_episode(
+            server, ReplySettings(tmp_path), "a", "first", "second", **PRICES
+        )
         assert (replies, counts["stored"]) == (["one", "two"], 1)
         assert len(server.requests) == 2
 
@@ -146,32 +158,35 @@ def test_costs_that_are_unknown_end_a_run_with_a_limit_and_no_reply_is_lost(tmp_
     assert math.isnan(counts["cost_usd"])
 
 
-def test_a_reply_that_cannot_be_read_may_have_been_paid(tmp_path):
+def test_an_unreadable_reply_makes_the_cost_of_a_run_unknown(tmp_path):
     limited = ReplySettings(tmp_path, 1e-6)
     with fake_vlm([NO_CHOICES]) as server:
         vlm = VLMQuery(model_options(server, **PRICES), Template(""))
         with pytest.raises(PolicyReplyError), use_replies(limited, "a"):
-            vlm.ask(query("words"), str)
+            vlm.ask(query_of("words"), str)
         assert math.isnan(vlm.usage()["cost_usd"])
         with pytest.raises(BudgetError, match="what 1 reply cost is unknown"):
-            play(server, limited, "b", "words", **PRICES)
+            ask_in_episode(server, limited, "b", "words", **PRICES)
         assert len(server.requests) == 1
 
 
-def test_half_a_surrogate_pair_in_a_reply_is_stored_and_paid_once(tmp_path):
+def test_a_reply_with_an_invalid_character_is_stored_and_paid_once(tmp_path):
+    """Half a surrogate pair cannot be written as UTF-8."""
     with fake_vlm(["\ud800 fine"]) as server:
         for stored in (0, 1):
-            replies, counts = play(server, ReplySettings(tmp_path), "a", "words", **PRICES)
+            replies, counts = ask_in_episode(
+                server, ReplySettings(tmp_path), "a", "words", **PRICES
+            )
             assert replies == [r"\ud800 fine"]
-            assert (counts["cost_usd"], counts["stored"]) == (COST, stored)
+            assert (counts["cost_usd"], counts["stored"]) == (COST_OF_A_REPLY, stored)
 
 
-def test_a_limit_of_costs_needs_prices(tmp_path):
+def test_a_budget_without_prices_is_refused_before_anything_is_asked(tmp_path):
     with (
         fake_vlm(["one"]) as server,
         pytest.raises(BudgetError, match="needs the prices of model 'fake'"),
     ):
-        play(server, ReplySettings(tmp_path, 1.0), "a", "words")
+        ask_in_episode(server, ReplySettings(tmp_path, 1.0), "a", "words")
     assert not server.requests
 
 
@@ -179,13 +194,15 @@ def test_a_limit_of_costs_needs_prices(tmp_path):
     ("provider", "code"),
     [("openai", 429), ("google", 503), ("openai", 408), ("google", 502), ("openai", 504)],
 )
-def test_a_busy_service_is_waited_for(tmp_path, provider, code):
-    """As long as it asks for, and other processes of the run wait, too."""
+def test_a_busy_model_service_is_asked_again_after_the_pause_it_names(tmp_path, provider, code):
+    """Other processes of the run wait, too: the time of the next request is stored."""
     busy = Status(code, headers={"Retry-After": "0.05"})
     started = time.time()
     with fake_vlm([busy, busy, busy, "at last"]) as server:
         settings = ReplySettings(tmp_path)
-        replies, counts = play(server, settings, "a", "words", provider=provider, patience_s=60)
+        replies, counts = ask_in_episode(
+            server, settings, "a", "words", provider=provider, patience_s=60
+        )
         assert (replies, len(server.requests)) == (["at last"], 4)
         assert counts["waited_s"] >= 0.15
 
@@ -202,7 +219,8 @@ def test_a_busy_service_is_waited_for(tmp_path, provider, code):
         ([BUSY, ModelBusyError("busy", 99.5)], [1.0]),  # patience would end
     ],
 )
-def test_pauses_grow_until_it_cannot_be_reached_or_patience_ends(monkeypatch, said, waits):
+def test_pauses_for_a_busy_service_double_until_retries_or_patience_end(monkeypatch, said, waits):
+    """`said` are the errors of the service in order, `waits` the pauses in seconds."""
     waited: list[float] = []
     clock = SimpleNamespace(monotonic=lambda: sum(waited), sleep=waited.append)
     monkeypatch.setattr(vlm_query, "time", clock)
@@ -210,15 +228,15 @@ def test_pauses_grow_until_it_cannot_be_reached_or_patience_ends(monkeypatch, sa
     model = SimpleNamespace(answer=Mock(side_effect=said))
 
     with pytest.raises(PolicyConnectionError, match=str(said[-1])):
-        VLMQuery(options, Template(""), lambda _: model).ask(query("words"), str)
+        VLMQuery(options, Template(""), lambda _: model).ask(query_of("words"), str)
     assert waited == waits
 
 
-def test_what_is_no_chat_completion_is_not_asked_again_nor_stored(tmp_path):
+def test_a_reply_of_another_format_is_an_error_and_is_not_stored(tmp_path):
     with fake_vlm([Garbage(b"{}"), "one"]) as server:
         with pytest.raises(PolicyReplyError):
-            play(server, ReplySettings(tmp_path), "a", "words")
-        replies, counts = play(server, ReplySettings(tmp_path), "a", "words")
+            ask_in_episode(server, ReplySettings(tmp_path), "a", "words")
+        replies, counts = ask_in_episode(server, ReplySettings(tmp_path), "a", "words")
         assert (replies, counts["stored"]) == (["one"], 0)
 
 
@@ -236,7 +254,7 @@ def test_the_waiting_time_of_a_service_is_read_in_seconds(headers, seconds):
     assert retry_after_s(headers) == seconds
 
 
-CHILD = textwrap.dedent(
+PROGRAM = textwrap.dedent(
     """
     import os, signal, sys
     from pathlib import Path
@@ -279,13 +297,13 @@ def name_of(body: dict) -> str:
     return words_of(body).rpartition("<")[2]
 
 
-class Child:
+class EpisodeProcess:
     """Plays episodes, each in a process of its own, forked from one that has loaded everything."""
 
     def __init__(self, server, folder: Path) -> None:
         words = [f"{server.url}/v1", str(folder), str(CALLS)]
         self.main = subprocess.Popen(
-            [sys.executable, "-c", CHILD, *words],
+            [sys.executable, "-c", PROGRAM, *words],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -315,7 +333,7 @@ def test_no_answered_call_is_made_again_after_a_kill(tmp_path, kills):
     answered: dict[str, int] = {}
     """How often a call had been made when its answer was seen first."""
     with fake_vlm(name_of) as server:
-        child = Child(server, tmp_path)
+        child = EpisodeProcess(server, tmp_path)
         for episode in [f"e{number}" for number in range(kills // 2)]:
             for _ in range(2):
                 child.write(episode)
@@ -336,7 +354,8 @@ def test_no_answered_call_is_made_again_after_a_kill(tmp_path, kills):
         assert requests.total() <= CALLS * (kills // 2) + kills
 
 
-def test_who_asks_at_the_same_moment_waits_for_all_before(tmp_path, monkeypatch):
+def test_three_processes_that_ask_at_the_same_moment_take_turns(tmp_path, monkeypatch):
+    """At 60 requests a minute they start one second apart; a longer pause counts for all."""
     waits: list[float] = []
     clock = SimpleNamespace(time=lambda: 5.0, sleep=waits.append)
     monkeypatch.setattr(reply_store, "time", clock)

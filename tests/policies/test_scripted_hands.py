@@ -28,11 +28,11 @@ from roboirg.tasks.choices import choices_of
 from roboirg.tasks.splits.splits import get_episode
 
 TASKS = [name for name in all_tasks() if get_task(name).suite != "real"]
-SOME = ("BinFill", "StopCube", "VideoUnmask", "VideoRepick", "VideoPlaceOrder")
+SOME_TASKS = ("BinFill", "StopCube", "VideoUnmask", "VideoRepick", "VideoPlaceOrder")
 AS_READ = {"press_below": "press", "hold_until": "hold"}
 
 
-def world_of(task, episode=0, **options):
+def environment_and_hands(task, episode=0, **options):
     """An environment and hands in it, at the beginning of their turn."""
     env = roboirg.make(task, episode=episode, cameras=(), **options)
     env.reset()
@@ -42,7 +42,7 @@ def world_of(task, episode=0, **options):
     return env, hands
 
 
-def do(env, hands, subgoal):
+def follow_to_the_end(env, hands, subgoal):
     """Let hands follow a subgoal to its end; return how it ended."""
     hands.follow(subgoal)
     while not hands.endings or hands.endings[-1].subgoal != subgoal:
@@ -59,7 +59,8 @@ def play_with(planner, task, episode=0, setting="explicit"):
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_every_subgoal_of_a_task_is_read_as_its_motion(task):
+def test_the_text_of_every_subgoal_is_read_as_the_motion_it_stands_for(task):
+    """With a point, at <12, 200>, and without."""
     for index in range(8):
         episode = get_episode(task, "test", index)
         for goal in get_task(task).goals(episode.scene):
@@ -78,12 +79,12 @@ def test_every_subgoal_of_a_task_is_read_as_its_motion(task):
 @pytest.mark.parametrize(
     ("words", "steps"), [("remain static", 16), ("Remain static for 40 steps.", 40)]
 )
-def test_waiting_carries_how_long(words, steps):
+def test_remain_static_is_read_with_its_number_of_steps(words, steps):
     assert read_subgoal(words).steps == steps
 
 
 @pytest.mark.parametrize("words", ["", "la la la", "pick up the red banana", "press", "pick"])
-def test_other_words_are_no_subgoal(words):
+def test_nonsense_and_incomplete_words_are_not_read_as_a_subgoal(words):
     assert read_subgoal(words) is None
 
 
@@ -102,8 +103,8 @@ def test_other_words_are_no_subgoal(words):
         ("ButtonUnmaskSwap", {"press the first button": "2 things fit the words 'button'"}),
     ],
 )  # fmt: skip
-def test_what_fits_nothing_or_several_things_is_refused_for_nothing(task, refused):
-    env, hands = world_of(task)
+def test_a_subgoal_that_fits_no_object_or_several_is_refused_without_moving(task, refused):
+    env, hands = environment_and_hands(task)
     before = env.session.world.elapsed
 
     for words, why in refused.items():
@@ -115,10 +116,11 @@ def test_what_fits_nothing_or_several_things_is_refused_for_nothing(task, refuse
 
 
 @pytest.mark.sim
-def test_a_point_outweighs_words_and_the_record_has_both():
+def test_a_subgoal_with_a_point_means_the_object_at_the_point_despite_its_words():
+    """The words say *red cube*, the point is on another one; then it is held and put down."""
     from roboirg.simulation.expert.things import origin_pixel
 
-    env, hands = world_of("PickXtimes", 2)
+    env, hands = environment_and_hands("PickXtimes", 2)
     cubes = [body for body in env.session.world.bodies.values() if body.item.kind == "cube"]
     red = next(cube for cube in cubes if cube.item.color == "red")
     other = next(cube for cube in cubes if cube.item.color != "red")
@@ -126,7 +128,7 @@ def test_a_point_outweighs_words_and_the_record_has_both():
     # What has missed is done again, also where the same is meant in other words.
     hands.follow(f"pick up the cube at <{row}, {column}>")
     hands._underway.chunks = iter(())
-    end = do(env, hands, f"pick up the red cube at <{row}, {column}>")
+    end = follow_to_the_end(env, hands, f"pick up the red cube at <{row}, {column}>")
     assert (end.how, end.thing) == ("done", other.item.name)
     assert end.thing != red.item.name
     # What is held is *it*; the motion just done is not repeated.
@@ -136,7 +138,7 @@ def test_a_point_outweighs_words_and_the_record_has_both():
     assert env.session.world.elapsed == steps
     hands.follow(f"pick up the cube at <{row}, {column}>")  # it is no longer there
     assert hands.endings[-1].how == "refused"
-    assert do(env, hands, "put it down").thing == other.item.name
+    assert follow_to_the_end(env, hands, "put it down").thing == other.item.name
 
 
 @pytest.mark.sim
@@ -150,7 +152,7 @@ def test_the_oracle_with_scripted_hands_succeeds(task):
 
 
 @pytest.mark.sim
-def test_the_oracle_points_at_what_the_arm_hides():
+def test_the_oracle_planner_succeeds_though_the_arm_hides_the_object_it_points_at():
     """What is put down stands between camera and thing: in 4 of 550 episodes of the test split."""
     planner = make_planner("oracle", {}, "the test")
     info, policy = play_with(planner, "VideoUnmaskSwap", episode=23)
@@ -158,8 +160,8 @@ def test_the_oracle_points_at_what_the_arm_hides():
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("task", slow_but(["StopCube", "VideoUnmask"], SOME))
-def test_the_listener_plans_what_the_words_mean(task):
+@pytest.mark.parametrize("task", slow_but(["StopCube", "VideoUnmask"], SOME_TASKS))
+def test_the_listener_planner_succeeds_from_the_words_alone(task):
     planner = make_planner("listener", {}, "the test")
     assert play_with(planner, task, 1, "reasoning")[0]["status"] == "success"
 
@@ -174,7 +176,7 @@ def test_the_listener_plans_what_the_words_mean(task):
         (Late(10.0), 1, "no answer"),
     ],
 )
-def test_the_record_says_how_a_planner_failed(reply, timeout_s, named):
+def test_a_failed_record_names_the_fault_of_its_planner(reply, timeout_s, named):
     with fake_vlm([reply]) as server:
         model = f"base_url={server.url}/v1&model=stub&timeout_s={timeout_s}&retries=0"
         spec = f"planner:stateless?{model}&observe_every=400"  # few pictures are drawn
@@ -185,7 +187,7 @@ def test_the_record_says_how_a_planner_failed(reply, timeout_s, named):
 
 
 @pytest.mark.parametrize("model", ["", "&model=x"])
-def test_specs_name_planners_and_hands(model):
+def test_planners_with_scripted_hands_can_be_named_on_the_command_line(model):
     with fake_vlm(["x"]) as server:
         at = f"base_url={server.url}/v1"
         for spec in (
@@ -203,7 +205,7 @@ def test_specs_name_planners_and_hands(model):
 
 
 @pytest.mark.sim
-def test_the_stateless_planner_asks_when_a_subgoal_has_ended(monkeypatch):
+def test_the_stateless_planner_asks_with_a_list_of_ended_subgoals(monkeypatch):
     labels = []
     monkeypatch.setattr(
         model_planners, "contact_sheets", lambda frames, said: labels.append(said) or frames[:1]
@@ -244,7 +246,8 @@ def test_the_stateless_planner_asks_when_a_subgoal_has_ended(monkeypatch):
         ("VideoPlaceOrder", "pick_cube+ place_on+ press"),
     ],
 )
-def test_choices_are_robommes_in_every_episode(task, choices):
+def test_the_choices_of_each_task_are_those_of_robomme(task, choices):
+    """A plus marks a motion for which a point has to be chosen."""
     for index in range(20):
         found = choices_of(get_episode(task, "test", index))
         motions = []
@@ -257,7 +260,8 @@ def test_choices_are_robommes_in_every_episode(task, choices):
 
 
 @pytest.mark.sim
-def test_a_program_acts_by_choices():
+def test_an_episode_can_be_solved_with_the_action_space_choice():
+    """An action is a letter of the choice and a pixel."""
     from roboirg.simulation.expert.things import origin_pixel
 
     env = roboirg.make("PickXtimes", episode=2, actions="choice", cameras=())

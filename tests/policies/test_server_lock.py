@@ -17,21 +17,21 @@ from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.server_lock import lock_server
 
 SPAWN = multiprocessing.get_context("spawn")
-ONE = Endpoint("h", 8001)
-TWO = Endpoint("h", 8001, "/two")
+FIRST_SERVER = Endpoint("h", 8001)
+SECOND_SERVER = Endpoint("h", 8001, "/two")
 
 
-def hold(folder, endpoint, ready, seconds):
+def hold_lock(folder, endpoint, ready, seconds):
     with lock_server([endpoint], wait=5, folder=folder).file:
         ready.set()
         time.sleep(seconds)
 
 
 @pytest.fixture
-def holder(tmp_path):
+def process_with_first_server(tmp_path):
     """Another process that has the first server."""
     ready = SPAWN.Event()
-    process = SPAWN.Process(target=hold, args=(tmp_path, ONE, ready, 3_600))
+    process = SPAWN.Process(target=hold_lock, args=(tmp_path, FIRST_SERVER, ready, 3_600))
     process.start()
     assert ready.wait(300)
     yield process
@@ -39,52 +39,56 @@ def holder(tmp_path):
     process.join()
 
 
-def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path, monkeypatch):
-    """Waiting is told, and counted as waiting."""
-    told = []
-    monkeypatch.setattr(waiting, "_listeners", [told.append])
+def test_a_busy_server_is_waited_for_replaced_by_a_free_one_or_inherited(
+    process_with_first_server, tmp_path, monkeypatch
+):
+    """Another process holds the first server; in the end it is killed and leaves it."""
+    reported = []
+    monkeypatch.setattr(waiting, "_listeners", [reported.append])
     before = queued_seconds()
-    lock_server([TWO], wait=5, folder=tmp_path).file.close()
 
-    assert (told, queued_seconds()) == ([], before)
+    # The second server is free: nothing is waited for.
+    lock_server([SECOND_SERVER], wait=5, folder=tmp_path).file.close()
+    assert (reported, queued_seconds()) == ([], before)
 
+    # The first one is busy: waiting is reported and counted, and ends in an error.
     start = time.monotonic()
     with (
         waiting.waiting("its turn in a test"),
         pytest.raises(PolicyTimeoutError, match=r"Other episodes used h:8001 for 0\.2 s"),
     ):
-        lock_server([ONE], wait=0.2, folder=tmp_path)
+        lock_server([FIRST_SERVER], wait=0.2, folder=tmp_path)
     assert 0.2 <= time.monotonic() - start < 300
 
-    (outer, wait, again, end) = told
+    (outer, wait, again, end) = reported
     assert (wait.what, wait.is_queue, again, end) == ("a free server: h:8001", True, outer, None)
     assert queued_seconds() - before >= 0.2
 
     monkeypatch.setattr(os, "getpid", lambda: 1)  # it begins with the second, then the first
-    lock = lock_server([TWO, ONE], wait=0, folder=tmp_path)
-    assert lock.endpoint == TWO
+    lock = lock_server([SECOND_SERVER, FIRST_SERVER], wait=0, folder=tmp_path)
+    assert lock.endpoint == SECOND_SERVER
     with pytest.raises(PolicyTimeoutError, match="used h:8001/two, h:8001 for"):
-        lock_server([TWO, ONE], wait=0, folder=tmp_path, shared=True)
+        lock_server([SECOND_SERVER, FIRST_SERVER], wait=0, folder=tmp_path, shared=True)
 
-    os.kill(holder.pid, signal.SIGKILL)
-    again = lock_server([TWO, ONE], wait=300, folder=tmp_path)
-    assert again.endpoint == ONE
+    os.kill(process_with_first_server.pid, signal.SIGKILL)
+    again = lock_server([SECOND_SERVER, FIRST_SERVER], wait=300, folder=tmp_path)
+    assert again.endpoint == FIRST_SERVER
 
     lock.file.close()
     again.file.close()
 
 
-def test_those_who_share_do_not_exclude_each_other(tmp_path):
-    locks = [lock_server([ONE], wait=0, folder=tmp_path, shared=True) for _ in range(3)]
+def test_a_shared_lock_of_a_server_allows_more_shared_ones_and_no_other(tmp_path):
+    locks = [lock_server([FIRST_SERVER], wait=0, folder=tmp_path, shared=True) for _ in range(3)]
     with pytest.raises(PolicyConnectionError):
-        lock_server([ONE], wait=0, folder=tmp_path)
+        lock_server([FIRST_SERVER], wait=0, folder=tmp_path)
 
     for lock in locks:
         lock.file.close()
-    lock_server([ONE], wait=0, folder=tmp_path).file.close()
+    lock_server([FIRST_SERVER], wait=0, folder=tmp_path).file.close()
 
 
-def test_names_of_this_computer_are_one_server(tmp_path):
+def test_localhost_and_127_0_0_1_are_locked_as_the_same_server(tmp_path):
     lock = lock_server([Endpoint("localhost", 1)], wait=0, folder=tmp_path)
     with pytest.raises(PolicyConnectionError):
         lock_server([Endpoint("127.0.0.1", 1)], wait=0, folder=tmp_path)
@@ -93,7 +97,7 @@ def test_names_of_this_computer_are_one_server(tmp_path):
     lock.file.close()
 
 
-def test_a_thread_does_not_wait_for_itself():
+def test_a_second_policy_of_the_same_thread_is_refused_instead_of_waiting_for_ever():
     with MmeVlaServer() as server:
         first, second = (make_policy(f"mme-vla://{server.place}", 0) for _ in range(2))
         first.reset(INSTRUCTION, video(0))
@@ -119,7 +123,7 @@ def play(url, length):
         policy.close()
 
 
-def test_processes_and_policies_do_not_mix_state():
+def test_two_processes_that_share_a_stateful_server_get_correct_replies():
     with MmeVlaServer(delay=0.002) as server:
         url = f"mme-vla://{server.place}?part=2"
         players = [SPAWN.Process(target=play, args=(url, length)) for length in (3, 8)]

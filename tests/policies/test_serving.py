@@ -80,7 +80,7 @@ def check_same(given, kept, fields):
         assert np.array_equal(given[field], kept[field]), field
 
 
-SEEN = {
+FIELDS_SENT = {
     "openpi": ("front_rgb", "wrist_rgb", "joint_positions"),
     "mme-vla": ("front_rgb", "wrist_rgb", "joint_positions"),
     "challenge": ("front_rgb", "wrist_rgb", "joint_positions", "gripper", "end_effector"),
@@ -96,8 +96,8 @@ def play(url, length, *moments, **more):
     return chunks, client.metadata
 
 
-FIRST = moment(3, history=())
-LATER = moment(5, history=(moment(4), moment(5)))
+FIRST_MOMENT = moment(3, history=())
+LATER_MOMENT = moment(5, history=(moment(4), moment(5)))
 
 
 def served_episodes(protocol):
@@ -108,7 +108,7 @@ def served_episodes(protocol):
     }  # fmt: skip
     with served(HERE, protocol, seed=7) as url:
         for length in (3, 2):
-            chunks, metadata = play(url, length, FIRST, LATER)
+            chunks, metadata = play(url, length, FIRST_MOMENT, LATER_MOMENT)
             assert chunks == [[[1] * 8] * 4, [[2] * 8] * 4]
             assert expected.items() <= metadata.items()
     _opened, *episodes = Recorder.episodes
@@ -116,29 +116,30 @@ def served_episodes(protocol):
 
 
 @pytest.mark.parametrize("protocol", SERVED)
-def test_a_served_policy_gets_what_the_client_was_given(protocol):
+def test_a_served_policy_sees_what_its_client_was_shown(protocol):
     first, second = served_episodes(protocol)
 
     for policy in (first, second):
         assert (policy.seed, policy.closed) == (7, True)
         assert policy.instruction == (INSTRUCTION.lower() if protocol == "mme-vla" else INSTRUCTION)
-        for given, observation in zip((FIRST, LATER), policy.calls, strict=True):
-            check_same(given, observation, SEEN[protocol])
+        for given, observation in zip((FIRST_MOMENT, LATER_MOMENT), policy.calls, strict=True):
+            check_same(given, observation, FIELDS_SENT[protocol])
             assert observation["gripper"].shape == (2,)
             assert observation["gripper"][0] == given["gripper"][0]
 
 
 @pytest.mark.parametrize("protocol", [name for name in SERVED if name != "openpi"])
-def test_a_served_policy_gets_the_video_and_what_was_seen_in_between(protocol):
+def test_a_served_policy_sees_the_video_and_the_moments_between_two_questions(protocol):
+    """Depending on the protocol: some carry neither video nor history."""
     first, second = served_episodes(protocol)
-    shown = set(SEEN[protocol])
+    shown = set(FIELDS_SENT[protocol])
     if protocol == "mme-vla":
         shown.remove("wrist_rgb")
 
     check_same(video(3), first.demonstration, shown)
     assert len(second.demonstration["joint_positions"]) == 2
     assert first.calls[0]["history"][:-1] == ()
-    for given, kept in zip(LATER["history"], first.calls[1]["history"], strict=True):
+    for given, kept in zip(LATER_MOMENT["history"], first.calls[1]["history"], strict=True):
         check_same(given, kept, shown)
 
 
@@ -148,7 +149,7 @@ def test_a_policy_that_is_served_by_openpi_gets_no_video():
 
 
 @pytest.mark.parametrize("protocol", SERVED)
-def test_a_served_policy_hears_what_the_prompt_says_next(protocol):
+def test_a_served_policy_hears_each_new_sentence_of_a_growing_prompt(protocol):
     said = ["this one is red.", "please note.", "please note.", "take it."]
     chunks = [(), (moment(1), moment(2)), (moment(3),), (moment(4), moment(5))]
     moments = [
@@ -169,7 +170,7 @@ def test_a_served_policy_hears_what_the_prompt_says_next(protocol):
         assert policy.heard == [("please note.", 2), ("take it.", 5)]
 
 
-def test_a_served_policy_gets_depth_and_matrices_if_the_client_sends_them():
+def test_a_served_policy_sees_depth_and_calibration_if_the_client_sends_them():
     moments = [moment(number, sensors=True) for number in range(6)]
     first = {**moments[3], "history": ()}
     later = {**moments[5], "history": (moments[4], moments[5])}
@@ -186,7 +187,7 @@ def test_a_served_policy_gets_depth_and_matrices_if_the_client_sends_them():
     assert policy.calls[1]["front_depth"].dtype == np.int16
 
 
-def test_a_list_of_another_length_is_refused():
+def test_a_request_whose_lists_differ_in_length_is_refused():
     names = ("front_rgb", "wrist_rgb", "joint_state", "eef_state", "gripper_state")
     request = {f"{name}_list": [np.zeros(3)] * 2 for name in names}
     request |= {"task_goal": ["go"], "is_first_step": True, "front_depth_list": [np.zeros(3)]}
@@ -196,13 +197,14 @@ def test_a_list_of_another_length_is_refused():
         assert "front_depth_list must be lists of the same length" in raw.recv()
 
 
-def ask(raw, message):
+def reply_to(raw, message):
     raw.send(pack(message))
     return unpack(raw.recv())
 
 
 @pytest.mark.parametrize("kind", ["grounded", "simple"])
-def test_mme_vla_has_one_memory_for_all_connections(kind):
+def test_connections_to_an_mme_vla_server_share_one_policy(kind):
+    """The video is sent over one connection, the question over another."""
     frames = np.stack([moment(number)["front_rgb"][None] for number in range(3)])
     states = np.zeros((3, 8), np.float32)
     shown = {"add_buffer": True, "images": frames, "state": states, "exec_start_idx": 2}
@@ -220,13 +222,13 @@ def test_mme_vla_has_one_memory_for_all_connections(kind):
             second.recv()
             assert len(Recorder.episodes) == 1  # idle connections make no policy
 
-            reply = ask(first, {"reset": True})
+            reply = reply_to(first, {"reset": True})
             assert reply["reset_finished"] is True
             assert isinstance(reply["reset_time_ms"], float)
-            reply = ask(first, shown)
+            reply = reply_to(first, shown)
             assert reply["add_buffer_finished"] is True
             assert isinstance(reply["add_buffer_time_ms"], float)
-            reply = ask(second, request)
+            reply = reply_to(second, request)
             assert reply["actions"].shape == (4, 8)
             assert set(reply) == {"actions", "infer_time_ms"}
 
@@ -244,7 +246,7 @@ def test_mme_vla_has_one_memory_for_all_connections(kind):
         ("hello", "Messages must be binary"),
     ],
 )
-def test_errors_are_a_traceback_and_close_1011(message, words):
+def test_a_malformed_request_is_answered_by_a_traceback_and_close_code_1011(message, words):
     with served(HERE, "mme-vla") as url:
         with connect(url.replace("mme-vla", "ws")) as raw:
             raw.recv()
@@ -259,7 +261,7 @@ def test_errors_are_a_traceback_and_close_1011(message, words):
 
 
 @pytest.mark.parametrize("protocol", SERVED)
-def test_what_a_policy_raises_is_the_clients_error(protocol):
+def test_an_exception_in_a_served_policy_reaches_the_client_with_its_message(protocol):
     with served(HERE, protocol) as url:
         client = make_policy(url, 0)
         client.reset("fail", video(1))
@@ -316,13 +318,14 @@ def test_a_server_reports_its_health_and_refuses_other_keys(protocol, monkeypatc
         ),
     ],
 )
-def test_what_cannot_be_served_is_told(options, error, words):
+def test_a_policy_that_a_protocol_cannot_serve_is_refused_with_the_reason(options, error, words):
     place = ServerOptions(port=options.get("port", 0))
     with pytest.raises(error, match=words):
         open_server(options.get("spec", "random"), options.get("protocol", "openpi"), place)
 
 
-def test_the_command_serves_until_it_is_stopped():
+def test_the_command_serve_runs_until_a_signal_ends_it():
+    """143 is 128 + 15, the number of SIGTERM."""
     with serving("mme-vla") as server:
         assert server.url.startswith("mme-vla://127.0.0.1:")
 

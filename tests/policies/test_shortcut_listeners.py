@@ -14,7 +14,7 @@ from roboirg.tasks.splits.splits import get_episode
 SPATIAL = "Have a look at the cube at the far left. Take it and place it on the target once."
 
 
-def test_every_rule_is_a_policy_of_its_name():
+def test_every_rule_that_guesses_from_words_is_also_a_policy():
     assert set(SURFACE_RULES) <= set(BUILTIN)
     for rule in SURFACE_RULES:
         policy = make_policy(rule, 3)
@@ -24,7 +24,8 @@ def test_every_rule_is_a_policy_of_its_name():
         assert find_policy(rule).version == "built-in"
 
 
-def test_what_the_words_leave_open_is_drawn_by_seed():
+def test_a_value_that_the_words_leave_open_is_drawn_by_the_policy_s_seed():
+    """The sentence leaves the color open and says once; 60 seeds draw all three colors."""
     env = SimpleNamespace(episode=get_episode("PickXtimes", "test", 2))  # has all three colors
     goals = [make_policy("surface", seed).decide(env, SPATIAL) for seed in range(60)]
 
@@ -39,7 +40,7 @@ def status(rule, setting):
 
 
 @pytest.mark.sim
-def test_first_mention_solves_direct_and_fails_in_reasoning():
+def test_the_policy_that_takes_the_first_value_named_fails_where_reasoning_is_needed():
     """The green cube, once: in reasoning the words name another number."""
     assert status("first-mention", "direct") == "success"
     assert status("first-mention", "reasoning") == "failure"

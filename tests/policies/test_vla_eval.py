@@ -30,6 +30,7 @@ def described(array):
 
 
 def test_an_episode_is_what_the_harness_would_send(snapshot):
+    """All messages of an episode, compared with stored ones."""
     with VlaEvalServer() as server:
         with client_of(server, "vla-eval") as client:
             client.reset(INSTRUCTION, video(3))
@@ -43,7 +44,7 @@ def test_an_episode_is_what_the_harness_would_send(snapshot):
     assert re.sub(r"roboirg [\d.]+", "roboirg", sent) == snapshot
 
 
-def test_a_task_without_a_video_has_no_history_and_subgoals_are_passed_on():
+def test_observations_without_a_video_have_no_history_and_carry_the_subgoal():
     with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
         client.follow("pick it up at <1, 2>")
@@ -74,7 +75,7 @@ def test_a_task_without_a_video_has_no_history_and_subgoals_are_passed_on():
         ),
     ],
 )
-def test_what_is_shown_is_what_the_server_or_the_url_wishes(query, wishes):
+def test_options_of_the_server_or_the_url_leave_out_camera_state_and_video(query, wishes):
     with VlaEvalServer() as server:
         server.hello = {**server.hello, "observation_params": wishes}
         with client_of(server, "vla-eval", query) as client:
@@ -88,7 +89,7 @@ def test_what_is_shown_is_what_the_server_or_the_url_wishes(query, wishes):
     assert list(shown["images"]) == ["agentview"]
 
 
-def test_another_action_space_or_protocol_is_refused():
+def test_a_server_with_another_action_space_or_protocol_version_is_refused():
     with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
         server.hello = {**server.hello, "observation_params": {"action_space": "ee_pose"}}
         with pytest.raises(InvalidValueError, match="'ee_pose', but the policy's URL says actions"):
@@ -116,7 +117,7 @@ def test_another_action_space_or_protocol_is_refused():
         ({"other": 1}, "without 'actions'; it holds 'other'"),
     ],
 )
-def test_a_malformed_reply_ends_the_episode_only(fault, words):
+def test_a_malformed_reply_of_a_vla_eval_server_ends_only_its_episode(fault, words):
     with VlaEvalServer(faults=[fault]) as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
         with pytest.raises(PolicyReplyError, match=words):
@@ -128,13 +129,13 @@ def test_a_malformed_reply_ends_the_episode_only(fault, words):
 
 @pytest.mark.parametrize("name", ["actions", "action"])
 @pytest.mark.parametrize("action", [[0.5] * 8, np.full((1, 8), 0.5), np.full(8, 0.5, np.float16)])
-def test_an_action_has_either_name_and_any_form(name, action):
+def test_actions_are_read_under_both_names_and_in_any_shape(name, action):
     with VlaEvalServer(faults=[{name: action}]) as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
         assert client.act(moment(0)).tolist() == [[0.5] * 8]
 
 
-def test_errors_of_the_server_are_named_also_when_an_episode_cannot_begin():
+def test_an_error_of_the_server_is_reported_with_its_words():
     class Failing(VlaEvalServer):
         def answer(self, message):
             raise RuntimeError("observation_failed: the weights melted \x1b[2J")

@@ -5,7 +5,7 @@ import pytest
 from roboirg.reader import interpret
 from roboirg.tasks.splits import get_episode
 
-READ = [
+COMMANDS_WITH_VALUES = [
     ("PickXtimes", "GRAB   THE RED CUBE , put it on the target TWICE and press the button",
      ("red", 2)),
     ("PickXtimes", "Blue cube -> target, 3x, then button.", ("blue", 3)),
@@ -73,8 +73,9 @@ READ = [
 """Task, command, and the values of the goal."""
 
 
-@pytest.mark.parametrize(("task", "text", "values"), READ)
-def test_a_command_is_read_as_it_is_meant(task, text, values):
+@pytest.mark.parametrize(("task", "text", "values"), COMMANDS_WITH_VALUES)
+def test_a_typed_command_is_read_as_the_goal_that_a_person_means(task, text, values):
+    """`values` are those of the goal, for example the color and how often."""
     found = interpret(text, get_episode(task, "test", 2).scene, task)
     assert [tuple(dict(goal.slots).values()) for goal in found.goals] == [values]
     assert found.not_understood == ()
@@ -122,13 +123,14 @@ def test_a_command_is_read_as_it_is_meant(task, text, values):
         ("PutInBox", "Put the tape in the red box.", "nothing red"),
     ],
 )  # fmt: skip
-def test_what_is_not_read_is_refused_with_a_reason(task, text, complaint):
+def test_an_unclear_command_is_refused_with_the_reason(task, text, complaint):
+    """`complaint` is a part of what the interpreter reports as not understood."""
     found = interpret(text, get_episode(task, "test", 2).scene, task)
     assert len(found.goals) != 1
     assert complaint in " / ".join(found.not_understood)
 
 
-def test_a_step_with_unknown_words_before_it_is_no_remark():
+def test_a_command_is_refused_if_the_first_of_its_two_steps_is_not_understood():
     """Left out, the last step alone would be another goal."""
     episode = get_episode("VideoUnmaskSwap", "random", 979917)
     text = (

@@ -20,10 +20,11 @@ from roboirg.tasks import every_task, get_task
 from roboirg.tasks.splits import get_episode
 
 EPISODES = {task: get_episode(task, "train", 3) for task in every_task()}
-PICK = get_episode("PickXtimes", "test", 2).scene
+PICK_SCENE = get_episode("PickXtimes", "test", 2).scene
 
 
-def test_it_reads_none_of_the_tasks_words():
+def test_the_interpreter_uses_neither_our_words_nor_their_declared_meaning():
+    """It is evidence about our words only if it is independent of them."""
     trees = [ast.parse(path.read_text()) for path in Path(reader.__file__).parent.glob("*.py")]
     nodes = itertools.chain.from_iterable(map(ast.walk, trees))
     attributes = {node.attr for node in nodes if isinstance(node, ast.Attribute)}
@@ -49,6 +50,7 @@ WORDS = (
     ),
 )
 def test_any_text_gives_one_goal_or_a_complaint(task, text):
+    """Random text and random words of commands: no error, and no goal that the scene lacks."""
     scene = EPISODES[task].scene
     found = interpret(text, scene, task)
 
@@ -56,12 +58,13 @@ def test_any_text_gives_one_goal_or_a_complaint(task, text):
     assert bool(found.not_understood) == (len(found.goals) != 1)
 
 
-def test_endless_places_are_given_up():
+def test_a_place_nested_300_times_is_given_up_without_a_goal():
     text = "Take the cube " + "closest to the cube " * 300 + "at the far left."
-    assert interpret(text, PICK, "PickXtimes").goals == ()
+    assert interpret(text, PICK_SCENE, "PickXtimes").goals == ()
 
 
-def test_over_it_leaves_a_thing_the_one_in_the_video():
+def test_the_same_container_over_it_still_means_the_one_shown_in_the_video():
+    """*Over it* adds a place; it must not erase that *the same* refers to the video."""
     chunks = Chunks("lift the same container over it")
     read_things(chunks)
     _, container = chunks.tokens()
@@ -69,7 +72,7 @@ def test_over_it_leaves_a_thing_the_one_in_the_video():
 
 
 @pytest.mark.parametrize("text", ["", "  ", "...", "\n", "?!", "I like the red cube."])
-def test_no_command_licenses_no_goal(text):
+def test_text_without_a_command_gives_no_goal(text):
     for task, episode in EPISODES.items():
         found = interpret(text, episode.scene, task)
         assert not found.goals
@@ -87,7 +90,7 @@ def test_no_command_licenses_no_goal(text):
     ],
 )
 def test_unknown_words_are_named(text, words):
-    found = interpret(text, PICK, "PickXtimes")
+    found = interpret(text, PICK_SCENE, "PickXtimes")
     assert not found.goals
     assert found.unknown_words == tuple(words)
     for word in words:
@@ -98,7 +101,7 @@ def is_unknown(word):
     return split_sentences(word) == ((word,),) and not is_known(word)
 
 
-MORE = st.one_of(
+HARMLESS_AND_UNKNOWN_WORDS = st.one_of(
     st.sampled_from(sorted(FILLERS)),
     st.sampled_from(["sphere", "stack", "orange", "lamp", "thirtieth", "würfel", "11th"]),
     st.text("abcdefghijklmnopqrstuvwxyzäß", min_size=2, max_size=9).filter(is_unknown),
@@ -106,8 +109,9 @@ MORE = st.one_of(
 
 
 @settings(max_examples=60)
-@given(st.sampled_from(tuple(EPISODES)), MORE, st.data())
-def test_a_word_more_is_harmless_or_named(task, word, data):
+@given(st.sampled_from(tuple(EPISODES)), HARMLESS_AND_UNKNOWN_WORDS, st.data())
+def test_an_added_word_is_a_known_filler_or_is_reported_as_unknown(task, word, data):
+    """A filler is a word such as *please*, which changes nothing."""
     episode = EPISODES[task]
     words = instruct(episode).text.removesuffix(".").split()
     words.insert(data.draw(st.integers(0, len(words))), word)
@@ -121,12 +125,13 @@ def test_a_word_more_is_harmless_or_named(task, word, data):
         assert word in found.unknown_words
 
 
-INSERTED = ["not", "no", "except", "nine", "other", "fifth", "but", "or", "purple"]
+CHANGING_WORDS = ["not", "no", "except", "nine", "other", "fifth", "but", "or", "purple"]
 
 
 @settings(max_examples=60)
-@given(st.sampled_from(tuple(EPISODES)), st.sampled_from(INSERTED), st.data())
-def test_a_word_that_would_change_the_goal_is_never_read_in_silence(task, word, data):
+@given(st.sampled_from(tuple(EPISODES)), st.sampled_from(CHANGING_WORDS), st.data())
+def test_a_word_such_as_not_or_except_never_changes_the_goal_unnoticed(task, word, data):
+    """The word is inserted anywhere into a command: the goal stays, or there is a complaint."""
     episode = EPISODES[task]
     words = instruct(episode).text.removesuffix(".").split()
     words.insert(data.draw(st.integers(1, len(words))), word)
@@ -136,18 +141,18 @@ def test_a_word_that_would_change_the_goal_is_never_read_in_silence(task, word, 
     assert found.goals in ((), (episode.goal,)) or found.not_understood
 
 
-PAGE = Path(__file__).parents[2] / "docs" / "interpreter.md"
-ROWS = re.findall(r"^\| \*(.+?)\*.*? \| `(.+?)`", PAGE.read_text(), flags=re.MULTILINE)
+DOCUMENTATION = Path(__file__).parents[2] / "docs" / "interpreter.md"
+ROWS = re.findall(r"^\| \*(.+?)\*.*? \| `(.+?)`", DOCUMENTATION.read_text(), flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize(("text", "complaint"), ROWS)
-def test_the_page_quotes_true_complaints(text, complaint):
-    assert complaint in interpret(text, PICK, "PickXtimes").not_understood
+def test_the_complaints_quoted_by_the_documentation_are_real(text, complaint):
+    assert complaint in interpret(text, PICK_SCENE, "PickXtimes").not_understood
 
 
-def test_the_page_teaches_a_new_verb():
+def test_the_verb_that_the_documentation_teaches_is_unknown_before():
     assert len(ROWS) >= 8
 
-    page = PAGE.with_name("teach-words.md").read_text()
+    page = DOCUMENTATION.with_name("teach-words.md").read_text()
     taught = re.search(r'"(Hoist .*)", \("red", 2\)', page)
-    assert interpret(taught[1], PICK, "PickXtimes").unknown_words == ("hoist",)
+    assert interpret(taught[1], PICK_SCENE, "PickXtimes").unknown_words == ("hoist",)

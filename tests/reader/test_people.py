@@ -13,7 +13,7 @@ UNDERSTOOD = {"sentences": 186, "held_out": 56}
 """Sentences that are understood at least."""
 
 
-def sections(name):
+def commands_of_people(name):
     """Yield task, episode, expected goal (``?``: to be refused) and sentence."""
     task = index = ""
     for line in (PEOPLE / f"{name}.txt").read_text().splitlines():
@@ -23,7 +23,7 @@ def sections(name):
             yield task, int(index), *line.split(" | ", 1)
 
 
-def said(goal):
+def goal_in_the_file_s_notation(goal):
     """Return a goal in the notation of the files."""
     slots = goal.as_mapping()
     if "counts" in slots:
@@ -34,12 +34,13 @@ def said(goal):
 
 
 @pytest.mark.parametrize("name", UNDERSTOOD)
-def test_no_sentence_of_people_is_misread_and_most_are_understood(name):
+def test_no_command_written_by_people_is_misread_and_most_are_understood(name):
+    """400 sentences, each with the goal that was meant, or `?` where nothing clear was."""
     verdicts = Counter()
-    for task, index, goal, text in sections(name):
+    for task, index, goal, text in commands_of_people(name):
         found = interpret(text, get_episode(task, "test", index).scene, task)
         if len(found.goals) == 1 and not found.not_understood:
-            assert said(found.goals[0]) == goal, text
+            assert goal_in_the_file_s_notation(found.goals[0]) == goal, text
             verdicts["understood"] += 1
         else:
             assert found.not_understood, text

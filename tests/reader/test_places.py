@@ -11,7 +11,7 @@ from roboirg.tasks import every_task, get_task
 from roboirg.tasks.splits import get_episode
 
 
-def found_at(scene, noun, words):
+def things_meant_by(scene, noun, words):
     """Return the names of the things that words can mean."""
     (sentence,) = split_sentences(f"Take the {noun} {words}.")
     (act,) = read_command(sentence).acts
@@ -40,31 +40,34 @@ def containers(places):
         ("nearest to the container farthest to your left", [(0.1, 0.0), (-0.1, 0.0), (0.0, 0.1)]),
     ],
 )
-def test_what_ties_may_be_meant(words, places):
-    assert found_at(containers(places), "container", words) == ["container_0", "container_1"]
+def test_of_two_things_at_nearly_the_same_place_both_may_be_meant(words, places):
+    """`places` are points (x, y) of three containers; the robot's left is positive y."""
+    assert things_meant_by(containers(places), "container", words) == ["container_0", "container_1"]
 
 
-def test_a_member_of_an_unclear_group_is_unclear():
+def test_a_place_within_a_group_is_unclear_if_the_group_is():
+    """First, any two of the three could be *the two closest to you*; then it is clear which."""
     places = [(0.0, 0.1), (0.005, 0.15), (-0.1, 0.0)]
     words = "farthest to your left among the two closest to you"
-    assert found_at(containers(places), "container", words) == [
+    assert things_meant_by(containers(places), "container", words) == [
         "container_0",
         "container_1",
     ]
 
     places[1] = (-0.05, 0.15)
-    assert found_at(containers(places), "container", words) == ["container_1"]
+    assert things_meant_by(containers(places), "container", words) == ["container_1"]
 
 
 def test_left_and_right_of_the_picture_are_mirrored():
+    """The camera looks at the robot from the front."""
     scene = containers([(0.0, 0.2), (0.0, -0.2)])
-    assert found_at(scene, "container", "on the left") == ["container_0"]
-    assert found_at(scene, "container", "on the left of the picture") == ["container_1"]
-    assert found_at(scene, "container", "on the camera's right") == ["container_0"]
+    assert things_meant_by(scene, "container", "on the left") == ["container_0"]
+    assert things_meant_by(scene, "container", "on the left of the picture") == ["container_1"]
+    assert things_meant_by(scene, "container", "on the camera's right") == ["container_0"]
 
 
 @pytest.mark.parametrize("task", [name for name, task in every_task().items() if task.spatial])
-def test_every_landmark_can_mean_what_it_selects(task):
+def test_the_interpreter_finds_the_object_of_each_of_our_phrases_for_a_place(task):
     kind = get_task(task).things.pointed
     for index in (3, 14):
         scene = get_episode(task, "test", index).scene
@@ -73,5 +76,5 @@ def test_every_landmark_can_mean_what_it_selects(task):
                 selected = selector.select()
                 words = selector.landmark.phrase
                 if selected is not None:
-                    names = found_at(scene, kind.removeprefix("hidden_"), words)
+                    names = things_meant_by(scene, kind.removeprefix("hidden_"), words)
                     assert selected.name in names, words

@@ -11,7 +11,8 @@ EPISODE = get_episode("PickXtimes", "test", 3)
 TEXT = "Hoist the {} cube and put it on the target twice, then press the button."
 
 
-def test_a_taught_word_is_read_as_the_known_one():
+def test_a_registered_word_is_read_like_the_known_word_it_stands_for():
+    """*Hoist* is registered as *lift*, and *vermilion* as the goal's color."""
     color = EPISODE.goal.text("color")
     text = TEXT.format("vermilion")
     before = interpret(text, EPISODE.scene, "PickXtimes")
@@ -33,6 +34,6 @@ def test_a_taught_word_is_read_as_the_known_one():
         ("hoist", "elevate", "'hoist' is to be read as 'elevate', a word that"),
     ],
 )
-def test_known_words_keep_their_meaning(word, meaning, sentence):
+def test_registering_a_known_word_or_an_unknown_meaning_is_refused(word, meaning, sentence):
     with pytest.raises(InvalidValueError, match=sentence):
         register_words({word: meaning})

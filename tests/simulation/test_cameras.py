@@ -26,7 +26,8 @@ def cameras(world) -> Cameras:
     return world.cameras
 
 
-def test_the_front_camera_stands_where_robomme_s_does(cameras):
+def test_the_cameras_have_robomme_s_positions_and_focal_length(cameras):
+    """The matrix takes the world to the front camera: columns x, y, z and the offset in meters."""
     expected = [[0, 1, 0, 0], [0.89443, 0, -0.44721, -0.08944], [-0.44721, 0, -0.89443, 0.49194]]
     assert cameras.extrinsic("front") == pytest.approx(np.array(expected), abs=1e-5)
     for camera in CAMERAS:
@@ -34,7 +35,7 @@ def test_the_front_camera_stands_where_robomme_s_does(cameras):
         assert cameras.intrinsic(camera) == pytest.approx(np.array(matrix), abs=1e-4)
 
 
-def test_depth_of_the_bare_table_is_as_computed_by_hand(cameras):
+def test_depth_of_the_bare_table_agrees_with_geometry(cameras):
     # A pixel's ray meets z = 0 at a depth of height / slope. Camera axes in the world: down is
     # (0.894, 0, -0.447), forward (-0.447, 0, -0.894), and the eye is 0.4 above the table.
     depth = cameras.depth("front")
@@ -45,7 +46,8 @@ def test_depth_of_the_bare_table_is_as_computed_by_hand(cameras):
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_objects_are_seen_where_their_origins_are_projected(world, cameras, camera):
+def test_the_pixels_of_each_object_lie_where_its_position_projects(world, cameras, camera):
+    """Within two pixels; depth is in millimeters."""
     pixels = cameras.segmentation(camera)
     assert (pixels.shape, pixels.dtype) == (cameras.picture(camera).shape[:2], np.int16)
     for body in world.bodies.values():
@@ -59,7 +61,8 @@ def test_objects_are_seen_where_their_origins_are_projected(world, cameras, came
         assert depth.mean() / 1000 == pytest.approx(distance, abs=0.03)
 
 
-def test_one_drawing_gives_everything(world, cameras, takes):
+def test_picture_depth_and_segmentation_of_a_moment_take_one_drawing(world, cameras, takes):
+    """`takes` counts drawings. The cube moves by 3 cm, so all three have to be drawn anew once."""
     cube = world.bodies["cube_red"]
     for offset in (0.0, 0.03):
         place = cube.item.position
@@ -80,7 +83,7 @@ def test_one_drawing_gives_everything(world, cameras, takes):
     cube.put(cube.item.position)
 
 
-def test_pictures_do_not_depend_on_other_worlds_in_the_process():
+def test_pictures_of_a_world_do_not_change_when_another_world_is_drawn():
     episode = get_episode("PickXtimes", "test", 3)
     first = World(episode.scene)
     first.step(HOME_ACTION)

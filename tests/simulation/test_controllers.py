@@ -13,14 +13,15 @@ DOWN = (np.pi, 0.0, 0.0)
 OUT_OF_REACH = (1.5, 0.0, 0.3, *DOWN, 1.0)
 
 
-def make(actions, **options):
+def environment_with_actions(actions, **options):
     env = roboirg.make("PickXtimes", episode=2, cameras=(), actions=actions, **options)
     env.reset()
     return env
 
 
-def test_a_pose_is_one_control_step_towards_it():
-    env = make("ee_pose")
+def test_a_pose_action_is_one_control_step_toward_the_pose():
+    """A pose is x, y, z in meters, roll, pitch, yaw in radians, and the gripper (-1 closes)."""
+    env = environment_with_actions("ee_pose")
     assert env.action_space.shape == (7,)
 
     goal = np.array([-0.1, 0.1, 0.25, np.pi - 0.2, 0.1, 0.4])
@@ -35,9 +36,9 @@ def test_a_pose_is_one_control_step_towards_it():
     assert observation["gripper"].max() < 0.002
 
 
-def test_joint_angles_and_the_pose_that_they_have_lead_to_the_same():
-    joints = make("joint_angle")
-    poses = make("ee_pose")
+def test_pose_actions_reach_the_place_that_joint_angles_reached():
+    joints = environment_with_actions("joint_angle")
+    poses = environment_with_actions("ee_pose")
     target = HOME_ACTION + np.array([0.1, 0.1, -0.1, -0.1, 0.1, 0.1, 0.1, 0.0])
     for _ in range(30):
         wanted, *_ = joints.step(target)
@@ -48,8 +49,9 @@ def test_joint_angles_and_the_pose_that_they_have_lead_to_the_same():
     assert got["end_effector"] == pytest.approx(wanted["end_effector"], abs=2e-3)
 
 
-def test_waypoints_alone_do_a_whole_task():
-    env = make("waypoint")
+def test_a_pick_and_place_task_is_solved_with_waypoint_actions():
+    """A waypoint is a pose to which the arm moves straight, in as many steps as it takes."""
+    env = environment_with_actions("waypoint")
     bodies = env.session.world.bodies
     slots = env.episode.goal.as_mapping()
     name = f"cube_{slots['color']}"
@@ -73,8 +75,9 @@ def test_waypoints_alone_do_a_whole_task():
     assert (info["status"], terminated, truncated) == ("success", True, False)
 
 
-def test_the_gripper_takes_six_steps_and_only_for_exact_commands():
-    env = make("waypoint")
+def test_the_gripper_moves_only_for_exactly_minus_or_plus_one():
+    """Closing takes about six control steps."""
+    env = environment_with_actions("waypoint")
     here = env.session.world.robot.tool_pose.p
     observation, *_, info = env.step([*here, *DOWN, 0.5])
     moved = info["steps"]
@@ -83,13 +86,13 @@ def test_the_gripper_takes_six_steps_and_only_for_exact_commands():
     assert observation["gripper"].min() > 0.039
 
     observation, *_, info = env.step([*here, *DOWN, -1.0])
-    assert info["steps"] - 2 * moved in range(4, 9)
+    assert info["steps"] - 2 * moved in range(4, 9)  # the move to where it is, twice
     assert observation["gripper"].max() < 0.005
 
 
 @pytest.mark.parametrize("actions", ["ee_pose", "waypoint"])
-def test_a_pose_out_of_reach_fails_the_episode_in_words(actions):
-    env = make(actions)
+def test_an_unreachable_pose_fails_the_episode_with_the_pose_in_its_cause(actions):
+    env = environment_with_actions(actions)
     _, reward, terminated, truncated, info = env.step(OUT_OF_REACH)
     assert (reward, terminated, truncated) == (0.0, True, False)
     assert (info["status"], info["steps"]) == ("failure", 0)
@@ -99,8 +102,8 @@ def test_a_pose_out_of_reach_fails_the_episode_in_words(actions):
     assert info["cause"] == words
 
 
-def test_time_is_up_in_the_middle_of_a_move():
-    env = make("waypoint", max_steps=10)
+def test_an_episode_times_out_in_the_middle_of_a_waypoint_move():
+    env = environment_with_actions("waypoint", max_steps=10)
     *_, terminated, truncated, info = env.step([-0.1, 0.1, 0.1, *DOWN, -1.0])
 
     assert (terminated, truncated) == (False, True)

@@ -29,11 +29,11 @@ from roboirg.tasks.splits.splits import get_episode
 pytestmark = [pytest.mark.sim, pytest.mark.usefixtures("without_cache")]
 
 VIDEO_TASKS = tuple(task for task in all_tasks() if get_episode(task, "test", 0).demonstration)
-SHORT = "VideoUnmask"
+SHORT_VIDEO_TASK = "VideoUnmask"
 
 
 @pytest.fixture(scope="module", autouse=True)
-def meshes():
+def meshes_read_once():
     """Reads the meshes once, from the cache of the session."""
     for kind in ("faithful", "light"):
         reset(cameras=("front",), meshes=kind)
@@ -46,7 +46,7 @@ def cache(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def unplanned(monkeypatch):
+def forbid_planning(monkeypatch):
     """Makes planning fail once called."""
 
     def forbid():
@@ -56,7 +56,7 @@ def unplanned(monkeypatch):
 
 
 @pytest.fixture
-def drawn(monkeypatch):
+def cameras_drawn(monkeypatch):
     """Cameras whose pictures have been drawn, in order."""
     names = []
     picture = Cameras.picture
@@ -69,21 +69,22 @@ def drawn(monkeypatch):
     return names
 
 
-def reset(task=SHORT, **options):
+def reset(task=SHORT_VIDEO_TASK, **options):
     env = roboirg.make(task, **{"episode": 1, "cameras": (), **options})
     observation, info = env.reset()
     return env, observation, info
 
 
-def same(first, second):
+def check_same_arrays(first, second):
     assert list(first) == list(second)
     for key, value in first.items():
         assert value.dtype == second[key].dtype
         assert np.array_equal(value, second[key]), key
 
 
-@pytest.mark.parametrize("task", slow_but((SHORT, "VideoRepick"), VIDEO_TASKS))
-def test_a_replay_is_the_demonstration_to_the_last_bit(task):
+@pytest.mark.parametrize("task", slow_but((SHORT_VIDEO_TASK, "VideoRepick"), VIDEO_TASKS))
+def test_replaying_a_recorded_demonstration_gives_bit_identical_states(task):
+    """One session plans the robot's motions, the other repeats the recorded actions."""
     planned, replayed = (
         EpisodeSession(get_episode(task, "test", 3), visible=shown) for shown in (False, True)
     )
@@ -107,10 +108,13 @@ def test_a_replay_is_the_demonstration_to_the_last_bit(task):
     assert planned.state_hash() == replayed.state_hash()
 
 
-@pytest.mark.parametrize("task", slow_but((SHORT,), (SHORT, "VideoPlaceOrder")))
-def test_pictures_read_late_are_those_of_the_demonstration(task):
+@pytest.mark.parametrize(
+    "task", slow_but((SHORT_VIDEO_TASK,), (SHORT_VIDEO_TASK, "VideoPlaceOrder"))
+)
+def test_video_pictures_read_after_the_policy_acted_show_the_demonstration(task):
+    """Pictures are drawn only when they are read, by replaying the demonstration."""
     seen = {"front_rgb": [], "wrist_rgb": []}
-    every = 3 if task == SHORT else 60
+    every = 3 if task == SHORT_VIDEO_TASK else 60
     steps = []
 
     def look(env, is_demonstration):
@@ -137,7 +141,7 @@ def test_pictures_read_late_are_those_of_the_demonstration(task):
 def test_depth_and_calibration_of_the_video_are_those_of_its_moments():
     options = {"cameras": ("wrist",), "depth": True, "calibration": True}
     seen = []
-    env = roboirg.make(SHORT, episode=1, **options)
+    env = roboirg.make(SHORT_VIDEO_TASK, episode=1, **options)
     env.set_frame_hook(
         lambda env, shown: seen.append(env._current.observation_builder.read()) if shown else 0
     )
@@ -145,39 +149,43 @@ def test_depth_and_calibration_of_the_video_are_those_of_its_moments():
 
     assert list(video) == list(seen[0])
 
-    same({key: np.stack([moment[key] for moment in seen]) for key in video}, dict(video))
+    check_same_arrays(
+        {key: np.stack([moment[key] for moment in seen]) for key in video}, dict(video)
+    )
 
 
-def test_nothing_is_drawn_before_it_is_read(drawn):
+def test_pictures_of_a_video_are_drawn_only_when_they_are_read(cameras_drawn):
+    """The video has 66 moments; the first observation draws one picture of each camera."""
     env, _, info = reset(cameras=("front", "wrist"))
     world = weakref.ref(env.session.world)
-    assert drawn == ["front", "wrist"]  # the first observation
+    assert cameras_drawn == ["front", "wrist"]  # the first observation
 
     video = info["demonstration"]
     assert (video.length, len(video["joint_positions"]), "front_rgb" in video) == (66, 66, True)
     assert "front_rgb (not drawn)" in repr(video)
-    assert drawn == ["front", "wrist"]
+    assert cameras_drawn == ["front", "wrist"]
 
     env.close()
     assert world() is None
     assert video["wrist_rgb"].shape == (66, PICTURE_SIZE, PICTURE_SIZE, 3)
-    assert drawn == ["front", "wrist"] + ["wrist"] * 66
+    assert cameras_drawn == ["front", "wrist"] + ["wrist"] * 66
 
     other = pickle.loads(pickle.dumps(video))  # noqa: S301 - our own
-    same(dict(other), dict(video))
+    check_same_arrays(dict(other), dict(video))
     assert list(other) == list(video)
     assert other.length == video.length
     assert not isinstance(other, dict)
     assert len(other.actions) == 0
 
 
-def test_all_pictures_are_drawn_in_one_replay(drawn, monkeypatch):
+def test_all_pictures_of_a_camera_are_drawn_in_one_replay(cameras_drawn, monkeypatch):
+    """66 moments, every fifth: 14 pictures. A second replay draws the other camera."""
     replays = []
     play = EpisodeSession.play_demonstration
     options = {"cameras": ("front", "wrist"), "depth": True, "demonstration_frames": 5}
     _, _, info = reset(**options)
     alone = dict(reset(**options)[2]["demonstration"])
-    drawn.clear()
+    cameras_drawn.clear()
     monkeypatch.setattr(
         EpisodeSession,
         "play_demonstration",
@@ -186,20 +194,20 @@ def test_all_pictures_are_drawn_in_one_replay(drawn, monkeypatch):
     video = info["demonstration"]
     wrist = video["wrist_rgb"]
 
-    assert (len(replays), drawn) == (1, ["wrist"] * 14)
+    assert (len(replays), cameras_drawn) == (1, ["wrist"] * 14)
 
     video.draw()
-    assert (len(replays), drawn) == (2, ["wrist"] * 14 + ["front"] * 14)
+    assert (len(replays), cameras_drawn) == (2, ["wrist"] * 14 + ["front"] * 14)
     assert "not drawn" not in repr(video)
     assert video["wrist_rgb"] is wrist
 
-    same(alone, dict(video))
+    check_same_arrays(alone, dict(video))
     pickle.dumps(video)
     video.draw()
     assert len(replays) == 2
 
 
-def story(task=SHORT):
+def everything_returned(task=SHORT_VIDEO_TASK):
     """Everything that an environment and a run return."""
     options = {"cameras": ("front", "wrist"), "demonstration_frames": Viewer.demonstration_frames}
     _, observation, info = reset(task, depth=True, grounded=True, **options)
@@ -233,21 +241,25 @@ class Viewer:
         return actions
 
 
-def test_cold_warm_or_off_the_cache_changes_nothing(cache, monkeypatch, drawn, unplanned):
+def test_results_are_equal_with_an_empty_a_filled_and_no_cache(
+    cache, monkeypatch, cameras_drawn, forbid_planning
+):
+    """With the filled cache nothing is planned and no picture of the video is drawn."""
     monkeypatch.setitem(sys.modules, __name__, sys.modules[__name__])
-    cold = story()
-    at_first = len(drawn)
+    cold = everything_returned()
+    at_first = len(cameras_drawn)
     assert len(list(cache.glob("actions/*"))) == 1
     assert len(list(cache.glob("frames/*"))) == 4
 
     with monkeypatch.context() as patch:
         patch.setenv("ROBOIRG_CACHE", "off")
-        off = story()
-    drawn.clear()
-    unplanned()
-    warm = story()
+        off = everything_returned()
+    cameras_drawn.clear()
+    forbid_planning()
+    warm = everything_returned()
 
-    assert len(drawn) == at_first - 2 * 11
+    # The video has 11 pictures of each of two cameras.
+    assert len(cameras_drawn) == at_first - 2 * 11
     for arrays, info, record in (warm, off):
         assert record == cold[2]
         assert record["demonstration_steps"] == 66
@@ -257,23 +269,26 @@ def test_cold_warm_or_off_the_cache_changes_nothing(cache, monkeypatch, drawn, u
             assert np.array_equal(arrays[key], cold[0][key]), key
 
 
-@pytest.mark.parametrize("task", [SHORT, "VideoRepick"])
-def test_a_warm_reset_is_a_cold_one(task, cache, unplanned):
+@pytest.mark.parametrize("task", [SHORT_VIDEO_TASK, "VideoRepick"])
+def test_a_reset_from_the_cache_equals_one_that_plans_the_demonstration(
+    task, cache, forbid_planning
+):
+    """After the first reset, planning is forbidden: the second one has to read the cache."""
     _, observation, info = reset(task)
     small = [entry.stat().st_size < 200_000 for entry in cache.glob("actions/*")]
     # A shipped recording needs no cache.
     assert small == ([] if info["demonstration_source"] == "recorded" else [True])
 
-    unplanned()
+    forbid_planning()
     env, again, warm = reset(task)
-    same(dict(info.pop("demonstration")), dict(warm.pop("demonstration")))
+    check_same_arrays(dict(info.pop("demonstration")), dict(warm.pop("demonstration")))
     assert (info, observation.pop("instruction")) == (warm, again.pop("instruction"))
 
-    same(observation, again)
+    check_same_arrays(observation, again)
     assert env.session.judge.index == len(env.episode.demonstration)
 
 
-def kept_recording(cache):
+def stored_recording(cache):
     """Return the store, and the name and content of the one recording in it."""
     (entry,) = cache.glob("actions/*")
     store = demonstration_cache.open_cache("actions")
@@ -281,9 +296,12 @@ def kept_recording(cache):
 
 
 @pytest.mark.parametrize("fault", ["end", "actions", "stages"])
-def test_a_replay_that_ends_differently_is_replaced_and_told(cache, caplog, fault):
+def test_a_cached_recording_that_replays_differently_is_rebuilt_with_a_warning(
+    cache, caplog, fault
+):
+    """The cached recording gets another final state, other actions, or no actions at all."""
     _, observation, info = reset()
-    store, name, right = kept_recording(cache)
+    store, name, right = stored_recording(cache)
     wrong = {
         "end": {"end": "0" * 64},
         "actions": {"actions": right.actions[::-1] + 0.3},
@@ -295,21 +313,23 @@ def test_a_replay_that_ends_differently_is_replaced_and_told(cache, caplog, faul
 
     assert [record.levelname for record in caplog.records] == ["WARNING"]
     assert name in caplog.text
-    assert f"{SHORT}/test/1" in caplog.text
+    assert f"{SHORT_VIDEO_TASK}/test/1" in caplog.text
     assert np.array_equal(after["end_effector"], observation["end_effector"])
-    same(dict(info["demonstration"]), dict(rebuilt["demonstration"]))
+    check_same_arrays(dict(info["demonstration"]), dict(rebuilt["demonstration"]))
     assert Recording.from_bytes(store.read(name)).end == right.end
 
     reset()
     assert len(caplog.records) == 1
 
 
-def test_a_frame_hook_sees_the_right_demonstration_once(cache):
+def test_a_frame_hook_does_not_see_the_replay_of_a_wrong_recording(cache):
+    """The video has 67 steps; the hook must see each of them once, though
+    the cached recording was wrong and the demonstration is played again."""
     _, _, _ = reset()
-    store, name, right = kept_recording(cache)
+    store, name, right = stored_recording(cache)
     store.write(name, dataclasses.replace(right, actions=right.actions + 0.2).to_bytes())
     seen = []
-    env = roboirg.make(SHORT, episode=1, cameras=())
+    env = roboirg.make(SHORT_VIDEO_TASK, episode=1, cameras=())
     env.set_frame_hook(lambda env, shown: seen.append(env.session.world.elapsed))
 
     env.reset()
@@ -317,11 +337,12 @@ def test_a_frame_hook_sees_the_right_demonstration_once(cache):
     assert seen == list(range(1, 68))
 
 
-def test_keys_change_with_what_determines_a_demonstration(monkeypatch):
-    episode = get_episode(SHORT, "test", 1)
+def test_the_cache_key_of_a_demonstration_changes_with_code_and_processor(monkeypatch):
+    """The key also names the versions of the libraries that compute motions."""
+    episode = get_episode(SHORT_VIDEO_TASK, "test", 1)
     key = demonstration_cache.recording_key(episode)
-    assert demonstration_cache.recording_key(get_episode(SHORT, "test", 1)) == key
-    assert demonstration_cache.recording_key(get_episode(SHORT, "test", 2)) != key
+    assert demonstration_cache.recording_key(get_episode(SHORT_VIDEO_TASK, "test", 1)) == key
+    assert demonstration_cache.recording_key(get_episode(SHORT_VIDEO_TASK, "test", 2)) != key
 
     for name, other in (("_SOURCE_HASH", "another"), ("processor_features", lambda: "another")):
         with monkeypatch.context() as patch:
@@ -336,9 +357,12 @@ def test_keys_change_with_what_determines_a_demonstration(monkeypatch):
         assert part in fingerprint
 
 
-def test_pictures_drawn_otherwise_are_other_entries(cache):
-    def read(meshes, every=11):
-        options = {"cameras": ("front",), "meshes": meshes, "demonstration_frames": every}
+def test_pictures_of_other_meshes_or_frame_rates_have_their_own_cache_entries(cache):
+    """*Faithful* and *light* are ways of drawing; every eleventh
+    frame is another series than every twenty-second."""
+
+    def read(meshes_read_once, every=11):
+        options = {"cameras": ("front",), "meshes": meshes_read_once, "demonstration_frames": every}
         return reset(**options)[2]["demonstration"]["front_rgb"]
 
     faithful = read("faithful")
@@ -355,7 +379,8 @@ def test_pictures_drawn_otherwise_are_other_entries(cache):
     assert all(np.array_equal(read("faithful", 11 * n), faithful[::n]) for n in (1, 2))
 
 
-def test_a_recording_survives_as_it_is():
+def test_a_recording_is_written_and_read_bit_for_bit():
+    """Also a number next to 9 and a negative zero."""
     steps = [RecordedStep(1, np.nextafter(np.arange(8.0), 9.0)), RecordedStep(2, np.full(8, -0.0))]
     recording = Recording.from_steps(steps, "ab12")
 

@@ -13,7 +13,7 @@ from roboirg.simulation.expert.primitives import MotionPrimitives
 
 pytestmark = pytest.mark.sim
 
-VIDEOS = {
+FRAMES_OF_VIDEOS = {
     ("VideoUnmask", "easy"): (66, 66),
     ("VideoUnmask", "hard"): (66, 66),
     ("VideoUnmaskSwap", "easy"): (114, 168),
@@ -29,7 +29,7 @@ VIDEOS = {
 }
 """Frames, shortest and longest known."""
 
-PRIMITIVES = {
+STEPS_OF_PRIMITIVES = {
     "pick_cube": (67, 137),
     "place_on": (66, 117),
     "put_down": (46, 81),
@@ -41,9 +41,11 @@ PRIMITIVES = {
 """Control steps, shortest and longest known, in the videos of the Reference tasks."""
 
 
-@pytest.mark.parametrize(("task", "difficulty"), slow_but([("VideoUnmaskSwap", "easy")], VIDEOS))
-def test_videos_are_as_long_as_the_known_ones_within_a_tenth(task, difficulty):
-    low, high = VIDEOS[task, difficulty]
+@pytest.mark.parametrize(
+    ("task", "difficulty"), slow_but([("VideoUnmaskSwap", "easy")], FRAMES_OF_VIDEOS)
+)
+def test_our_videos_are_as_long_as_robomme_s_within_a_tenth(task, difficulty):
+    low, high = FRAMES_OF_VIDEOS[task, difficulty]
     episode = next(drawn_episodes(task, difficulty))
     frames = []
 
@@ -52,7 +54,8 @@ def test_videos_are_as_long_as_the_known_ones_within_a_tenth(task, difficulty):
     assert 0.9 * low <= len(frames) <= 1.1 * high
 
 
-def test_primitives_take_as_long_as_the_known_ones_within_fifteen_percent():
+def test_our_motions_take_as_many_steps_as_robomme_s_within_15_percent():
+    """Motions ("primitives") are picks, placements and the like, in the videos of two tasks."""
     steps = defaultdict(list)
     for task in ("VideoRepick", "VideoPlaceButton"):
         for episode in itertools.islice(drawn_episodes(task, "medium"), 2):
@@ -64,8 +67,8 @@ def test_primitives_take_as_long_as_the_known_ones_within_fifteen_percent():
                     session.step(action)
                 steps[stage.primitive.kind].append(session.world.elapsed - begin)
 
-    assert set(steps) == set(PRIMITIVES)
-    for kind, (low, high) in PRIMITIVES.items():
+    assert set(steps) == set(STEPS_OF_PRIMITIVES)
+    for kind, (low, high) in STEPS_OF_PRIMITIVES.items():
         assert 0.85 * low <= min(steps[kind]), kind
         assert max(steps[kind]) <= 1.15 * high, kind
         assert low <= median(steps[kind]) <= high, kind

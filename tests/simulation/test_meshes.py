@@ -15,7 +15,7 @@ from roboirg.simulation.rendering import mesh_cache, robot_meshes, table_mesh
 from roboirg.simulation.rendering.mesh_cache import cached_arrays, pack_arrays, unpack_arrays
 from roboirg.util.cache import open_cache
 
-DERIVED = 13
+DERIVED_MESHES = 13
 """Ten links of the robot, what the front camera sees of one, the wrist camera and the table."""
 
 
@@ -25,13 +25,13 @@ def cache(tmp_path, monkeypatch):
     return tmp_path / "meshes"
 
 
-def complete(cache):
+def entries(cache):
     return sorted(path.name for path in cache.glob("[!.]*"))
 
 
 @settings(max_examples=12)
 @given(st.dictionaries(st.text(), arrays(scalar_dtypes(), array_shapes(min_dims=0, min_side=0))))
-def test_arrays_come_back_as_they_were(given_arrays):
+def test_packed_arrays_are_unpacked_bit_for_bit(given_arrays):
     again = unpack_arrays(memoryview(pack_arrays(given_arrays)))
     assert list(again) == list(given_arrays)
     for name, array in given_arrays.items():
@@ -39,7 +39,7 @@ def test_arrays_come_back_as_they_were(given_arrays):
         assert again[name].tobytes() == array.tobytes()
 
 
-def test_what_was_derived_is_not_derived_again(cache):
+def test_cached_arrays_are_computed_once_for_each_source(cache):
     made = []
 
     def make():
@@ -49,21 +49,21 @@ def test_what_was_derived_is_not_derived_again(cache):
     for sources in (b"first", b"first", b"second"):
         ((name, array),) = cached_arrays("thing", sources, make).items()
         assert (name, array.tolist()) == ("corners", [[0, 1, 2], [3, 4, 5]])
-    assert len(made) == len(complete(cache)) == 2
+    assert len(made) == len(entries(cache)) == 2
 
 
-def test_meshes_have_a_share_of_the_cache(cache, monkeypatch):
+def test_cached_meshes_stay_within_their_sixteenth_of_the_cache(cache, monkeypatch):
     monkeypatch.setenv("ROBOIRG_CACHE_GIB", str(16 * 10_000 / 2**30))
     for number in range(20):
         cached_arrays("thing", bytes([number]), lambda: {"zeros": np.zeros(200)})
         assert sum(path.stat().st_size for path in cache.iterdir()) <= 10_000
-    assert 1 < len(complete(cache)) < 20
+    assert 1 < len(entries(cache)) < 20
 
     open_cache("actions").write("a1", bytes(5000))
     assert open_cache("actions").read("a1") == bytes(5000)
 
 
-FILL = """
+PRINT_CHECKSUM_OF_PICTURE = """
 import zlib, roboirg
 print(zlib.crc32(roboirg.make("PickXtimes").reset()[0]["front_rgb"].tobytes()))
 """
@@ -71,10 +71,15 @@ print(zlib.crc32(roboirg.make("PickXtimes").reset()[0]["front_rgb"].tobytes()))
 
 @pytest.mark.slow
 @pytest.mark.sim
-def test_damaged_meshes_are_made_anew_and_told(cache):
+def test_damaged_cached_meshes_are_rebuilt_with_a_warning(cache):
+    """One file is cut off, in another one bit is flipped; the picture must not change."""
+
     def draw():
         done = subprocess.run(
-            [sys.executable, "-c", FILL], capture_output=True, text=True, check=True
+            [sys.executable, "-c", PRINT_CHECKSUM_OF_PICTURE],
+            capture_output=True,
+            text=True,
+            check=True,
         )
         return done.stdout, done.stderr
 
@@ -82,7 +87,7 @@ def test_damaged_meshes_are_made_anew_and_told(cache):
     assert complaints == ""
 
     sound = {path.name: path.read_bytes() for path in cache.iterdir()}
-    assert len(sound) == len(complete(cache)) == DERIVED
+    assert len(sound) == len(entries(cache)) == DERIVED_MESHES
 
     harmed = [next(cache.glob(f"{name}-*")) for name in ("table", "link0")]
     harmed[0].write_bytes(sound[harmed[0].name][:-1000])
@@ -99,7 +104,7 @@ def test_damaged_meshes_are_made_anew_and_told(cache):
 
 
 @pytest.mark.sim
-def test_the_table_is_the_installed_one():
+def test_our_reduced_table_mesh_equals_the_installed_model():
     stock = sapien.render.RenderShapeTriangleMesh(str(find_model_files() / TABLE_FILE))
     for ours, theirs in zip(table_mesh.table_shape().parts, stock.parts, strict=True):
         for what in ("vertices", "triangles"):
@@ -116,11 +121,11 @@ def test_the_table_is_the_installed_one():
         assert held.address_mode == "repeat"
 
 
-def test_code_that_derives_is_part_of_the_key(cache, monkeypatch):
+def test_the_cache_key_of_a_mesh_changes_with_the_code_that_computes_it(cache, monkeypatch):
     cached_arrays("thing", b"", dict)
     monkeypatch.setattr(mesh_cache, "source_code", lambda *_: b"other code")
 
     cached_arrays("thing", b"", dict)
 
-    assert len(complete(cache)) == 2
+    assert len(entries(cache)) == 2
     assert robot_meshes.source_code("robot_meshes") != mesh_cache.source_code("robot_meshes")

@@ -49,17 +49,18 @@ def folder(tmp_path, monkeypatch):
     return path
 
 
-def unpacked(folder):
+def files_in(folder):
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
-EVERYTHING = sorted([*model_files.MODEL_FILES, "LICENSE", "LICENSE-3RD-PARTY"])
+ALL_FILES = sorted([*model_files.MODEL_FILES, "LICENSE", "LICENSE-3RD-PARTY"])
 
 
-def test_a_wheel_on_this_machine_is_unpacked_once(wheel, folder):
+def test_models_are_unpacked_from_a_local_wheel_and_not_again(wheel, folder):
+    """A wheel is a package file of pip; this one holds small files in place of the models."""
     said = []
     assert fetch_model_files(wheel, said.append) == folder
-    assert unpacked(folder) == EVERYTHING
+    assert files_in(folder) == ALL_FILES
 
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
     wheel.unlink()
@@ -76,14 +77,14 @@ def test_missing_and_damaged_files_are_fetched_again(wheel, folder):
         model_files.look_for_model_files()
 
     fetch_model_files(wheel, print)
-    assert unpacked(folder) == EVERYTHING
+    assert files_in(folder) == ALL_FILES
 
     (folder / model_files.MODEL_FILES[5]).write_text("damaged")
     with pytest.raises(MissingDependencyError, match=r"not those of ManiSkill 3\.0\.1"):
         model_files.look_for_model_files()
 
 
-def test_other_wheels_are_refused(wheel, folder):
+def test_a_wheel_with_another_hash_is_refused(wheel, folder):
     wheel.write_bytes(wheel.read_bytes() + b"more")
     for path in (wheel, wheel.parent, folder / "nowhere"):
         with pytest.raises(InvalidValueError, match=re.escape(f"'{path}' is not ")):
@@ -91,13 +92,15 @@ def test_other_wheels_are_refused(wheel, folder):
     assert not folder.exists()
 
 
-def test_a_folder_that_cannot_be_written_is_named(wheel, folder):
+def test_a_model_folder_that_is_a_file_is_reported_by_name(wheel, folder):
     folder.write_text("a file")
     with pytest.raises(InvalidValueError, match=f"{folder}.*ROBOIRG_MODEL_FILES names another"):
         fetch_model_files(wheel, print)
 
 
-def test_pip_s_configuration_is_respected(wheel, folder, monkeypatch, capsys):
+def test_models_are_downloaded_by_pip_with_the_user_s_configuration(
+    wheel, folder, monkeypatch, capsys
+):
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     monkeypatch.setenv("PIP_FIND_LINKS", str(folder))
     monkeypatch.setattr(sys, "argv", ["roboirg", "fetch-models"])
@@ -113,21 +116,21 @@ def test_pip_s_configuration_is_respected(wheel, folder, monkeypatch, capsys):
         cli.main()
     assert not left.value.code
     assert capsys.readouterr().out == f"{folder}\n"
-    assert unpacked(folder) == EVERYTHING
+    assert files_in(folder) == ALL_FILES
 
     (folder / model_files.MODEL_FILES[0]).unlink()
     monkeypatch.setattr(model_fetch, "WHEEL_SHA256", "0" * 64)
     with pytest.raises(MissingDependencyError, match="is not PyPI's"):
         fetch_model_files(None, print)
-    assert WHEEL not in unpacked(folder)
+    assert WHEEL not in files_in(folder)
 
 
-def test_without_pip_the_wheel_comes_from_pypi_s_files(wheel, folder, monkeypatch):
+def test_without_pip_the_models_are_downloaded_from_a_fixed_url(wheel, folder, monkeypatch):
     monkeypatch.setattr(model_fetch, "WHEEL_URL", wheel.as_uri())
     monkeypatch.setattr(model_fetch.importlib.util, "find_spec", lambda name: None)
     said = []
     assert fetch_model_files(None, said.append) == folder
-    assert unpacked(folder) == EVERYTHING
+    assert files_in(folder) == ALL_FILES
     assert len(said) == 1
     assert wheel.as_uri() in said[0]
 
@@ -138,6 +141,7 @@ def test_without_pip_the_wheel_comes_from_pypi_s_files(wheel, folder, monkeypatc
 
 
 def test_a_kill_while_unpacking_leaves_whole_files(wheel, folder):
+    """The program dies before it writes the seventh file; six are whole, and the rest follows."""
     program = (
         "import os, sys; from pathlib import Path\n"
         "from roboirg.simulation import model_fetch, model_files\n"
@@ -152,9 +156,9 @@ def test_a_kill_while_unpacking_leaves_whole_files(wheel, folder):
     command = [sys.executable, "-c", program, wheel, model_fetch.WHEEL_SHA256]
     killed = subprocess.run(command, check=False)
     assert killed.returncode == 9
-    for name in unpacked(folder):
+    for name in files_in(folder):
         assert (folder / name).read_bytes() == name.encode() * 50
-    assert len(unpacked(folder)) == 6
+    assert len(files_in(folder)) == 6  # it died at the seventh
 
     fetch_model_files(wheel, print)
-    assert unpacked(folder) == EVERYTHING
+    assert files_in(folder) == ALL_FILES

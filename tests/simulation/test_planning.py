@@ -39,20 +39,22 @@ def random_goals(count: int):
     rng = np.random.default_rng(1)
     for _ in range(count):
         position = rng.uniform([-0.3, -0.25, 0.0], [0.15, 0.25, 0.3])
-        yield turned(position, rng.uniform(-0.8, 0.8))
+        yield pose_with_yaw(position, rng.uniform(-0.8, 0.8))
 
 
-def turned(position: np.ndarray, angle: float) -> ToolPose:
+def pose_with_yaw(position: np.ndarray, angle: float) -> ToolPose:
     return ToolPose(position, DOWN * Rotation.from_rotvec([0, 0, angle]))
 
 
 def test_forward_kinematics_of_home_is_where_the_simulator_has_the_tool(planner):
+    """Position of the tool in meters, at the arm's resting position."""
     assert planner.forward_kinematics(HOME).position == pytest.approx(
         [-0.0605, 0.0, 0.5211], abs=1e-4
     )
 
 
-def test_moves_are_straight_within_limits_end_at_the_goal_and_repeat_themselves(planner):
+def test_planned_moves_are_straight_and_keep_the_limits_of_speed_and_acceleration(planner):
+    """They end at the goal, and planning again gives the same path."""
     for goal in random_goals(12):
         path = planner.plan_straight(HOME, goal)
         assert path[0] == pytest.approx(HOME, abs=1e-9)
@@ -73,7 +75,8 @@ def test_moves_are_straight_within_limits_end_at_the_goal_and_repeat_themselves(
     assert np.array_equal(planner.plan_straight(HOME, goal), path)
 
 
-def test_joint_positions_found_for_a_pose_have_it_and_keep_the_limits(planner):
+def test_inverse_kinematics_finds_joint_positions_within_their_limits(planner):
+    """From random positions, with one joint pushed against its limit."""
     rng = np.random.default_rng(2)
     for _ in range(15):
         begin = rng.uniform(JOINT_LOW, JOINT_HIGH)
@@ -87,7 +90,7 @@ def test_joint_positions_found_for_a_pose_have_it_and_keep_the_limits(planner):
         assert np.array_equal(planner.inverse_kinematics(begin, goal), arm)
 
 
-def test_near_poses_need_small_joint_movements(planner):
+def test_poses_one_centimeter_apart_need_small_joint_movements(planner):
     for goal in random_goals(10):
         arm = planner.plan_straight(HOME, goal)[-1]
         near = ToolPose(goal.position + np.array([0.01, -0.01, 0.01]), goal.rotation)
@@ -95,18 +98,19 @@ def test_near_poses_need_small_joint_movements(planner):
 
 
 @pytest.mark.parametrize("position", [(1.5, 0, 0.3), (1e308, -1e308, 0)])
-def test_poses_out_of_reach_are_said_whatever_the_numbers(planner, position):
+def test_an_unreachable_pose_is_a_planning_error_even_with_huge_numbers(planner, position):
     goal = ToolPose(np.array(position, dtype=float), DOWN)
     for plan in (planner.inverse_kinematics, planner.plan_move):
         with pytest.raises(MotionPlanningError):
             plan(HOME, goal)
 
 
-def test_what_no_straight_line_reaches_is_reached_by_way_of_home(planner):
+def test_a_pose_that_no_straight_line_reaches_is_reached_by_way_of_home(planner):
+    """Home is the arm's resting position."""
     place = np.array([-0.1, 0.0, 0.2])
-    twisted = planner.plan_straight(HOME, turned(place, -2.8))[-1]
+    twisted = planner.plan_straight(HOME, pose_with_yaw(place, -2.8))[-1]
     # The short way round would turn the last joint beyond its limit.
-    goal = turned(place, 1.6)
+    goal = pose_with_yaw(place, 1.6)
     with pytest.raises(MotionPlanningError, match="joint limit"):
         planner.plan_straight(twisted, goal)
 
@@ -125,6 +129,7 @@ def test_a_move_to_where_one_is_takes_no_time():
     direction=st.lists(st.floats(-1.0, 1.0), min_size=7, max_size=7).filter(any),
 )
 def test_every_short_move_has_a_timing(exponent, direction):
+    """Moves of a ten-millionth to a hundredth of a radian, in any direction."""
     way = np.array(direction) / np.linalg.norm(direction) * 10.0**exponent
     path = time_parameterize(np.stack([HOME, HOME + way]))
 
@@ -133,7 +138,7 @@ def test_every_short_move_has_a_timing(exponent, direction):
 
 
 @pytest.mark.parametrize("tilt", [0.0, 1e-4])
-def test_to_stay_is_no_way_home(planner, tilt):
+def test_a_goal_at_the_current_pose_does_not_lead_by_way_of_home(planner, tilt):
     start = planner.plan_straight(HOME, ToolPose(np.array([-0.1, 0.0, 0.2]), DOWN))[-1]
     place = planner.forward_kinematics(start)
 
@@ -152,6 +157,7 @@ def test_to_stay_is_no_way_home(planner, tilt):
     ],
 )
 def test_free_moves_take_as_long_as_robomme_s(planner, travel, low, high):
+    """`travel` is in meters, `low` and `high` are numbers of control steps."""
     start = planner.plan_straight(HOME, ToolPose(np.array([-0.1, 0.0, 0.2]), DOWN))[-1]
     goal = ToolPose(np.array([-0.1, 0.0, 0.2]) + travel, DOWN)
     assert low <= len(planner.plan_straight(start, goal)) <= high
@@ -173,7 +179,7 @@ def test_first_picks_take_as_long_as_robomme_s(task, primitive, low, high):
         assert stage.expects in world.facts
 
 
-def lifted(*objects: SceneObject) -> bool:
+def is_picked_up(*objects: SceneObject) -> bool:
     """Whether the expert picks up the first of several objects."""
     world = World(Scene(objects), visible=False)
     execute(world, Primitive("pick_cube", objects[0].name))
@@ -185,18 +191,20 @@ def cube(name: str, x: float, y: float, yaw: float = 0.0) -> SceneObject:
 
 
 def test_a_cube_at_the_edge_of_the_workspace_is_gripped_short_of_its_middle(planner):
+    """Its middle is out of reach, but the near edge is not; 2 cm farther away, that is, too."""
     place = np.array([0.171, -0.159, CUBE_HALF])
     with pytest.raises(MotionPlanningError, match="cannot reach"):
         planner.plan_move(HOME, ToolPose(place, DOWN))
-    assert lifted(cube("far", *place[:2], yaw=2.22))
+    assert is_picked_up(cube("far", *place[:2], yaw=2.22))
     with pytest.raises(MotionPlanningError, match="cannot reach"):
-        lifted(cube("too_far", place[0] + 0.02, place[1]))
+        is_picked_up(cube("too_far", place[0] + 0.02, place[1]))
 
 
-def test_where_open_fingers_land_on_neighbors_a_narrower_gripper_picks(monkeypatch):
+def test_a_cube_between_close_neighbors_is_picked_with_half_open_fingers(monkeypatch):
+    """Four cubes stand 7 cm around it; with open fingers the pick fails."""
     around = [(0.07, 0.0), (-0.07, 0.0), (0.0, 0.07), (0.0, -0.07)]
     cubes = [cube(f"cube_{number}", -0.05 + x, 0.1 + y) for number, (x, y) in enumerate(around)]
-    assert lifted(cube("middle", -0.05, 0.1), *cubes)
+    assert is_picked_up(cube("middle", -0.05, 0.1), *cubes)
 
     monkeypatch.setattr(primitives, "NARROW", primitives.OPEN)
-    assert not lifted(cube("middle", -0.05, 0.1), *cubes)
+    assert not is_picked_up(cube("middle", -0.05, 0.1), *cubes)

@@ -28,7 +28,7 @@ FAR_OFF_LEVELS = 24
 FAR_OFF_SHARE = 0.01
 
 END = -1
-MOMENTS = {
+PICTURE_STEPS = {
     ("PickXtimes", 2): {1: "start", 95: "middle", END: "end"},
     ("StopCube", 3): {END: "stopped"},
     ("SwingXtimes", 3): {END: "glowing"},
@@ -57,7 +57,7 @@ def unused_scene(task, difficulty):
     return next(drawn_episodes(task, difficulty, itertools.count(31_000_000)))
 
 
-def trace(task, index, shoot=None):
+def oracle_s_play(task, index, shoot=None):
     """Rewards, events and a hash of every action and joint position of the oracle's play."""
     env = roboirg.make(task, episode=index, cameras=())
     env.set_frame_hook(shoot)
@@ -76,9 +76,10 @@ def trace(task, index, shoot=None):
     return rewards, env.events, digest.hexdigest()
 
 
-@pytest.mark.parametrize(("task", "index"), MOMENTS)
-def test_the_oracle_succeeds_and_pictures_look_as_they_did_when_they_were_looked_at(task, index):
-    moments = MOMENTS[task, index]
+@pytest.mark.parametrize(("task", "index"), PICTURE_STEPS)
+def test_the_oracle_succeeds_and_its_pictures_equal_the_stored_ones(task, index):
+    """The stored pictures were looked at by people; 1 % of the pixels may differ."""
+    moments = PICTURE_STEPS[task, index]
     cameras = CAMERAS if task in BOTH_CAMERAS else ("front",)
     taken = {}
 
@@ -88,7 +89,7 @@ def test_the_oracle_succeeds_and_pictures_look_as_they_did_when_they_were_looked
             for camera in cameras:
                 taken[f"{task}_{moments[elapsed]}_{camera}.png"] = env.picture(camera)
 
-    first = trace(task, index, shoot)
+    first = oracle_s_play(task, index, shoot)
 
     rewards = first[0]
     assert sum(rewards) == rewards[-1] == 1.0
@@ -98,7 +99,7 @@ def test_the_oracle_succeeds_and_pictures_look_as_they_did_when_they_were_looked
         off = np.abs(picture.astype(int) - known).max(axis=2) > FAR_OFF_LEVELS
         assert off.mean() < FAR_OFF_SHARE, f"{name} differs"
     if task in REPEATED:  # to the bit, also without pictures
-        assert trace(task, index) == first
+        assert oracle_s_play(task, index) == first
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -117,6 +118,7 @@ def test_nothing_falls_or_drifts_while_the_robot_rests(task):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_the_front_camera_sees_every_object_that_is_there(task):
+    """At least 20 pixels of each, after 34 steps; what appears later is left out."""
     episode = unused_scene(task, "easy")
     world = rest(World(episode.scene), 34)
     late = set()

@@ -11,7 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from roboirg.simulation.proprioception import euler_angles, unwrap_angle
 
-number = st.floats(-1.0, 1.0, width=32) | st.sampled_from([0.0, -0.0, 1.0, -1.0, 0.5, -0.5])
+quaternion_part = st.floats(-1.0, 1.0, width=32) | st.sampled_from(
+    [0.0, -0.0, 1.0, -1.0, 0.5, -0.5]
+)
 
 
 def angles_by_scipy(pose):
@@ -27,27 +29,30 @@ def check_angles(quaternion):
     assert euler_angles(pose).tobytes() == angles_by_scipy(pose).tobytes()
 
 
-quaternions = st.tuples(number, number, number, number)
+quaternions = st.tuples(quaternion_part, quaternion_part, quaternion_part, quaternion_part)
 
 
 @given(quaternions)
-def test_angles_are_those_of_scipy(quaternion):
+def test_euler_angles_are_bit_identical_to_scipy_s(quaternion):
     check_angles(quaternion)
 
 
-turned = st.floats(-50.0, 50.0) | st.integers(-40, 40).map(lambda number: number * np.pi / 4)
+any_angle = st.floats(-50.0, 50.0) | st.integers(-40, 40).map(
+    lambda quaternion_part: quaternion_part * np.pi / 4
+)
 
 
 @settings(max_examples=100)
-@given(turned, turned)
-def test_angles_without_turns_are_those_of_numpy(before, now):
+@given(any_angle, any_angle)
+def test_an_angle_is_continued_without_a_jump_as_by_numpy_unwrap(before, now):
     ours = np.float64(unwrap_angle(before, now))
     assert ours.tobytes() == np.unwrap([before, now])[1].tobytes()
 
 
 @pytest.mark.parametrize("spread", [1.0, 1e-3, 1e-7])
 @pytest.mark.parametrize("around", [(0, 1, 0, 0), (1, 0, 1, 0), (1, 0, -1, 0), (0, 1, 0, -1)])
-def test_angles_near_where_they_jump_are_those_of_scipy(around, spread):
+def test_euler_angles_near_a_gimbal_lock_are_bit_identical_to_scipy_s(around, spread):
+    """At a gimbal lock two of the three angles can be exchanged, and rounding decides."""
     rng = np.random.default_rng(0)
     for offset in rng.normal(0.0, spread, (300, 4)):
         pose = sapien.Pose(q=np.array(around) + offset)

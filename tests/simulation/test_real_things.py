@@ -19,8 +19,10 @@ from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
 
-TAPE = SceneObject("tape", "tape", Point(0.0, 0.0, object_sizes.TAPE_HALF), 0.0, "yellow")
-BOX = SceneObject("box_green", "box", Point(0.0, 0.0, object_sizes.BOX_HEIGHT / 2), 0.2, "green")
+TAPE_ROLL = SceneObject("tape", "tape", Point(0.0, 0.0, object_sizes.TAPE_HALF), 0.0, "yellow")
+GREEN_BOX = SceneObject(
+    "box_green", "box", Point(0.0, 0.0, object_sizes.BOX_HEIGHT / 2), 0.2, "green"
+)
 HALF_OPEN = -0.1
 """A gripper action at which each finger is 0.0125 from the middle: one fits into the hole."""
 
@@ -32,32 +34,32 @@ def step_through(world, pieces, gripper=None):
         world.step(action)
 
 
-def dropped(x, y, height, box=BOX):
+def world_after_drop(x, y, height, box=GREEN_BOX):
     """The world after a tape has fallen from a height and come to rest."""
     tape = SceneObject("tape", "tape", Point(x, y, height), 0.7, "yellow")
     return rest(World(Scene((box, tape)), visible=False), 40)
 
 
-def test_a_roll_weighs_about_as_much_as_a_cube_and_lies_still():
-    world = rest(World(Scene((TAPE,)), visible=False), 40)
+def test_a_roll_of_tape_weighs_50_to_100_grams_and_lies_still():
+    world = rest(World(Scene((TAPE_ROLL,)), visible=False), 40)
     body = world.bodies["tape"]
 
     assert 0.05 <= body.physics.mass <= 0.1
-    assert body.position == pytest.approx(TAPE.position, abs=1e-4)
+    assert body.position == pytest.approx(TAPE_ROLL.position, abs=1e-4)
     assert Fact("lying", "tape") in world.facts
 
 
-def test_a_roll_is_picked_from_outside():
-    world = World(Scene((TAPE,)), visible=False)
+def test_a_roll_of_tape_can_be_gripped_around_its_outside():
+    world = World(Scene((TAPE_ROLL,)), visible=False)
     execute(world, Primitive("pick_cube", "tape"))
 
     assert Fact("picked", "tape") in world.facts
     assert Fact("held", "tape") in world.facts
 
 
-def test_a_roll_is_picked_by_its_wall():
+def test_a_roll_of_tape_can_be_gripped_by_its_wall():
     """A finger fits into the hole; the wall is what is held then."""
-    world = World(Scene((TAPE,)), visible=False)
+    world = World(Scene((TAPE_ROLL,)), visible=False)
     expert = MotionPrimitives(world)
     rotation = expert._rotation()  # closes along y
     middle = (object_sizes.TAPE_RADIUS + object_sizes.TAPE_HOLE_RADIUS) / 2
@@ -66,7 +68,7 @@ def test_a_roll_is_picked_by_its_wall():
     step_through(world, [expert._grip(physics_settings.OPEN)], HALF_OPEN)
     step_through(world, [expert._move(at, rotation)], HALF_OPEN)
 
-    assert world.bodies["tape"].position == pytest.approx(TAPE.position, abs=2e-3)
+    assert world.bodies["tape"].position == pytest.approx(TAPE_ROLL.position, abs=2e-3)
 
     step_through(world, [expert._grip(physics_settings.CLOSED)])
     wall = object_sizes.TAPE_RADIUS - object_sizes.TAPE_HOLE_RADIUS
@@ -77,8 +79,9 @@ def test_a_roll_is_picked_by_its_wall():
 
 
 @pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (-0.02, 0.03)])
-def test_a_box_takes_in_what_falls_between_its_walls(x, y):
-    world = dropped(x, y, 0.12)
+def test_tape_that_falls_between_the_walls_of_a_box_is_in_the_box(x, y):
+    """(x, y) is from where it falls, relative to the middle of the box, in meters."""
+    world = world_after_drop(x, y, 0.12)
     # One that has touched a wall may stand on its edge.
     low, high = (
         object_sizes.BOX_FLOOR + size for size in (object_sizes.TAPE_HALF, object_sizes.TAPE_RADIUS)
@@ -86,16 +89,17 @@ def test_a_box_takes_in_what_falls_between_its_walls(x, y):
 
     assert low - 1e-3 <= world.bodies["tape"].position.z <= high + 1e-3
     assert Fact("binned", "tape", "box_green") in world.facts
-    assert world.bodies["box_green"].position == pytest.approx(BOX.position)
+    assert world.bodies["box_green"].position == pytest.approx(GREEN_BOX.position)
 
 
-def test_beside_a_box_is_not_inside():
-    world = dropped(0.0, 0.11, 0.02)
+def test_tape_next_to_a_box_is_not_in_it():
+    world = world_after_drop(0.0, 0.11, 0.02)
     assert Fact("lying", "tape") in world.facts
     assert Fact("binned", "tape", "box_green") not in world.facts
 
 
-def test_what_is_held_over_a_box_is_not_inside():
+def test_tape_held_over_a_box_is_not_in_it_until_it_is_dropped():
+    """The first two pieces of the motion carry it over the box."""
     episode = get_episode("PutInBox", "test", 0)
     world = World(episode.scene, visible=False)
     expert = MotionPrimitives(world)
@@ -111,7 +115,7 @@ def test_what_is_held_over_a_box_is_not_inside():
     assert inside in world.facts
 
 
-def test_a_box_is_open_and_the_hand_does_not_touch_it():
+def test_putting_tape_into_a_box_makes_no_other_contact_with_the_box():
     episode = get_episode("PutInBox", "train", 11)  # where 0.06 would be too high
     env = roboirg.make(episode, cameras=())
     touched = set()
@@ -130,9 +134,9 @@ def test_a_box_is_open_and_the_hand_does_not_touch_it():
     assert touched <= {"tape", f"box_{episode.goal.text('color')}"}
 
 
-def test_the_front_camera_sees_through_the_hole_of_a_roll():
+def test_the_front_camera_sees_the_target_through_the_hole_of_a_roll_of_tape():
     disc = SceneObject("target", "target", Point(0.0, 0.0, 0.005), radius=0.05)
-    world = rest(World(Scene((disc, TAPE))), 2)
+    world = rest(World(Scene((disc, TAPE_ROLL))), 2)
 
     seen = world.cameras.segmentation("front")
 

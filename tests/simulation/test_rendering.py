@@ -37,7 +37,7 @@ NOTICEABLE_SHARE = 0.01
 MEAN_LEVELS = 0.5
 
 
-class Stage:
+class DrawnScene:
     """A scene that is only looked at."""
 
     def __init__(self, scene, rendering):
@@ -64,13 +64,13 @@ class Stage:
         return np.stack([pictures[camera] for camera in CAMERAS]).astype(int), np.stack(segments)
 
 
-def spread(taken):
+def some_evenly_spaced(taken):
     """Return some moments, evenly spaced."""
     return [taken[number] for number in np.linspace(0, len(taken) - 1, FRAMES).astype(int)]
 
 
 @functools.cache
-def moments(task, index):
+def states_of_oracle_s_run(task, index):
     """Return moments of an oracle's run."""
     taken = []
 
@@ -108,14 +108,16 @@ class Differences:
 
 
 @pytest.mark.slow
-def test_pictures_are_those_of_the_stock_path():
+def test_fast_drawing_gives_the_pictures_of_sapien_s_own_shader_and_meshes():
+    """*Faithful* may differ in a hundred-thousandth of the pixels; *light* has simpler meshes,
+    and may differ visibly in 1 %. Leaving out what is out of sight changes nothing."""
     scene = get_episode("VideoPlaceButton", "test", 2).scene
     differences = {rendering: Differences() for rendering in (CULLING_ALONE, FAITHFUL, LIGHT)}
     uncut = {rendering: replace(rendering, culling=False) for rendering in (FAITHFUL, LIGHT)}
     renderings = (STOCK, *differences, *uncut.values())
-    stages = {rendering: Stage(scene, rendering) for rendering in renderings}
+    stages = {rendering: DrawnScene(scene, rendering) for rendering in renderings}
 
-    for moment in spread(moments("VideoPlaceButton", 2)):
+    for moment in some_evenly_spaced(states_of_oracle_s_run("VideoPlaceButton", 2)):
         shown = {rendering: stage.show(moment) for rendering, stage in stages.items()}
         for rendering, found in differences.items():
             found.add(shown[rendering], shown[STOCK])
@@ -134,9 +136,9 @@ def test_pictures_are_those_of_the_stock_path():
     assert light.levels <= MEAN_LEVELS * light.pixels
 
 
-def test_cameras_leave_out_what_they_cannot_see(takes):
-    stage = Stage(get_episode("PickXtimes", "test", 2).scene, FAITHFUL)
-    for moment in spread(moments("PickXtimes", 2)):
+def test_parts_of_the_robot_that_a_camera_cannot_see_are_not_drawn(takes):
+    stage = DrawnScene(get_episode("PickXtimes", "test", 2).scene, FAITHFUL)
+    for moment in some_evenly_spaced(states_of_oracle_s_run("PickXtimes", 2)):
         stage.show(moment)
 
     links = {camera: {} for camera in CAMERAS}
@@ -159,10 +161,12 @@ def triangle_count(body):
 
 
 def test_a_camera_draws_again_only_when_something_in_its_view_has_moved(takes):
+    """Twenty steps in which the arm, which carries the
+    wrist camera, moves far from the front view."""
     scene = get_episode("PickXtimes", "test", 2).scene
-    ours = Stage(scene, FAITHFUL)
-    always = Stage(scene, RenderSettings(culling=False))
-    some = moments("PickXtimes", 2)[10:30]
+    ours = DrawnScene(scene, FAITHFUL)
+    always = DrawnScene(scene, RenderSettings(culling=False))
+    some = states_of_oracle_s_run("PickXtimes", 2)[10:30]
 
     for moment in some:
         for mine, wanted in zip(ours.show(moment), always.show(moment), strict=True):
@@ -174,7 +178,7 @@ def test_a_camera_draws_again_only_when_something_in_its_view_has_moved(takes):
     assert drawn.count("wrist") > 0.9 * len(some)
 
 
-def test_another_shader_is_refused(monkeypatch):
+def test_a_sapien_version_with_another_shader_is_refused(monkeypatch):
     monkeypatch.setattr(shaders, "_STOCK_SHA256", "of another version")
     with pytest.raises(InvalidValueError, match=r"install sapien==3\.0\.3 again"):
         shaders.slim_shader.__wrapped__()

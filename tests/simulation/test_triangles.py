@@ -5,7 +5,7 @@ import numpy as np
 from roboirg.simulation.rendering.triangles import Triangles, duplicate_vertices, index_triangles
 
 
-def hills():
+def triangles_of_hills():
     """Triangles over a grid of points with uneven heights."""
     ticks = np.arange(6.0)
     x, y = np.meshgrid(ticks, ticks, indexing="ij")
@@ -18,9 +18,10 @@ def hills():
     return Triangles(corners, normals)
 
 
-def test_triangles_keep_their_places_and_normals_when_they_share_corners():
-    corners, normals = hills()
-    shared = index_triangles(hills())
+def test_sharing_corners_keeps_each_triangle_and_its_normal():
+    """A mesh lists three corners for each triangle, or shared corners and their numbers."""
+    corners, normals = triangles_of_hills()
+    shared = index_triangles(triangles_of_hills())
 
     assert np.array_equal(shared.normals[shared.triangles[:, 0]], normals)
     for given, kept in zip(corners, shared.vertices[shared.triangles], strict=True):
@@ -28,16 +29,16 @@ def test_triangles_keep_their_places_and_normals_when_they_share_corners():
     assert len(shared.vertices) < 0.5 * 3 * len(corners)
 
 
-def test_they_can_have_their_own_corners_again():
-    shared = index_triangles(hills())
+def test_triangles_with_shared_corners_can_get_their_own_again():
+    shared = index_triangles(triangles_of_hills())
     own = duplicate_vertices(shared)
 
     assert len(own.vertices) == 3 * len(own.triangles)
     assert np.array_equal(own.to_triangles().corners, shared.to_triangles().corners)
-    assert np.array_equal(own.to_triangles().normals, hills().normals)
+    assert np.array_equal(own.to_triangles().normals, triangles_of_hills().normals)
 
 
-def test_none_is_no_special_case():
+def test_a_mesh_without_triangles_needs_no_special_case():
     nothing = Triangles(np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.float32))
     shared = index_triangles(nothing)
 

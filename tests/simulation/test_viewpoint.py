@@ -40,7 +40,7 @@ def covered(corners, shift):
 
 
 @st.composite
-def soups(draw):
+def random_triangles(draw):
     """Triangles (n, 3, 3) in the window, from specks to ones that fill it; some have no area."""
     random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     count = draw(st.integers(1, 60))
@@ -55,34 +55,39 @@ def soups(draw):
 
 
 @settings(max_examples=40)
-@given(soups(), st.integers(0, 99))
-def test_whatever_a_renderer_may_show_is_kept(corners, seed):
+@given(random_triangles(), st.integers(0, 99))
+def test_no_triangle_that_covers_a_pixel_is_left_out(corners, seed):
+    """Compares with a renderer that tries every triangle, with corners shifted by rounding."""
     shown = reach_pixels(corners)
     random = np.random.default_rng(seed)
     for size in (0.0, 0.01, 0.01, 0.01):
         assert shown[covered(corners, random.uniform(-size, size, (*corners.shape[:2], 2)))].all()
 
 
-def square(depth, half, center=(0.0, 0.0)):
+def square_across_the_view(depth, half, center=(0.0, 0.0)):
     """Two triangles across the view, `half` pixels from the center to the sides."""
     ends = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=float) * half + center
     points = np.column_stack([ends / FOCAL_LENGTH, np.ones(4)]) * depth
     return points[[(0, 2, 1), (0, 3, 2)]]
 
 
-def test_what_lies_between_the_middles_of_pixels_is_left_out():
-    assert not reach_pixels(square(1.0, 0.4)).any()
-    assert reach_pixels(square(1.0, 0.4, center=(0.5, 0.5))).all()
-    assert reach_pixels(square(1.0, 0.49)).all(), "it may be rounded to where it is shown"
+def test_a_square_between_pixel_centers_is_left_out():
+    """Half its width is 0.4 pixels, so it covers a
+    center only where it is moved by half a pixel."""
+    assert not reach_pixels(square_across_the_view(1.0, 0.4)).any()
+    assert reach_pixels(square_across_the_view(1.0, 0.4, center=(0.5, 0.5))).all()
+    assert reach_pixels(square_across_the_view(1.0, 0.49)).all(), (
+        "it may be rounded to where it is shown"
+    )
 
 
-def test_what_is_out_of_the_picture_is_left_out_and_what_is_at_the_eye_is_kept():
-    beside = square(1.0, 8, center=(PICTURE_SIZE, 0))
-    behind = square(1.0, 8) * [1, 1, -1]
+def test_a_square_outside_the_picture_is_left_out_and_one_behind_the_eye_is_kept():
+    beside = square_across_the_view(1.0, 8, center=(PICTURE_SIZE, 0))
+    behind = square_across_the_view(1.0, 8) * [1, 1, -1]
     assert reach_pixels(np.concatenate([beside, behind])).tolist() == [False] * 2 + [True] * 2
 
 
-def test_the_front_camera_s_frame():
+def test_the_front_camera_s_matrix_puts_its_target_straight_ahead():
     matrix = to_front_camera(sapien.Pose())
     far = np.linalg.norm(np.subtract(FRONT_TARGET, FRONT_EYE))
 

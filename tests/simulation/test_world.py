@@ -24,7 +24,8 @@ def world_of(task: str, index: int = 3, *, visible: bool = False) -> World:
     return World(episode.scene, visible=visible)
 
 
-def test_calls_that_may_hang_are_reported_while_they_run(monkeypatch):
+def test_physics_and_drawing_report_when_they_begin_and_end(monkeypatch):
+    """A driver may hang in them; a listener gets (code, time of begin, or 0 at the end)."""
     calls: list[tuple[str, float]] = []
     world = world_of("PickXtimes", visible=True)
     monkeypatch.setattr(waiting, "_native_listeners", [lambda *call: calls.append(call)])
@@ -38,7 +39,8 @@ def test_calls_that_may_hang_are_reported_while_they_run(monkeypatch):
     ]
 
 
-def test_objects_rest_where_and_weigh_what_the_facts_say():
+def test_cubes_and_buttons_rest_where_and_weigh_what_robomme_s_do():
+    """Heights in meters, masses in kilograms."""
     world = rest(world_of("PickXtimes"), 40)
     cube = world.bodies["cube_red"]
     button = world.bodies["button"]
@@ -52,6 +54,7 @@ def test_objects_rest_where_and_weigh_what_the_facts_say():
 
 
 def test_containers_appear_over_their_cubes_after_32_steps():
+    """Until then they are parked 10 m high."""
     world = world_of("VideoUnmask")
     rest(world, 32)
     assert all(
@@ -74,7 +77,8 @@ def world_scene(world: World) -> Scene:
     return Scene(tuple(body.item for body in world.bodies.values()))
 
 
-def test_a_released_motion_leaves_the_object_alone():
+def test_a_container_that_has_appeared_falls_when_it_is_let_go():
+    """`Away` keeps it parked at first, and must leave it to physics afterward."""
     episode = get_episode("VideoUnmask", "test", 0)
     moved = World(episode.scene, visible=False)
     rest(moved, 40)
@@ -87,7 +91,7 @@ def test_a_released_motion_leaves_the_object_alone():
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_worlds_repeat_themselves_bit_for_bit(task):
+def test_a_world_repeats_itself_bit_for_bit_even_next_to_another_one(task):
     rng = np.random.default_rng(0)
     actions = physics_settings.HOME_ACTION + np.append(
         rng.normal(0, 0.2, (40, 7)), np.zeros((40, 1)), 1
@@ -123,7 +127,8 @@ def test_the_gripper_opens_and_closes():
     assert world.robot.finger_positions == pytest.approx([0.04, 0.04], abs=1e-3)
 
 
-def test_a_moving_arm_is_not_still():
+def test_the_robot_is_not_still_while_its_arm_moves():
+    """The base joint turns by 0.3 rad, which takes less than 40 steps."""
     world = world_of("PickXtimes")
     action = physics_settings.HOME_ACTION.copy()
     action[0] += 0.3
@@ -136,7 +141,7 @@ def test_a_moving_arm_is_not_still():
     assert Fact("still", "robot") in world.facts
 
 
-def test_pictures_of_an_invisible_world_are_refused():
+def test_a_world_without_rendering_or_an_unknown_camera_gives_no_picture():
     with pytest.raises(InvalidValueError, match="without pictures"):
         world_of("PickXtimes").picture("front")
     with pytest.raises(InvalidValueError, match="no camera 'side'"):

@@ -30,14 +30,15 @@ def scenes(task, difficulty):
     return list(drawn_scenes(task, difficulty, range(SEEDS)))
 
 
-def of_color(scene, color):
+def cubes_of_color(scene, color):
     return [cube for cube in scene.of_kind("cube") if cube.color == color]
 
 
 each_difficulty = pytest.mark.parametrize("difficulty", DIFFICULTIES)
 
 
-def test_a_bin_without_a_place_rejects_the_seed():
+def test_a_scene_without_room_for_the_bin_is_rejected():
+    """The whole region of 0.1 m is taken by a square of 1 m."""
     with pytest.raises(SceneRejectedError, match="no place for bin"):
         draw_bin(np.random.default_rng(0), Region(0, 0, 0.1, 0.1), [Rectangle(0, 0, 1, 1)])
 
@@ -46,6 +47,7 @@ def test_a_bin_without_a_place_rejects_the_seed():
 
 
 def test_bin_fill_keeps_the_bin_off_the_button(monkeypatch):
+    """In the real regions the two hardly ever meet; here they would in every second draw."""
     # In the real regions the two hardly ever meet; here they would in every second draw.
     monkeypatch.setattr(bin_fill, "BUTTON_REGION", Region(-0.15, 0.0, 0.0, 0.0))
     monkeypatch.setattr(bin_fill, "BIN_REGION", Region(-0.05, 0.0, 0.03, 0.03))
@@ -54,9 +56,9 @@ def test_bin_fill_keeps_the_bin_off_the_button(monkeypatch):
         assert not overlap(footprint(scene["bin"]), footprint(scene["button"]))
 
 
-def test_bin_fill_goals_are_all_that_can_be_put_in():
+def test_bin_fill_has_a_goal_for_each_choice_of_one_to_five_cubes():
     scene, _ = scenes("BinFill", "hard")[0]
-    there = {c: len(of_color(scene, c)) for c in ("red", "blue", "green")}
+    there = {c: len(cubes_of_color(scene, c)) for c in ("red", "blue", "green")}
 
     possible = [
         counts
@@ -68,7 +70,8 @@ def test_bin_fill_goals_are_all_that_can_be_put_in():
     assert all(min(goal.numbers("counts")) >= 1 for goal in bin_fill.goals(scene))
 
 
-def test_bin_fill_subgoals_count_within_a_color():
+def test_bin_fill_subgoals_number_the_cubes_of_each_color_separately():
+    """The order of the colors is that of the goal, unless the scene has an order of its own."""
     scene, _ = scenes("BinFill", "hard")[0]
     goal = next(g for g in bin_fill.goals(scene) if g.numbers("counts") == (2, 1))
     first, second = goal.texts("colors")
@@ -84,6 +87,7 @@ def test_bin_fill_subgoals_count_within_a_color():
         "press the button {at}",
     ]
 
+    # The scene's own order takes the second color first.
     turned = bin_fill.stages(replace(scene, color_order=(second,)), goal)
     assert [stage.subgoal for stage in turned[::2]] == [
         f"pick up the first {second} cube {{at}}",
@@ -98,6 +102,7 @@ def test_bin_fill_subgoals_count_within_a_color():
 
 @each_difficulty
 def test_swing_stages_go_right_then_left_with_the_goals_cube(difficulty):
+    """A pick, both sides for each repetition, a put-down and a press: 2 × repeats + 3 stages."""
     for scene, _ in scenes("SwingXtimes", difficulty)[:50]:
         for goal in swing_x_times.TASK.goals(scene):
             stages = swing_x_times.stages(scene, goal)
@@ -147,11 +152,13 @@ def test_stop_cube_ignores_the_difficulty():
         (120, 5, (100, 200, 300, 400, 500, 510)),
     ],
 )
-def test_stop_cube_waits_until_it_is_time_to_press(interval, visit, expected):
+def test_stop_cube_waits_in_steps_of_100_until_30_steps_before_the_visit(interval, visit, expected):
+    """The middle of a visit is at interval × (visit − ½); the last number is 30 steps before."""
     assert stop_cube.checkpoints(interval, visit) == expected
 
 
 def test_stop_cube_stages_hover_wait_and_press():
+    """The hand goes over the button, waits until it is time, and presses."""
     for scene, _ in scenes("StopCube", "easy")[:50]:
         (run,) = scene.motions
         for goal in stop_cube.goals(scene):

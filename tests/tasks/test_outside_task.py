@@ -25,7 +25,7 @@ from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.splits import get_episode, make_episode
 
 PAGE = (Path(__file__).parents[2] / "docs" / "add-task.md").read_text()
-NAME = "PlaceAndPress"
+OUTSIDE_TASK = "PlaceAndPress"
 
 
 @pytest.fixture
@@ -52,38 +52,41 @@ def task(tmp_path, monkeypatch):
         cache.cache_clear()
 
 
-def test_it_is_found_beside_the_benchmark(task):
-    assert tasks.get_task(NAME) is task
-    assert tasks.find_tasks([NAME]) == tasks.find_tasks([task.suite]) == (NAME,)
-    assert NAME not in tasks.find_tasks(["all"])
+def test_a_task_of_another_package_is_found_by_name_but_is_not_part_of_all(task):
+    """The task is the documentation's, "PlaceAndPress", as if its package were installed."""
+    assert tasks.get_task(OUTSIDE_TASK) is task
+    assert tasks.find_tasks([OUTSIDE_TASK]) == tasks.find_tasks([task.suite]) == (OUTSIDE_TASK,)
+    assert OUTSIDE_TASK not in tasks.find_tasks(["all"])
     assert plain_settings(task) == ("explicit", "direct", "reasoning", "contextual")
     assert set(settings_of(task)) - set(plain_settings(task)) == {"direct-rival", "grounded"}
 
 
-def test_its_scenes_fit_and_its_instructions_mean_their_goal(task):
+def test_a_task_of_another_package_has_scenes_and_instructions_that_mean_its_goals(task):
     for seed in range(15):
         for difficulty in ("easy", "medium", "hard"):
-            make_episode(NAME, seed, difficulty)
+            make_episode(OUTSIDE_TASK, seed, difficulty)
     for index in range(8):
-        episode = get_episode(NAME, "test", index)
+        episode = get_episode(OUTSIDE_TASK, "test", index)
         for options in expressible_options(episode):
             said = instruct_with(episode, options)
             assert understood_goals(said, episode) == (episode.goal,), said.text
 
 
-def test_a_run_of_a_task_without_words_is_refused(task, monkeypatch):
+def test_planning_a_run_of_a_task_without_a_file_of_words_is_refused(task, monkeypatch):
     read = scenario_file.task_scenarios.__wrapped__
     # Undone before the fixture puts the registry back.
     with monkeypatch.context() as patch:
         patch.setattr(tasks, "_registry", lambda: (replace(task, words=""),))
         patch.setattr(scenario_file, "task_scenarios", read)
         tasks.all_tasks.cache_clear()
-        with pytest.raises(RoboIRGError, match=rf"{NAME} names no file of words \(write one, see"):
-            make_plan(["random"], tasks=NAME, episodes="1")
+        with pytest.raises(
+            RoboIRGError, match=rf"{OUTSIDE_TASK} names no file of words \(write one, see"
+        ):
+            make_plan(["random"], tasks=OUTSIDE_TASK, episodes="1")
 
 
-def test_its_causes_say_what_was_done_and_what_was_expected(task):
-    episode = get_episode(NAME, "test", 2)
+def test_a_failure_in_a_task_of_another_package_has_a_readable_cause(task):
+    episode = get_episode(OUTSIDE_TASK, "test", 2)
     color = episode.goal.text("color")
 
     judge = Judge(episode.stages, episode.scene)
@@ -94,8 +97,8 @@ def test_its_causes_say_what_was_done_and_what_was_expected(task):
 
 @pytest.mark.sim
 @pytest.mark.parametrize("policy", ["oracle", "listener"])
-def test_built_in_policies_solve_a_task_from_outside(task, policy):
-    env = roboirg.make(NAME, setting="contextual", episode=1, cameras=())
+def test_built_in_policies_solve_a_task_of_another_package(task, policy):
+    env = roboirg.make(OUTSIDE_TASK, setting="contextual", episode=1, cameras=())
     assert play(env, make_policy(policy, 0))["status"] == "success"
 
 
@@ -110,7 +113,8 @@ def test_built_in_policies_solve_a_task_from_outside(task, policy):
         (Fact("lift", "cube_red"), "There is no kind of fact 'lift'"),
     ],
 )
-def test_a_fact_that_can_never_hold_is_refused(task, monkeypatch, fact, sentence):
+def test_a_stage_that_expects_an_impossible_fact_is_refused(task, monkeypatch, fact, sentence):
+    """A fact is a kind, a subject and perhaps a place, and a task can name wrong ones."""
     scene = Scene(
         (
             SceneObject("button", "button", (-0.1, 0.1, 0.0)),
@@ -126,4 +130,4 @@ def test_a_fact_that_can_never_hold_is_refused(task, monkeypatch, fact, sentence
     monkeypatch.setattr(splits, "get_task", lambda _name: made)
 
     with pytest.raises(RoboIRGError, match=re.escape(sentence)):
-        splits.make_episode(NAME, 0, "easy")
+        splits.make_episode(OUTSIDE_TASK, 0, "easy")

@@ -40,34 +40,36 @@ def swaps(episode):
     return episode.scene.motions_of(Swap)
 
 
-def apart(first, second):
+def distance(first, second):
     return math.hypot(first.x - second.x, first.y - second.y)
 
 
-def test_shape_and_swaps_and_picks_do_not_tell_each_other():
+def test_layout_number_of_swaps_and_number_of_picks_are_independent():
+    """Two values each, so eight combinations, none of them rare."""
     found = Counter()
     for episode in episodes("VideoUnmaskSwap", "easy"):
         points = layout_points(np.random.default_rng(episode.seed), 3)
         line = min(math.hypot(*point) for point in points) < 1e-9
         found[line, len(swaps(episode)), len(episode.goal.texts("colors"))] += 1
 
-    assert len(found) == 8
+    assert len(found) == 8  # 2 layouts, 2 numbers of swaps, 2 numbers of picks
     assert min(found.values()) > 0.06 * len(SEEDS)
 
 
 @each_swap_task
 @each_difficulty
-def test_swaps_follow_each_other_with_the_nearest_partner(task, difficulty):
+def test_each_swap_exchanges_a_container_with_its_nearest_neighbor(task, difficulty):
+    """Swaps begin at steps 64, 114 and 164 and take 50 steps each."""
     for episode in episodes(task, difficulty):
         places = {container.name: container.position for container in containers(episode)}
         plan = swaps(episode)
         assert [swap.start for swap in plan] == [64, 114, 164][: len(plan)]
         for swap in plan:
             first = places.pop(swap.first)
-            nearest = min(apart(first, place) for place in places.values())
+            nearest = min(distance(first, place) for place in places.values())
             second = places.pop(swap.second)
             assert (swap.steps, swap.lane, swap.stage) == (50, 0.07, None)
-            assert apart(first, second) == nearest
+            assert distance(first, second) == nearest
             assert set(swap.pinned) == set(places)
             places[swap.first] = second
             places[swap.second] = first
@@ -83,7 +85,8 @@ def final_places(episode):
 
 @each_swap_task
 @each_difficulty
-def test_where_the_cube_was_is_a_bad_guess(task, difficulty):
+def test_in_half_to_three_quarters_of_episodes_the_hidden_cube_ends_up_elsewhere(task, difficulty):
+    """Whoever lifts the container at the cube's first place must mostly fail."""
     moved = [
         final_places(episode)[cube.inside] != cube.inside
         for episode in episodes(task, difficulty)
@@ -95,6 +98,7 @@ def test_where_the_cube_was_is_a_bad_guess(task, difficulty):
 
 @each_task
 def test_subgoals_name_presses_and_containers_in_order(task):
+    """A subgoal is the text of a step; `{at}` stands for a point in the picture."""
     presses = {
         "ButtonUnmask": [("press the button {at}", "button")],
         "ButtonUnmaskSwap": [
@@ -119,6 +123,7 @@ def test_subgoals_name_presses_and_containers_in_order(task):
 
 
 def test_scenes_with_fewer_than_three_containers_are_rejected():
+    """Two of the four places of containers are drawn, so two containers are placed."""
     rng = np.random.default_rng(0)
     placed = unmask_swap.draw_containers_about(rng, [FOUR[0], FOUR[1]])
 

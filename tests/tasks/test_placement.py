@@ -19,15 +19,17 @@ from roboirg.core.footprints import (
 )
 from roboirg.tasks.shared.fixtures import cube_obstacle, footprint
 
-coordinates = st.floats(-0.3, 0.3)
+meters_from_the_middle = st.floats(-0.3, 0.3)
 sizes = st.floats(0.01, 0.15)
 angles = st.floats(-math.pi, math.pi)
-rectangles = st.builds(Rectangle, coordinates, coordinates, sizes, sizes, angles)
-circles = st.builds(Circle, coordinates, coordinates, sizes)
+rectangles = st.builds(
+    Rectangle, meters_from_the_middle, meters_from_the_middle, sizes, sizes, angles
+)
+circles = st.builds(Circle, meters_from_the_middle, meters_from_the_middle, sizes)
 footprints = st.one_of(rectangles, circles)
 
 
-def outline(shape: Rectangle | Circle, inside: float) -> np.ndarray:
+def points_all_over(shape: Rectangle | Circle, inside: float) -> np.ndarray:
     """Points all over a shape shrunk (inside > 0) or grown (inside < 0) by some meters."""
     if isinstance(shape, Circle):
         angle, share = np.meshgrid(np.linspace(0, 2 * math.pi, 120), np.linspace(0, 1, 15))
@@ -44,7 +46,7 @@ def outline(shape: Rectangle | Circle, inside: float) -> np.ndarray:
     return np.stack([shape.x + right.ravel(), shape.y + ahead.ravel()])
 
 
-def contains(shape: Rectangle | Circle, points: np.ndarray, inside: float) -> bool:
+def contains_a_point(shape: Rectangle | Circle, points: np.ndarray, inside: float) -> bool:
     if isinstance(shape, Circle):
         radius = shape.radius - inside
         distance = np.hypot(points[0] - shape.x, points[1] - shape.y)
@@ -57,16 +59,18 @@ def contains(shape: Rectangle | Circle, points: np.ndarray, inside: float) -> bo
 @settings(max_examples=40)
 @given(footprints, footprints)
 def test_shapes_that_share_points_overlap(first, second):
-    if contains(second, outline(first, 1e-6), 1e-6):
+    """Compares with points sampled all over the first shape."""
+    if contains_a_point(second, points_all_over(first, 1e-6), 1e-6):
         assert overlap(first, second)
 
 
 @settings(max_examples=40)
 @given(footprints, footprints)
 def test_shapes_far_from_sharing_points_do_not_overlap(first, second):
+    """Compares with points sampled all over the first shape."""
     # The sampled points of the one are at most 1 cm apart, so growing both by that misses nothing.
     grown = -0.01
-    if not contains(second, outline(first, grown), grown):
+    if not contains_a_point(second, points_all_over(first, grown), grown):
         assert not overlap(first, second)
 
 
@@ -77,8 +81,9 @@ def test_overlap_is_symmetric(first, second):
 
 
 @settings(max_examples=40)
-@given(rectangles, st.floats(0.001, 0.05), coordinates, coordinates)
-def test_growing_brings_an_edge_nearer_by_as_much(rectangle, by, x, y):
+@given(rectangles, st.floats(0.001, 0.05), meters_from_the_middle, meters_from_the_middle)
+def test_growing_a_rectangle_brings_its_edge_nearer_by_that_much(rectangle, by, x, y):
+    """At a corner the distance falls by up to the diagonal, √2 times as much."""
     before = distance_to(rectangle, x, y)
     after = distance_to(rectangle.grown(by), x, y)
 
@@ -87,13 +92,15 @@ def test_growing_brings_an_edge_nearer_by_as_much(rectangle, by, x, y):
 
 
 def test_touching_counts_as_overlap():
+    """Rectangles are (x, y, half width, half depth), circles (x, y, radius)."""
     assert overlap(Rectangle(0, 0, 1, 1), Rectangle(2, 0, 1, 1))
     assert overlap(Circle(0, 0, 1), Circle(2, 0, 1))
     assert overlap(Circle(0, 0, 1), Rectangle(2, 0, 1, 1))
     assert not overlap(Rectangle(0, 0, 1, 1), Rectangle(2.001, 0, 1, 1))
 
 
-def test_a_line_is_as_long_as_it_is_and_has_no_breadth():
+def test_overlaps_of_a_line_without_breadth():
+    """The line runs from (-1, 0) to (1, 0)."""
     line = Line(0, 0, 1, 0)
     assert overlap(Circle(0, 0.5, 0.5), line)
     assert not overlap(Circle(0, 0.501, 0.5), line)
@@ -104,7 +111,9 @@ def test_a_line_is_as_long_as_it_is_and_has_no_breadth():
     assert not overlap(Rectangle(0, 1.001, 1, 1), line)
 
 
-def test_a_turned_square_is_not_seen_to_be_clear_across_a_line():
+def test_a_turned_square_next_to_a_line_is_reported_as_overlapping_it():
+    """Its nearest corner is 0.1 away, but its sides' projections meet those of the line.
+    RoboMME tests it in this way, so we do; a rectangle without breadth is tested exactly."""
     # Its nearest corner is 0.1 away, but its sides' projections meet those of the line.
     beside = Rectangle(0, 0.1 + math.sqrt(2), 1, 1, math.pi / 4)
     assert not overlap(beside, Rectangle(0, 0, 1, 0))
@@ -122,11 +131,13 @@ cubes = st.builds(
 @settings(max_examples=40)
 @given(cubes, cubes)
 def test_cubes_never_overlap_although_some_count_as_lines(first, second):
+    """Half of the cubes keep others away like a line only, as in RoboMME."""
     if not overlap(footprint(second).grown(0.02), cube_obstacle(first)):
         assert not overlap(footprint(second).grown(-1e-9), footprint(first))
 
 
-def test_half_of_the_cubes_count_as_lines_in_either_direction():
+def test_half_of_the_cubes_keep_others_away_like_a_line_in_either_direction():
+    """RoboMME mistakes half of all cubes for lines; which half depends on the angle."""
     yaws = 2 * math.pi * np.random.default_rng(0).random(4000)
     found = [cube_obstacle(SceneObject("cube", "cube", Point(0, 0, 0.02), yaw)) for yaw in yaws]
 
@@ -139,7 +150,7 @@ def test_half_of_the_cubes_count_as_lines_in_either_direction():
 
 
 @pytest.mark.parametrize("free_after", [0, 5, MAX_DRAWS - 1])
-def test_place_takes_the_first_free_draw(free_after):
+def test_place_returns_the_first_draw_that_does_not_overlap(free_after):
     draws = iter(range(10_000))
     blocked = Circle(0, 0, 1)
 
@@ -150,7 +161,7 @@ def test_place_takes_the_first_free_draw(free_after):
     assert placed == free_after
 
 
-def test_place_gives_up_after_its_draws():
+def test_place_gives_up_after_the_maximum_number_of_draws():
     draws = iter(range(10_000))
     assert place(lambda: next(draws), lambda _: Circle(0, 0, 1), [Circle(0, 0, 1)]) is None
     assert next(draws) == MAX_DRAWS

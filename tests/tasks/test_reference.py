@@ -37,7 +37,7 @@ def scenes(task, difficulty):
     return [scene for scene, _ in drawn(task, difficulty)]
 
 
-def shown(stages):
+def primitives_of(stages):
     """Each stage's primitive in short, with its place if it has one."""
     found = []
     for stage in stages:
@@ -48,7 +48,8 @@ def shown(stages):
 
 @every_task
 @every_difficulty
-def test_videos_forbid_nothing_and_show_what_the_past_says(task, difficulty):
+def test_a_video_shows_the_facts_of_the_past_in_order_and_can_never_fail(task, difficulty):
+    """The past of a scene is what the video shows, and what a goal may refer to."""
     for scene in scenes(task, difficulty):
         stages = task.demonstration(scene)
         assert not any(stage.forbids for stage in stages)
@@ -65,13 +66,13 @@ def test_videos_forbid_nothing_and_show_what_the_past_says(task, difficulty):
 # VideoRepick
 
 
-def test_a_repick_has_a_cycle_for_each_repeat_and_a_press():
+def test_a_repick_is_a_pick_and_a_put_down_for_each_repetition_then_a_press():
     scene, _ = drawn(VIDEO_REPICK, "hard")[0]
     target = scene.past[0].subject
     stages = VIDEO_REPICK.stages(scene, Goal.of(repeats=2))
     cycle = [("pick_cube", target), ("put_down", target)]
 
-    assert shown(stages) == [*cycle, *cycle, ("press", "button")]
+    assert primitives_of(stages) == [*cycle, *cycle, ("press", "button")]
     assert [stage.primitive.height for stage in stages[1:4:2]] == [0.01, 0.01]
     assert [stage.timer for stage in stages] == ["pick", "put down", "pick", "put down", None]
     assert [stage.subgoal for stage in stages] == [
@@ -87,7 +88,8 @@ def test_a_repick_has_a_cycle_for_each_repeat_and_a_press():
 
 
 @every_place_task
-def test_place_swaps_any_two_discs_in_the_last_hold(task):
+def test_hard_place_scenes_swap_any_two_of_four_discs_while_the_robot_waits(task):
+    """12 are all ordered pairs of four discs."""
     pairs = set()
     for scene in scenes(task, "hard"):
         (swap,) = scene.motions
@@ -98,7 +100,8 @@ def test_place_swaps_any_two_discs_in_the_last_hold(task):
     assert len(pairs) == 12
 
 
-def test_each_goal_of_place_button_takes_a_cube_to_a_disc():
+def test_each_goal_of_place_button_moves_a_cube_to_the_disc_before_or_after_the_press():
+    """Three colors, each before or after the press: six goals."""
     scene, _ = drawn(VIDEO_PLACE_BUTTON, "hard")[0]
     goals = VIDEO_PLACE_BUTTON.goals(scene)
     assert len(goals) == 6
@@ -107,11 +110,13 @@ def test_each_goal_of_place_button_takes_a_cube_to_a_disc():
         cube = f"cube_{goal.text('color')}"
         answer = {"before": "target_0", "after": "target_1"}[goal.text("relation")]
         stages = VIDEO_PLACE_BUTTON.stages(scene, goal)
-        assert shown(stages) == [("pick_cube", cube), ("place_on", cube, answer)]
+        assert primitives_of(stages) == [("pick_cube", cube), ("place_on", cube, answer)]
 
 
 @every_place_task
-def test_crowded_seeds_are_rejected(task):
+def test_seeds_without_room_for_all_targets_are_rejected_but_not_too_many(task):
+    """About 35 and 75 of 100: few enough for the 30 seeds that an episode may try."""
+
     def rejected(seed):
         try:
             task.sample(np.random.default_rng(seed), "medium")

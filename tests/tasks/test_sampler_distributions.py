@@ -51,7 +51,7 @@ RESOLUTION = 1e-6
 
 
 @functools.cache
-def published(task, difficulty):
+def published_scenes(task, difficulty):
     """Scene and goal of all published episodes."""
     found = (
         published_episode(task, split, index) for split in SPLITS for index in range(MOST_EPISODES)
@@ -62,7 +62,7 @@ def published(task, difficulty):
 
 
 @functools.cache
-def sampled(task, difficulty):
+def our_scenes(task, difficulty):
     """Scene and goal of the first seeds that give one."""
     seeds = itertools.count(FIRST_SEED)
     return list(itertools.islice(drawn_scenes(task, difficulty, seeds), SAMPLED))
@@ -77,7 +77,7 @@ def distances(first, second):
     ]
 
 
-def measures(scene, goal):
+def quantities(scene, goal):
     """Quantities of a scene: places and spreads of each kind, gaps between kinds, times."""
     found = {}
     for kind in KINDS:
@@ -179,9 +179,9 @@ def labels_of_swaps(scene, wanted, cubes):
 
 def p_values(task, difficulty, ours):
     """A p-value for every measure and label that is not the same in all scenes."""
-    theirs = published(task, difficulty)
+    theirs = published_scenes(task, difficulty)
     found = {}
-    for traits, p_value in ((measures, same_distribution), (labels, same_shares)):
+    for traits, p_value in ((quantities, same_distribution), (labels, same_shares)):
         our_values = values_by_trait(traits, ours)
         their_values = values_by_trait(traits, theirs)
         for key in our_values.keys() | their_values.keys():
@@ -222,7 +222,7 @@ def same_shares(first, second):
     return None if filled.shape[1] == 1 else chi2_contingency(filled).pvalue
 
 
-def differing(task, difficulty, ours):
+def significant_differences(task, difficulty, ours):
     """What differs significantly between these scenes and the published ones."""
     found = p_values(task, difficulty, ours)
     share = FAMILY_SIZE / (len(TASKS) * len(DIFFICULTIES) * len(found))
@@ -233,21 +233,26 @@ def differing(task, difficulty, ours):
 @pytest.mark.parametrize("difficulty", DIFFICULTIES)
 @pytest.mark.parametrize("task", TASKS)
 def test_random_scenes_are_distributed_as_published_ones(task, difficulty):
-    assert not differing(task, difficulty, sampled(task, difficulty))
+    """Each task and difficulty is compared in all quantities and traits of its scenes."""
+    assert not significant_differences(task, difficulty, our_scenes(task, difficulty))
 
 
 # A wrong sampler is found out
 
 
-def test_gaps_around_whole_squares_are_found_out(monkeypatch):
+def test_a_wrong_distance_between_cubes_is_detected_by_the_comparison(monkeypatch):
+    """A check of the check: with gaps around whole cubes, the nearest ones stand farther apart."""
     monkeypatch.setattr(fixtures, "cube_obstacle", footprint)
-    draw_anew = sampled.__wrapped__
-    assert "nearest cubes" in differing("BinFill", "hard", draw_anew("BinFill", "hard"))
+    draw_anew = our_scenes.__wrapped__
+    assert "nearest cubes" in significant_differences(
+        "BinFill", "hard", draw_anew("BinFill", "hard")
+    )
 
 
-def test_a_goal_that_is_never_drawn_is_found_out():
+def test_a_number_that_is_never_drawn_is_detected_by_the_comparison():
+    """A check of the check: three repetitions are replaced by two."""
     fewer = [
         (scene, Goal.of(color=goal["color"], repeats=min(goal["repeats"], 2)))
-        for scene, goal in sampled("PickXtimes", "easy")
+        for scene, goal in our_scenes("PickXtimes", "easy")
     ]
-    assert "repeats 0" in differing("PickXtimes", "easy", fewer)
+    assert "repeats 0" in significant_differences("PickXtimes", "easy", fewer)

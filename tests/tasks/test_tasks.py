@@ -55,7 +55,9 @@ REACH = 0.85
 0.855; the farthest corner of all regions in which things are placed is 0.815 away."""
 
 # Front camera, RoboMME: world to camera, OpenCV convention, and 90 degrees over 256 pixels.
-FRONT = np.array([[0, 1, 0, 0], [0.89443, 0, -0.44721, -0.08944], [-0.44721, 0, -0.89443, 0.49194]])
+FRONT_CAMERA = np.array(
+    [[0, 1, 0, 0], [0.89443, 0, -0.44721, -0.08944], [-0.44721, 0, -0.89443, 0.49194]]
+)
 FOCAL = CENTER = 128
 
 each_task = pytest.mark.parametrize("task", TASKS)
@@ -68,22 +70,25 @@ def episodes(task):
 
 
 @functools.cache
-def valid(task, difficulty, count=1):
+def first_episodes(task, difficulty, count=1):
     """The episodes of the first seeds that give a scene."""
     return tuple(itertools.islice(drawn_episodes(task, difficulty), count))
 
 
 def test_the_registry_holds_each_task_once_in_the_order_of_its_code():
-    told = [(task.code, task.name, task.suite, task.spatial) for task in every_task().values()]
-    assert told == REGISTERED
-    assert tuple(every_task()) == tuple(name for _, name, *_ in told)
+    """Also: only tasks with words for sides have the setting *spatial*."""
+    registered = [
+        (task.code, task.name, task.suite, task.spatial) for task in every_task().values()
+    ]
+    assert registered == REGISTERED
+    assert tuple(every_task()) == tuple(name for _, name, *_ in registered)
     for name, task in every_task().items():
         sides = ("spatial",) if task.spatial else ()
         assert plain_settings(task)[:4] == ("explicit", "direct", "reasoning", "contextual"), name
         assert plain_settings(task)[4:] == sides, name
 
 
-OTHER_GOALS = {
+NUMBERS_OF_OTHER_GOALS = {
     "PickXtimes": [0, 2, 2], "StopCube": [3, 3, 3], "SwingXtimes": [2, 8, 8],
     "BinFill": [0, 1, 7], "VideoUnmaskSwap": [5, 2, 5], "VideoUnmask": [2, 2, 5],
     "ButtonUnmaskSwap": [5, 2, 5], "ButtonUnmask": [2, 2, 5], "VideoRepick": [0, 0, 0],
@@ -94,15 +99,18 @@ OTHER_GOALS = {
 
 
 @each_task
-def test_other_goals_take_as_many_picks_and_are_not_on_the_way(task):
+def test_the_number_of_goals_that_can_replace_that_of_an_episode_is_stable(task):
+    """Control runs command another goal of the same scene, which needs
+    as many picks and is not reached on the way to the right one."""
     episodes = [get_episode(task, "test", index) for index in (0, 2, 3)]
-    assert [len(other_goals(episode)) for episode in episodes] == OTHER_GOALS[task]
+    assert [len(other_goals(episode)) for episode in episodes] == NUMBERS_OF_OTHER_GOALS[task]
 
 
 @each_task
 @pytest.mark.parametrize("difficulty", DIFFICULTIES)
 def test_same_seed_same_episode_other_seed_other_scene(task, difficulty):
-    first, second = valid(task, difficulty, 2)
+    """Two seeds that give a scene, and the first one made again."""
+    first, second = first_episodes(task, difficulty, 2)
     again = make_episode(task, first.seed, difficulty)
 
     assert again == first
@@ -111,7 +119,7 @@ def test_same_seed_same_episode_other_seed_other_scene(task, difficulty):
 
 
 @each_task
-def test_goal_is_one_of_the_scenes_goals_and_goals_differ(task):
+def test_the_goal_of_an_episode_is_one_of_several_different_goals_of_its_scene(task):
     for episode in episodes(task):
         goals = get_task(task).goals(episode.scene)
         assert episode.goal in goals
@@ -119,9 +127,9 @@ def test_goal_is_one_of_the_scenes_goals_and_goals_differ(task):
 
 
 @each_task
-def test_every_goal_has_stages(task):
+def test_every_goal_of_a_scene_has_a_plan_of_its_own(task):
     for difficulty in DIFFICULTIES:
-        (episode,) = valid(task, difficulty)
+        (episode,) = first_episodes(task, difficulty)
         goals = get_task(task).goals(episode.scene)
         plans = [get_task(task).stages(episode.scene, goal) for goal in goals]
         assert all(plans)
@@ -142,7 +150,7 @@ def names_moved(motion):
 
 
 @each_task
-def test_stages_and_motions_speak_of_things_that_exist(task):
+def test_stages_and_motions_name_only_objects_of_the_scene(task):
     for episode in episodes(task):
         objects = {item.name for item in episode.scene.objects}
         assert len(objects) == len(episode.scene.objects)
@@ -160,14 +168,14 @@ def test_stages_and_motions_speak_of_things_that_exist(task):
         assert bool(episode.scene.past) <= bool(episode.demonstration)
 
 
-def solids(scene):
+def solid_areas(scene):
     """The areas that nothing else may stand on."""
     footprints = dict.fromkeys(("cube", "container", "bin", "button", "box"), footprint)
     footprints["tape"] = lambda tape: Circle(*tape.position[:2], object_sizes.TAPE_RADIUS)
     return [footprints[item.kind](item) for item in scene.objects if item.kind in footprints]
 
 
-def discs(scene, *kinds):
+def disc_areas(scene, *kinds):
     """Targets or sites, but for the one over which a shuttle runs: its place is free."""
     if scene.of_kind("shuttle"):
         return []
@@ -180,24 +188,27 @@ def discs(scene, *kinds):
 
 @each_task
 def test_things_on_the_table_do_not_touch(task):
+    """Solid things and targets keep apart, and targets and sites; a cube may lie on a site."""
     for episode in episodes(task):
         # Cubes may lie where the video puts one back, as in RoboMME.
         for areas in (
-            [*solids(episode.scene), *discs(episode.scene, "target")],
-            discs(episode.scene, "target", "site"),
+            [*solid_areas(episode.scene), *disc_areas(episode.scene, "target")],
+            disc_areas(episode.scene, "target", "site"),
         ):
             assert not any(overlap(*pair) for pair in itertools.combinations(areas, 2)), episode.key
 
 
 @each_task
 def test_hidden_cubes_are_in_the_middle_of_their_containers(task):
+    """So that a cube is under the container that the video shows over it."""
     for episode in episodes(task):
         for cube in episode.scene.of_kind("hidden_cube"):
             assert cube.position[:2] == episode.scene[cube.inside].position[:2]
 
 
 @each_task
-def test_everything_lies_on_the_table_and_what_is_handled_within_reach(task):
+def test_objects_lie_on_the_table_and_those_to_handle_are_within_reach(task):
+    """`REACH` is 0.85 m from the robot's base, in the plane."""
     for episode in episodes(task):
         for item in episode.scene.objects:
             heights = HEIGHTS[item.kind]
@@ -211,10 +222,11 @@ def test_everything_lies_on_the_table_and_what_is_handled_within_reach(task):
 
 
 @each_task
-def test_everything_is_in_the_front_picture(task):
+def test_the_front_camera_s_picture_contains_every_object(task):
+    """Projects each object's origin to pixels (u, v) of the picture, 256 by 256."""
     for episode in episodes(task):
         for item in episode.scene.objects:
-            right, down, ahead = FRONT @ (*item.position, 1)
+            right, down, ahead = FRONT_CAMERA @ (*item.position, 1)
             u = CENTER + FOCAL * right / ahead
             v = CENTER + FOCAL * down / ahead
             assert ahead > 0

@@ -15,7 +15,7 @@ from roboirg_learn.policy.joint_chunks import JointChunks
 from roboirg_learn.policy.learned_policy import LearnedPolicy
 
 
-class Rehearsed(LearnedPolicy):
+class PolicyWithFixedWaypoints(LearnedPolicy):
     """Returns waypoints in order, and keeps what it sees."""
 
     def __init__(self, waypoints):
@@ -37,7 +37,7 @@ class Rehearsed(LearnedPolicy):
         return self.left.pop(0)
 
 
-class Guided(Rehearsed):
+class PolicyGuidedByExpert(PolicyWithFixedWaypoints):
     """Returns the expert's waypoints, to be rehearsed."""
 
     def __init__(self):
@@ -58,10 +58,11 @@ class Guided(Rehearsed):
 
 
 @pytest.mark.sim
-def test_in_joint_angles_a_policy_sees_and_does_what_it_does_in_waypoints():
+def test_a_waypoint_policy_run_in_joint_angles_does_the_same():
+    """`JointChunks` turns each waypoint (a pose to move to) into a chunk of joint angles."""
     episode = get_episode("ButtonUnmask", "train", 0)
-    one = Guided()
-    other = Rehearsed(one.waypoints)
+    one = PolicyGuidedByExpert()
+    other = PolicyWithFixedWaypoints(one.waypoints)
     ends = [
         play(make(episode, **PolicyNeeds.of(policy).env_options), policy)
         for policy in (one, JointChunks(other))
@@ -80,12 +81,13 @@ STATE = {"front_rgb": 0, "joint_positions": HOME, "gripper": np.full(2, 0.04)}
 
 
 @pytest.mark.sim
-def test_what_cannot_be_reached_is_waited_for_and_the_video_is_thinned():
+def test_an_unreachable_waypoint_becomes_eight_steps_of_waiting():
+    """Of a video of ten frames every eighth is passed on."""
     video = {
         "joint_positions": np.tile(HOME, (10, 1)), "gripper": np.full((10, 2), 0.04),
         "front_rgb": np.arange(10),
     }  # fmt: skip
-    policy = Rehearsed([np.array([[2.0, 2.0, 2.0, np.pi, 0.0, 0.0, 0.0]])] * 2)
+    policy = PolicyWithFixedWaypoints([np.array([[2.0, 2.0, 2.0, np.pi, 0.0, 0.0, 0.0]])] * 2)
     chunks = JointChunks(policy)
     chunks.reset("wait", video)
 

@@ -27,7 +27,9 @@ from roboirg_learn.listener.vocabulary import parts_of, split_words
 PAGE = Path(__file__).parents[3] / "docs" / "learned-listener.md"
 
 
-def test_without_pytorch_one_sentence_says_what_to_do(monkeypatch, tmp_path):
+def test_learned_policies_without_pytorch_fail_with_the_command_to_install_it(
+    monkeypatch, tmp_path
+):
     monkeypatch.setitem(__import__("sys").modules, "torch", None)
     for spec in ("learned:none", "trained:none?reader=none"):
         with pytest.raises(MissingDependencyError, match="pip install torch"):
@@ -41,7 +43,8 @@ def test_without_pytorch_one_sentence_says_what_to_do(monkeypatch, tmp_path):
 
 
 @pytest.mark.sim
-def test_labels_are_what_is_visible_and_where():
+def test_training_labels_name_the_visible_objects_with_their_places():
+    """First only cubes are visible, later only the containers over them."""
     episode = get_episode("VideoUnmask", "train", 0)
     places = [item.position[:2] for item in episode.scene.objects]
     cubes = {"cube red", "cube green", "cube blue"}
@@ -72,7 +75,8 @@ def torch():
     return pytest.importorskip("torch")
 
 
-def test_answers_fall_apart_into_parts_that_tell_them_apart():
+def test_the_parts_of_an_answer_identify_its_goal():
+    """The listener learns parts of goals, such as "color=red"."""
     assert parts_of('{"color": "red", "repeats": 2}') == ["color=red", "repeats=2"]
     assert parts_of('{"colors": ["red", "blue"]}') == [
         "colors.length=2",
@@ -91,6 +95,7 @@ def test_digits_are_read_as_words():
 
 
 def test_intervals_grow_with_the_differences_between_trainings():
+    """Rates of 11 tasks, each trained with three seeds on 50 episodes."""
     rng = np.random.default_rng(0)
     tasks = [(rng.random((3, 50)) < 0.8).astype(float) for _ in range(11)]
 
@@ -132,13 +137,13 @@ def plan_of(detector_epochs=1, **changes):
     return TrainingPlan(reader._replace(**changes), detector_epochs)
 
 
-def test_a_plan_names_the_words_of_its_tasks(torch):
+def test_a_training_plan_records_the_version_of_its_words(torch):
     _, words = plan_of().about["language_version"].split()
     assert words.startswith("StopCube/train@")
 
 
 @pytest.fixture
-def few(torch, monkeypatch):
+def few_episodes(torch, monkeypatch):
     """Few episodes of each split, and two listeners in a study."""
     from roboirg_learn.listener import listener_training
 
@@ -149,7 +154,7 @@ def few(torch, monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def trained(torch, tmp_path_factory):
+def trained_listener(torch, tmp_path_factory):
     """Explicit and direct StopCube: the words are enough."""
     from roboirg_learn.listener.learned_model import save_model
     from roboirg_learn.listener.listener_training import train_listener
@@ -163,10 +168,10 @@ def trained(torch, tmp_path_factory):
 
 
 @pytest.mark.sim
-def test_it_learns_and_its_file_is_the_same_listener(trained):
+def test_a_trained_listener_understands_stopcube_and_is_equal_after_loading(trained_listener):
     from roboirg_learn.listener.learned_model import load_model
 
-    model, path = trained
+    model, path = trained_listener
     again = load_model(path)
     assert again.vocabulary == model.vocabulary
     assert again.about["settings"] == ["explicit", "direct"]
@@ -188,7 +193,8 @@ def test_it_learns_and_its_file_is_the_same_listener(trained):
         again.understand("BinFill", "Do it.", [picture])
 
 
-def test_by_place_other_goals_of_a_scene_are_told_too(torch):
+def test_training_sentences_by_place_cover_several_goals_of_a_scene(torch):
+    """With three goals a scene: one explicit sentence, and three that name places."""
     from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.listener.reader_training import instructions_of
 
@@ -204,7 +210,7 @@ def test_by_place_other_goals_of_a_scene_are_told_too(torch):
     assert len({text for _, text in told}) == 4
 
 
-def test_a_task_without_words_is_refused(torch, monkeypatch):
+def test_training_on_a_task_that_no_sentence_speaks_of_is_refused(torch, monkeypatch):
     from roboirg_learn.listener import reader_training
     from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.listener.reader_training import check_reader
@@ -218,10 +224,10 @@ def test_a_task_without_words_is_refused(torch, monkeypatch):
 
 
 @pytest.mark.sim
-def test_it_plays_with_the_hands_of_the_oracle(trained):
+def test_a_trained_listener_plays_an_episode_with_the_oracle_s_hands(trained_listener):
     import roboirg
 
-    _, path = trained
+    _, path = trained_listener
     spec = f"learned:{path}"
     assert read_policy(spec).is_privileged
     policy = make_policy(spec, 0)
@@ -236,7 +242,9 @@ def test_it_plays_with_the_hands_of_the_oracle(trained):
 
 
 @pytest.mark.sim
-def test_an_encoder_of_one_s_own_is_trained_and_loaded(few, torch, tmp_path, monkeypatch):
+def test_the_documentation_s_own_encoder_is_trained_saved_and_loaded(
+    few_episodes, torch, tmp_path, monkeypatch
+):
     from roboirg_learn.listener import encoders
     from roboirg_learn.listener.learned_model import load_model, save_model
     from roboirg_learn.listener.listener_training import train_listener
@@ -259,7 +267,7 @@ def test_an_encoder_of_one_s_own_is_trained_and_loaded(few, torch, tmp_path, mon
     assert not torch.equal(mine, dark)
 
 
-def test_wrong_encoders_end_before_pictures_are_drawn(torch, tmp_path):
+def test_a_wrong_encoder_is_refused_before_pictures_are_drawn(torch, tmp_path):
     for encoders, words in (
         ({"wrods": {}}, "encoder 'wrods'"),
         ({"words": {"size": 3}}, "Encoder 'words' with {'size': 3}"),
@@ -271,7 +279,8 @@ def test_wrong_encoders_end_before_pictures_are_drawn(torch, tmp_path):
     assert not list(tmp_path.rglob("*.*"))
 
 
-def test_what_a_variant_does_not_get_changes_nothing(torch):
+def test_variants_of_the_listener_get_no_words_no_pictures_or_no_video(torch):
+    """A variant shows what an input is worth; `hide_inputs` takes it away."""
     from roboirg_learn.listener.learned_model import hide_inputs
     from roboirg_learn.listener.vocabulary import ListenerInput
 
@@ -286,7 +295,7 @@ def test_what_a_variant_does_not_get_changes_nothing(torch):
 
 
 @pytest.fixture
-def study(few, tmp_path):
+def short_study(few_episodes, tmp_path):
     """Run a short study of two seeds; returns its folder, and what runs it again."""
     short = {"scenes": 2, "detector_epochs": 1, "reader_epochs": 1, "seeds": 2}
     plan = plan_file(tasks="StopCube", training=short)
@@ -301,8 +310,8 @@ def study(few, tmp_path):
 
 
 @pytest.mark.sim
-def test_the_study_writes_every_listener_its_answers_and_tables(study):
-    folder, _ = study
+def test_the_study_writes_every_listener_its_answers_and_tables(short_study):
+    folder, _ = short_study
 
     expected = set()
     for variant, seed in itertools.product(VARIANTS[:2], (0, 1)):
@@ -319,8 +328,8 @@ def test_the_study_writes_every_listener_its_answers_and_tables(study):
 
 
 @pytest.mark.sim
-def test_a_study_trains_again_only_the_listener_that_is_lost(study):
-    folder, run = study
+def test_a_study_trains_again_only_the_listener_that_is_lost(short_study):
+    folder, run = short_study
     times = {path: path.stat().st_mtime_ns for path in folder.glob("*-?.*")}
     text = (folder / "study.md").read_text()
     lost = folder / "explicit-1.safetensors"

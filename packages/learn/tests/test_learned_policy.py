@@ -49,14 +49,14 @@ SHIPPED = PolicyFiles(
         ("trained:a", r"no reader of words; name one with \?reader=FILE. Train .* --body a --out"),
     ],
 )
-def test_wrong_names_are_one_sentence(spec, words):
+def test_a_wrong_name_of_a_learned_policy_is_refused_with_the_reason(spec, words):
     pytest.importorskip("torch")
     with pytest.raises(InvalidValueError, match=words):
         make_policy(spec, 0)
 
 
 @pytest.mark.sim
-def test_undisturbed_waypoints_solve_an_episode():
+def test_the_waypoint_expert_solves_an_episode():
     env = make(get_episode("PickXtimes", "train", 0), actions="waypoint", cameras=())
     assert play(env, WaypointExpert())["status"] == "success"
 
@@ -67,7 +67,8 @@ def recorded():
 
 
 @pytest.mark.sim
-def test_labels_are_the_expert_s_own_while_the_way_is_disturbed(recorded):
+def test_recorded_labels_are_the_expert_s_though_its_motion_was_disturbed(recorded):
+    """Recordings disturb the arm so that a policy learns to recover; labels must ignore that."""
     assert recorded.status == "success"
 
     episode = get_episode("ButtonUnmask", "random", 0)
@@ -88,7 +89,7 @@ def test_labels_are_the_expert_s_own_while_the_way_is_disturbed(recorded):
     assert not np.array_equal(plain.tool[: len(recorded.tool)], recorded.tool[: len(plain.tool)])
 
 
-def made_up(actions, looks):
+def recording_with_actions(actions, looks):
     """Return a recording of these waypoints at one thing, at looks in which nothing moves."""
     length = max(looks) + 1
     times = np.arange(length)
@@ -111,19 +112,21 @@ def made_up(actions, looks):
     )
 
 
-def test_a_move_that_was_not_made_has_the_label_of_the_one_that_was():
+def test_a_repeated_waypoint_is_labeled_with_the_gripper_command_that_follows():
+    """Actions are x, y, z, roll, pitch, yaw and gripper; -1 closes it."""
     down = [0, 0, 0.02, 0, 0, 0, 0]
     close = [0, 0, 0.02, 0, 0, 0, -1]
     above = [0, 0, 0.15, 0, 0, 0, 0]
 
-    found = decisions_of(made_up([above, down, down, close, above], [0, 1, 2, 3, 4]))
+    found = decisions_of(recording_with_actions([above, down, down, close, above], [0, 1, 2, 3, 4]))
 
     assert [decision.look for decision in found] == [0, 1, 2, 4]
     assert [decision.move.gripper for decision in found] == [0, -1, -1, 0]
 
 
 @pytest.mark.sim
-def test_an_interrupted_training_goes_on_where_it_was(recorded, tmp_path):
+def test_a_training_that_was_interrupted_ends_with_the_same_weights(recorded, tmp_path):
+    """Of four passes the command is interrupted after the second."""
     torch = pytest.importorskip("torch")
     train = trainer(recorded, tmp_path)
     passes = []
@@ -157,16 +160,17 @@ def trainer(recorded, out):
     layout = BodyLayout(sight_of([recorded]), goals, common_moves([decisions]))
 
     def train(name, progress):
-        folder = out / name
-        folder.mkdir(exist_ok=True)
+        folder_of_policy = out / name
+        folder_of_policy.mkdir(exist_ok=True)
         lessons = [BodyLesson(Recorded(episode, recorded), decisions)] * 3
-        return train_body(plan, lessons, layout, folder, progress)
+        return train_body(plan, lessons, layout, folder_of_policy, progress)
 
     return train
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_moved_and_mirrored_pictures_keep_their_labels(seed):
+    """The one white pixel of the picture is the labeled object."""
     pytest.importorskip("torch")
     from roboirg_learn.policy.thing_detector import LabeledPicture, augmented
 
@@ -182,7 +186,8 @@ def test_moved_and_mirrored_pictures_keep_their_labels(seed):
 
 
 @pytest.mark.sim
-def test_covered_cubes_are_not_to_be_seen_and_completed_stages_are_counted(recorded):
+def test_a_recording_notes_which_objects_are_visible_and_how_many_stages_are_done(recorded):
+    """The containers cover the cubes by step 40."""
     stages = len(get_episode("ButtonUnmask", "random", 0).stages)
     assert recorded.done[0] == 0
     assert (np.diff(recorded.done) >= 0).all()
@@ -210,7 +215,7 @@ def test_a_recording_is_read_as_it_was_written(recorded, tmp_path):
         load_recording(path)
 
 
-def test_a_file_that_cannot_be_loaded_is_said_with_the_reason(tmp_path):
+def test_a_damaged_or_wrong_policy_file_is_refused_with_the_reason(tmp_path):
     torch = pytest.importorskip("torch")
     from safetensors.torch import save_file
 
@@ -233,7 +238,7 @@ def test_a_file_that_cannot_be_loaded_is_said_with_the_reason(tmp_path):
     assert load_trained(path, "body", lambda file: file.about["plan"]) == {}
 
 
-def test_a_version_is_of_plan_and_tensors_and_not_of_the_file(tmp_path):
+def test_the_version_of_a_trained_file_depends_on_plan_and_weights_only(tmp_path):
     """Else a file that is written anew would be another policy, or one trained anew the same."""
     torch = pytest.importorskip("torch")
     from roboirg_learn.trained_file import TrainedFile, load_trained, save_trained
@@ -266,7 +271,7 @@ def test_a_version_is_of_plan_and_tensors_and_not_of_the_file(tmp_path):
 
 @settings(max_examples=25)
 @given(st.lists(st.sampled_from(["PickXtimes", "BinFill", "StopCube"]), max_size=90))
-def test_each_task_is_learned_and_shows_how_training_goes(tasks):
+def test_each_task_has_decisions_for_training_and_some_held_back_for_checking(tasks):
     pytest.importorskip("torch")
     from roboirg_learn.policy.body_training import HELD_BACK, held_back
 
@@ -277,7 +282,7 @@ def test_each_task_is_learned_and_shows_how_training_goes(tasks):
         assert sum(own) == (len(own) + HELD_BACK - 2) // HELD_BACK
 
 
-def learn(*options, what="policy"):
+def error_of_learning(*options, what="policy"):
     """Return the error of the command with wrong options."""
     pytest.importorskip("torch")
     done = CliRunner().invoke(app, ["learn", what, *map(str, options)])
@@ -285,7 +290,7 @@ def learn(*options, what="policy"):
     return str(done.exception)
 
 
-def test_what_cannot_be_learned_is_said_before_anything_is_recorded(tmp_path, monkeypatch):
+def test_impossible_training_options_are_refused_before_anything_is_recorded(tmp_path, monkeypatch):
     pytest.importorskip("torch")
     from roboirg_learn.listener.encoders import ENCODERS, TokenEncoder
 
@@ -307,34 +312,51 @@ def test_what_cannot_be_learned_is_said_before_anything_is_recorded(tmp_path, mo
         (tmp_path / "file", (), "is a file; --out needs a folder"),
         (tmp_path / "file" / "policy", (), "Cannot write"),
     ):
-        assert words in learn(*options, "--out", place)
+        assert words in error_of_learning(*options, "--out", place)
     with locked(out / ".lock", "held"):
-        assert "Another command learns in" in learn("--out", out)
+        assert "Another command learns in" in error_of_learning("--out", out)
     assert not (out / "recordings").exists()
 
 
 BODY = "recurrent-0.body.safetensors"
 READER = "explicit-0.reader.safetensors"
-FEW = {"scenes": 3, "drawn": 2, "detector_epochs": 1, "body_epochs": 2, "reader_epochs": 1}
+SHORT_TRAINING = {
+    "scenes": 3,
+    "drawn": 2,
+    "detector_epochs": 1,
+    "body_epochs": 2,
+    "reader_epochs": 1,
+}
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder_of_policy(tmp_path_factory):
     """A policy that has hardly learned, made by the command."""
     pytest.importorskip("torch")
-    folder = tmp_path_factory.mktemp("policy")
-    plan = plan_file(training=FEW)
-    call = ["learn", "policy", "--tasks", "ButtonUnmask", "--out", str(folder), "--plan", plan]
+    folder_of_policy = tmp_path_factory.mktemp("policy")
+    plan = plan_file(training=SHORT_TRAINING)
+    call = [
+        "learn",
+        "policy",
+        "--tasks",
+        "ButtonUnmask",
+        "--out",
+        str(folder_of_policy),
+        "--plan",
+        plan,
+    ]
     done = CliRunner().invoke(app, [*call, "--workers", "0"])
     assert done.exit_code == 0, done.output
-    assert PolicyFiles(folder / BODY, folder / READER).spec in done.output
-    return folder, call
+    assert PolicyFiles(folder_of_policy / BODY, folder_of_policy / READER).spec in done.output
+    return folder_of_policy, call
 
 
 @pytest.mark.sim
 @pytest.mark.slow
-def test_the_command_makes_a_policy_that_plays_by_pictures_alone(folder, tmp_path):
-    spec = PolicyFiles(folder[0] / BODY, folder[0] / READER).spec
+def test_the_command_learn_makes_a_policy_that_plays_from_pictures_alone(
+    folder_of_policy, tmp_path
+):
+    spec = PolicyFiles(folder_of_policy[0] / BODY, folder_of_policy[0] / READER).spec
     assert (read_policy(spec).is_privileged, read_policy(spec).is_hosted) == (False, True)
     assert read_policy(spec).needs.trained_tasks == ("ButtonUnmask",)
     assert not hasattr(make_policy(spec, 0), "attach")
@@ -350,24 +372,27 @@ def test_the_command_makes_a_policy_that_plays_by_pictures_alone(folder, tmp_pat
     ]
     assert memories == [(None, "recurrent")] * 2
 
-    curve = json.loads((folder[0] / "body-recurrent-0.json").read_text())
+    curve = json.loads((folder_of_policy[0] / "body-recurrent-0.json").read_text())
     assert [line["epoch"] for line in curve] == [1, 2]
 
 
 @pytest.mark.sim
 @pytest.mark.slow
-def test_what_is_there_is_used_again_and_another_plan_loses_nothing(folder):
-    place, (*call, plan) = folder
+def test_learning_again_reuses_files_and_refuses_those_of_another_plan(folder_of_policy):
+    place, (*call, plan) = folder_of_policy
     before = {path: path.stat().st_mtime_ns for path in place.rglob("*.*")}
     for options, words in (
         (["--tasks", "PickXtimes", *call[4:], plan, "--memory", "none"], "recordings with tasks"),
         ([*call[2:-1], "--memory", "none"], "recordings with drawn 2, not 300"),
-        ([*call[2:], plan_file(training=FEW | {"body_epochs": 3})], "was trained by another plan"),
+        (
+            [*call[2:], plan_file(training=SHORT_TRAINING | {"body_epochs": 3})],
+            "was trained by another plan",
+        ),
     ):
-        assert words in learn(*options)
+        assert words in error_of_learning(*options)
 
     other = ["--body", place / BODY, "--out", place / "new", "--tasks", "BinFill"]
-    assert "no task of this body 'BinFill'" in learn(*other, what="reader")
+    assert "no task of this body 'BinFill'" in error_of_learning(*other, what="reader")
 
     done = CliRunner().invoke(app, [*call, plan, "--memory", "none", "--settings", "none"])
     assert done.exit_code == 0, done.output
@@ -377,8 +402,11 @@ def test_what_is_there_is_used_again_and_another_plan_loses_nothing(folder):
 
 
 @pytest.mark.sim
-def test_a_reader_is_trained_for_a_body_that_is_there_and_goes_on_where_it_was(tmp_path):
-    """No expert plays, and a command that was killed trains the passes that are left."""
+def test_a_reader_is_trained_for_an_existing_body_without_new_recordings(tmp_path):
+    """A reader turns words into a goal, a body acts on it.
+
+    No expert plays, and a command that was killed trains only the passes that are left.
+    """
     pytest.importorskip("torch")
     from roboirg_learn.policy.trained_body import load_body
     from roboirg_learn.policy.trained_reader import load_reader
@@ -403,7 +431,7 @@ def test_a_reader_is_trained_for_a_body_that_is_there_and_goes_on_where_it_was(t
     assert load_reader(out).version == reader.version
 
 
-def test_what_is_printed_to_be_played_can_be_played(capsys):
+def test_the_command_printed_after_training_is_a_valid_run(capsys):
     """Names of all settings are refused where a task lacks one of them."""
     plan = ReaderPlan(("StopCube", "BinFill"), tuple(plain_settings()))
     print_policy(PolicyFiles(Path("a"), Path("my b")), plan)
@@ -423,13 +451,15 @@ def test_what_is_printed_to_be_played_can_be_played(capsys):
         (("--settings", "never"), "no setting 'never'"),
     ],
 )
-def test_a_reader_that_cannot_be_trained_is_said_first(options, words, tmp_path):
+def test_wrong_options_for_training_a_reader_are_refused_before_anything_is_written(
+    options, words, tmp_path
+):
     given = ["--body", SHIPPED.body, "--out", tmp_path / "a", *options]
-    assert words in learn(*given, what="reader")
+    assert words in error_of_learning(*given, what="reader")
     assert not list(tmp_path.iterdir())
 
 
-def test_a_reader_of_other_things_or_goals_does_not_fit(tmp_path):
+def test_a_reader_trained_for_other_objects_or_goals_is_refused_by_a_body(tmp_path):
     """Else it would name numbers that mean something else to the body."""
     pytest.importorskip("torch")
     from untrained import reader_for

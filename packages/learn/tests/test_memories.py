@@ -59,7 +59,7 @@ def body_of(memory):
     return BodyNet(CLASSES, PARTS, AT_THINGS, memory).eval()
 
 
-def changed(batch, looks):
+def with_changed_looks(batch, looks):
     """Return a batch in which these looks show something else."""
     other = batch_of(99)
     places = batch.places.clone()
@@ -68,18 +68,19 @@ def changed(batch, looks):
     return batch._replace(places=places, tool=tool)
 
 
-def same(first, other):
+def gives_same_answers(first, other):
     return all(torch.allclose(a, b, atol=1e-5) for a, b in zip(first[:3], other[:3], strict=True))
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
-def test_no_memory_sees_the_future(memory):
+def test_decisions_do_not_depend_on_later_looks(memory):
+    """A look is what the policy sees at a moment; decisions are made at looks 3 and 7."""
     body = body_of(memory)
     batch = batch_of(1)
-    assert same(body(batch), body(changed(batch, slice(8, None))))
+    assert gives_same_answers(body(batch), body(with_changed_looks(batch, slice(8, None))))
 
 
-def first_of(batch, looks, things):
+def first_looks_of(batch, looks, things):
     """Return the first looks of a batch, in which some things were not yet seen, and the last."""
     parts = [part[:, :looks, :things] for part in batch[:5]]
     last = torch.tensor([[looks - 1]])
@@ -92,7 +93,8 @@ def first_of(batch, looks, things):
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
-def test_what_is_carried_gives_what_all_looks_give(memory):
+def test_memory_carried_from_look_to_look_equals_reading_all_looks_at_once(memory):
+    """A policy reads one look more each time; training reads all. Objects 3 and 4 appear late."""
     body = body_of(memory)
     batch = batch_of(1)
     batch.seen[:, :4, 3:], batch.known[:, :4, 3:] = False, False
@@ -100,17 +102,20 @@ def test_what_is_carried_gives_what_all_looks_give(memory):
     carried = Carried()
 
     for looks, things in ((1, 3), (4, 3), (5, THINGS), (5, THINGS), (LOOKS, THINGS)):
-        part = first_of(batch, looks, things)
-        assert same(body(part, carried), body(part))
+        part = first_looks_of(batch, looks, things)
+        assert gives_same_answers(body(part, carried), body(part))
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
-def test_the_present_counts_and_with_memory_the_past(memory):
+def test_only_a_body_with_memory_depends_on_earlier_looks(memory):
+    """The decision is made at look 7."""
     body = body_of(memory)
     batch = batch_of(1, (7,))
 
-    assert not same(body(batch), body(changed(batch, slice(7, 8))))
-    assert same(body(batch), body(changed(batch, slice(0, 7)))) == (memory == "none")
+    assert not gives_same_answers(body(batch), body(with_changed_looks(batch, slice(7, 8))))
+    assert gives_same_answers(body(batch), body(with_changed_looks(batch, slice(0, 7)))) == (
+        memory == "none"
+    )
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
@@ -128,11 +133,12 @@ def test_padding_changes_nothing(memory):
 
     has_look[:, 9:] = False
 
-    assert same(body(batch._replace(has_look=has_look)), body(short))
+    assert gives_same_answers(body(batch._replace(has_look=has_look)), body(short))
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
-def test_what_is_unknown_is_never_chosen(memory):
+def test_an_object_that_was_never_seen_is_never_chosen(memory):
+    """The objects are numbered; number 2 is unknown."""
     body = body_of(memory)
     batch = batch_of(1)
     seen = batch.seen.clone()
@@ -146,7 +152,7 @@ def test_what_is_unknown_is_never_chosen(memory):
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
-def test_only_memory_chooses_what_is_out_of_sight(memory):
+def test_only_the_recurrent_memory_may_choose_an_object_out_of_sight(memory):
     body = body_of(memory)
     batch = batch_of(1)
     seen = batch.seen.clone()
@@ -166,7 +172,7 @@ def fast_numbers(seed, tokens=3, size=2):
     return fast, norm, keys, values, torch.rand(1, 1, tokens, 1) * 0.1
 
 
-def test_fast_weights_are_read_as_by_hand():
+def test_reading_fast_weights_gives_the_value_computed_by_hand():
     """With W = 2, b = (0, 1) and k = (3, 4): z = (6, 9) and rms(z) = sqrt(58.5)."""
     fast = Fast(2 * torch.eye(2)[None, None], torch.tensor([[[[0.0, 1.0]]]]))
     norm = FastNorm(torch.zeros(1, 1, 2), torch.zeros(1, 1, 2))
@@ -177,7 +183,7 @@ def test_fast_weights_are_read_as_by_hand():
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_step_goes_down_the_gradient_of_the_inner_loss(seed):
+def test_an_update_of_fast_weights_follows_the_gradient_of_its_loss(seed):
     fast, norm, keys, values, rates = fast_numbers(seed)
     weights, biases = (weights.clone().requires_grad_() for weights in fast)
     error = norm(keys @ weights + biases) - (values - keys)
@@ -189,7 +195,7 @@ def test_a_step_goes_down_the_gradient_of_the_inner_loss(seed):
     assert torch.allclose(after.biases, biases.detach() - biases.grad, atol=1e-5)
 
 
-def test_a_step_is_clipped_and_what_is_not_there_changes_nothing():
+def test_an_update_of_fast_weights_is_limited_and_zero_for_a_rate_of_zero():
     fast, norm, keys, values, rates = fast_numbers(0)
     far = fast.after(keys * 100, values, rates * 100, norm)
     assert torch.allclose((far.weights - fast.weights).norm(), torch.tensor(MOST_CHANGE))
@@ -199,7 +205,7 @@ def test_a_step_is_clipped_and_what_is_not_there_changes_nothing():
     assert torch.equal(still.biases, fast.biases)
 
 
-def test_even_frames_are_all_until_there_are_enough():
+def test_up_to_32_frames_are_all_kept_and_of_more_32_evenly_spaced():
     few = even_frames(torch.tensor([[5, 31]]))[0]
     assert few[0].tolist() == [0, 1, 2, 3, 4, 5] + [-1] * 26
     assert few[1].tolist() == list(range(32))
@@ -209,7 +215,7 @@ def test_even_frames_are_all_until_there_are_enough():
     assert many[1].tolist() == [20 * look for look in range(32)]
 
 
-def test_modulation_leaves_the_residual_alone():
+def test_modulation_with_zero_weights_equals_a_body_without_memory():
     """With scale and shift zero the body answers bit for bit as one without memory."""
     modulated = body_of("framesamp")
     plain = body_of("none")
@@ -230,12 +236,12 @@ def test_modulation_leaves_the_residual_alone():
         assert torch.equal(ours, other)
 
 
-def test_only_the_robot_sees_the_tokens_of_fast_weights():
+def test_fast_weights_change_the_robot_s_token_and_no_object_s():
     body = body_of("ttt")
     batch = batch_of(1, (7,))
     given = []
     body.encoder.layers[0].linear1.register_forward_hook(lambda _, one, __: given.append(one[0]))
-    for history in (batch, changed(batch, slice(0, 7))):
+    for history in (batch, with_changed_looks(batch, slice(0, 7))):
         body(history)
 
     robot, *things = (given[0] - given[1]).abs().amax(-1)[0]

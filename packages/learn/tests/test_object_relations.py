@@ -35,7 +35,7 @@ def scene_of(*views):
     return locate_and_rank([objects_of(*view) for view in views], FLAT, CLASSES)
 
 
-def rank(scene, number, landmark):
+def ranks_of(scene, number, landmark):
     """The ranks of an object from the first and from the last, where they are told."""
     told = scene.relations[number, landmark * CODES : (landmark + 1) * CODES]
     return list(np.flatnonzero(told[:RANKS])), list(np.flatnonzero(told[RANKS:]))
@@ -45,7 +45,7 @@ def landmark_of(name, view=0):
     return FIXED + view * len(CLASSES) + CLASSES.index(name)
 
 
-def test_a_plane_is_found_from_pairs_of_places():
+def test_the_table_plane_is_fitted_from_points_in_picture_and_world():
     rng = np.random.default_rng(0)
     matrix = np.array([[0.9, -0.2, 0.1], [0.1, -1.1, 0.4], [0.3, 0.2, 1.0]])
     places = rng.random((30, 2))
@@ -59,6 +59,7 @@ def test_a_plane_is_found_from_pairs_of_places():
 
 
 def test_cubes_are_ranked_among_cubes_whatever_their_color():
+    """The third argument of `ranks_of` is what ranks them; results are ranks from both ends."""
     scene = scene_of(
         [
             ("cube red", 0.0, 0.2),
@@ -67,48 +68,48 @@ def test_cubes_are_ranked_among_cubes_whatever_their_color():
             ("button", -0.2, 0.25),
         ]
     )
-    assert [rank(scene, number, LEFT) for number in range(3)] == [
+    assert [ranks_of(scene, number, LEFT) for number in range(3)] == [
         ([0], [2]),
         ([1], [1]),
         ([2], [0]),
     ]
-    assert rank(scene, 3, LEFT) == ([0], [0])  # the only button
-    assert rank(scene, 0, landmark_of("button")) == ([0], [2])
-    assert rank(scene, 2, landmark_of("button")) == ([2], [0])
+    assert ranks_of(scene, 3, LEFT) == ([0], [0])  # the only button
+    assert ranks_of(scene, 0, landmark_of("button")) == ([0], [2])
+    assert ranks_of(scene, 2, landmark_of("button")) == ([2], [0])
     # From the blue cube the two others are ranked, and it is not.
-    assert rank(scene, 0, landmark_of("cube blue")) == ([0], [1])
-    assert rank(scene, 1, landmark_of("cube blue")) == ([], [])
+    assert ranks_of(scene, 0, landmark_of("cube blue")) == ([0], [1])
+    assert ranks_of(scene, 1, landmark_of("cube blue")) == ([], [])
 
 
-def test_containers_are_ranked_by_what_an_earlier_picture_showed():
+def test_containers_are_ranked_by_their_distance_to_cubes_of_an_earlier_picture():
     scene = scene_of(
         [("cube red", 0.0, 0.2), ("cube blue", 0.0, -0.2)],
         [("container", 0.01, -0.2), ("container", 0.0, 0.0), ("container", 0.0, 0.21)],
     )
     assert scene.looks == 2
     assert list(scene.views) == [0, 0, 1, 1, 1]
-    assert rank(scene, 4, landmark_of("cube red")) == ([0], [2])
-    assert rank(scene, 2, landmark_of("cube blue")) == ([0], [2])
-    assert rank(scene, 0, landmark_of("container", view=1)) != ([], [])
+    assert ranks_of(scene, 4, landmark_of("cube red")) == ([0], [2])
+    assert ranks_of(scene, 2, landmark_of("cube blue")) == ([0], [2])
+    assert ranks_of(scene, 0, landmark_of("container", view=1)) != ([], [])
 
 
 coordinates = st.floats(-0.5, 0.5).map(lambda number: round(number, 3))
 
 
 @given(st.lists(st.tuples(st.sampled_from(CLASSES), coordinates, coordinates), max_size=12))
-def test_ranks_are_those_of_sorting(items):
+def test_ranks_of_objects_agree_with_sorting_them(items):
     scene = scene_of(items)
     assert scene.relations.shape == (len(items), relation_count(len(CLASSES)))
     for number, (name, _, _) in enumerate(items):
         kind = name.split()[0]
         same_kind = [place for place, item in enumerate(items) if item[0].split()[0] == kind]
-        for landmark, measure in ((LEFT, left), (FORWARD, forward), (DISTANCE, distance)):
+        for landmark, measure in ((LEFT, leftness), (FORWARD, depth), (DISTANCE, distance)):
             own = measure(items[number])
             values = [measure(items[place]) for place in same_kind]
             before = sum(value < own - 1e-6 for value in values)
             ties = sum(abs(value - own) <= 1e-6 for value in values)
 
-            near, _ = rank(scene, number, landmark)
+            near, _ = ranks_of(scene, number, landmark)
 
             assert len(near) <= 1
             if near:
@@ -117,12 +118,12 @@ def test_ranks_are_those_of_sorting(items):
                 assert before + ties > RANKS
 
 
-def left(item):
+def leftness(item):
     _, _, y = item
     return -y
 
 
-def forward(item):
+def depth(item):
     _, x, _ = item
     return x
 
@@ -132,8 +133,8 @@ def distance(item):
     return np.hypot(x - ROBOT_BASE[0], y - ROBOT_BASE[1])
 
 
-def test_nothing_is_left_of_a_scene_that_is_not_looked_at():
-    left = without_objects(scene_of([("cube red", 0.0, 0.0)]))
-    assert left.looks == 0
-    assert all(len(part) == 0 for part in left[:4])
-    assert left.relations.shape[1] == relation_count(len(CLASSES))
+def test_a_scene_without_looks_has_no_objects_and_no_relations():
+    unseen = without_objects(scene_of([("cube red", 0.0, 0.0)]))
+    assert unseen.looks == 0
+    assert all(len(part) == 0 for part in unseen[:4])
+    assert unseen.relations.shape[1] == relation_count(len(CLASSES))

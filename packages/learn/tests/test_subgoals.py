@@ -35,7 +35,8 @@ SIGHT = Sight(
 
 
 @pytest.mark.parametrize("task", sorted(all_tasks()))
-def test_hands_know_the_subgoals_of_every_task(task):
+def test_every_subgoal_of_a_task_is_encoded_with_its_motion(task):
+    """Learned hands read a subgoal as numbers, one of which marks the motion."""
     for number in range(10):
         for stage in get_episode(task, "train", number).stages:
             subgoal = SubgoalForm(stage.subgoal).at(np.array([100.0, 90.0]))
@@ -46,7 +47,7 @@ def test_hands_know_the_subgoals_of_every_task(task):
             )
 
 
-def test_a_point_means_the_place_that_it_was_taken_from():
+def test_a_point_in_a_subgoal_is_encoded_as_the_place_on_the_table():
     place = np.array([-0.05, 0.11, 0.02])
     subgoal = SubgoalForm("pick up the red cube {at}").at(points_of(place))
     assert split_point(subgoal)[1] is not None
@@ -58,7 +59,7 @@ def test_a_point_means_the_place_that_it_was_taken_from():
     assert encode_request("make me a sandwich", SIGHT) is None
 
 
-def recorded_of(episode, done):
+def recording_of(episode, done):
     """Return a recording in which every object moves a little at each look."""
     names = tuple(item.name for item in episode.scene.objects)
     looks = len(done)
@@ -75,11 +76,12 @@ def recorded_of(episode, done):
     )  # fmt: skip
 
 
-def test_recordings_yield_the_subgoal_that_is_due_with_a_point_from_its_beginning():
+def test_recordings_give_the_due_subgoal_with_the_point_at_its_start():
+    """The first two looks are of stage 0, the others of stage 1; objects move on meanwhile."""
     episode = get_episode("PickXtimes", "train", 0)
     done = [0, 0, 1, 1, 1]
     stages = [episode.stages[number] for number in done]
-    recorded = recorded_of(episode, done)
+    recorded = recording_of(episode, done)
 
     due = subgoals_due(recorded, episode, range(5))
     exact = recorded_subgoals(recorded, episode, done, None)
@@ -96,12 +98,14 @@ def test_recordings_yield_the_subgoal_that_is_due_with_a_point_from_its_beginnin
     assert 0 < np.abs(away).max() <= MOST_POINT_NOISE + 1
 
 
-def test_a_planner_remembers_changes_of_subgoal():
+def test_planner_history_keeps_the_looks_at_which_the_subgoal_changed():
+    """Forms of subgoals are numbered; form 0 is due at looks 2 and 4, form 1 at 7, 0 again at 9."""
     history = PlannerHistory(3, chooses=False)
     for form, look in ((0, 2), (0, 4), (1, 7), (0, 9)):
         history.name(form, look)
     assert history.switches == [2, 7, 9]
 
+    # At look 19, of three forms: how often each was done, which is under way, and since when.
     done, under_way, rest = np.split(history.context(19), [3, 6])
     assert done.tolist() == [1, 1, 0]
     assert under_way.tolist() == [1, 0, 0]
@@ -113,7 +117,7 @@ def test_a_planner_remembers_changes_of_subgoal():
     assert len(kept) == VIDEO_FRAMES + MAX_SWITCHES + 1
 
 
-def test_chosen_looks_in_a_row_become_their_middle_one():
+def test_neighboring_key_frames_are_merged_into_their_middle_one():
     """Looks are as far apart as the merge rule's gap, so that neighbors join."""
     history = PlannerHistory(3, chooses=True)
     history.choose([5, 6, 7])
@@ -131,7 +135,7 @@ def test_chosen_looks_in_a_row_become_their_middle_one():
     assert (history.kept(video=50, look=300) >= 0).sum() == VIDEO_FRAMES + MAX_CHOSEN + RECENT
 
 
-def test_what_is_replayed_is_what_a_planner_that_is_right_would_be_given():
+def test_training_inputs_equal_those_of_a_planner_that_is_always_right():
     forms = np.array([0, 0, 1, 1, 0])
     looks = np.array([1, 4, 6, 9, 12])
     planned = ideal_planner_inputs(forms, looks, 0, 2, chooses=True)
@@ -153,7 +157,7 @@ def test_what_is_replayed_is_what_a_planner_that_is_right_would_be_given():
 
 
 @pytest.fixture(params=["subgoal", "keyframes"])
-def saved(request, tmp_path):
+def saved_policy(request, tmp_path):
     """Return the files of a policy with a planner that has learned nothing."""
     torch = pytest.importorskip("torch")
     from untrained import reader_for
@@ -194,11 +198,12 @@ NO_VIDEO = {"joint_positions": np.zeros((0, 7))}
 
 
 @pytest.mark.sim
-def test_hands_follow_any_planner_and_name_their_own_subgoals_without_one(saved):
+def test_learned_hands_follow_given_subgoals_or_name_their_own(saved_policy):
+    """A subgoal that they cannot read, *sing*, changes nothing."""
     from roboirg.policies.contract.base import SubgoalFollower
     from roboirg_learn.kinds import make_learned
 
-    hands = make_learned(saved)
+    hands = make_learned(saved_policy)
     assert isinstance(hands, SubgoalFollower)
     hands.reset("pick the cube", NO_VIDEO)
     assert hands.act(observation_of()).shape == (1, 7)
@@ -217,13 +222,13 @@ def test_hands_follow_any_planner_and_name_their_own_subgoals_without_one(saved)
 
 
 @pytest.mark.sim
-def test_a_learned_planner_leads_the_scripted_hands_and_others_lead_learned_ones(saved):
+def test_learned_planners_and_hands_can_be_combined_with_others(saved_policy):
     from roboirg.core.errors import InvalidValueError
     from roboirg.policies.by_name.finding import make_policy, read_policy
     from roboirg_learn.policy.subgoal_following import LearnedHands, LearnedPlanner
 
-    own = saved.spec
-    scripted = f"{saved.spec}&hands=scripted"
+    own = saved_policy.spec
+    scripted = f"{saved_policy.spec}&hands=scripted"
     assert read_policy(own).is_hosted
     assert not read_policy(own).is_privileged
     assert read_policy(scripted).is_privileged
@@ -243,13 +248,14 @@ def test_a_learned_planner_leads_the_scripted_hands_and_others_lead_learned_ones
 
 
 @pytest.mark.sim
-def test_hands_know_no_goal_and_planners_point_at_what_is_out_of_sight(saved):
+def test_a_learned_planner_may_point_at_an_object_that_is_out_of_sight(saved_policy):
+    """Object 1 is out of sight from look 4 on; the decision is made at look 5."""
     torch = pytest.importorskip("torch")
     from roboirg_learn.policy.body_net import TOOL_NUMBERS
     from roboirg_learn.policy.policy_data import EpisodeNumbers, LookNumbers, to_batch
     from roboirg_learn.policy.trained_body import load_body
 
-    model = load_body(saved.body)
+    model = load_body(saved_policy.body)
     size = len(model.forms)
     looks = 6
     things = 3
