@@ -69,7 +69,7 @@ class _Destination:
     duplicates: int = 0
     conflicts: list[Summary] = field(default_factory=list)
 
-    def take(self, results: Iterable[Summary]) -> list[Summary]:
+    def keep_new(self, results: Iterable[Summary]) -> list[Summary]:
         """Keep results of one run; return those that must be copied into the merged run.
 
         They are those of new episodes, and verdicts (success or failure) that replace an error. The
@@ -117,7 +117,7 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
         _check_versions([(out, store.stored.values()), *results])
         merged = _Destination(dict(store.stored))
         for folder, run in runs:
-            taken = merged.take(run.newest)
+            taken = merged.keep_new(run.newest)
             store.extend(_copied_lines(run, taken, folder, out))
     # Other arms are controls, in which words or seeds differ on purpose.
     usual = [result for result in merged.kept.values() if result.arm == TOLD]
