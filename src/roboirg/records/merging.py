@@ -96,8 +96,9 @@ class _Destination:
 def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
     """Copy the records, videos and logs of several runs into one folder.
 
-    If several runs have the same episode, the first verdict is kept; a verdict replaces an error.
-    Records are checked and copied one by one; the memory holds only their summaries.
+    If several runs have the same episode, the first verdict (success or failure) is kept; a verdict
+    replaces an error. Records are checked and copied one by one; the memory holds only their
+    summaries.
 
     Args:
         folders: output folders of the runs; they are not changed.

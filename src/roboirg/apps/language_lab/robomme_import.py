@@ -121,7 +121,7 @@ def _sentences(function: SentenceFunction, task: Task) -> dict[Goal, str]:
 
 
 def _published_episodes(task: Task) -> Iterator[PublishedEpisode]:
-    """Yield RoboMME's episodes of a task."""
+    """Yield the episodes of a task whose scenes RoboMME has published, in all splits."""
     for split, size in SIZES.items():
         for index in range(size):
             episode = published_episode(task.name, split, index)

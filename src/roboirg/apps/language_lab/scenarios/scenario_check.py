@@ -93,7 +93,13 @@ def scenes_of(task: str, random: int = RANDOM_SCENES) -> tuple[Episode, ...]:
 def check_scenarios(
     words: TaskScenarios, name: str | None, scenes: Sequence[Episode]
 ) -> list[ScenarioReport]:
-    """Check the scenarios of a task, or only those of one frame, in scenes."""
+    """Return a report on each scenario of a task, a template of texts, checked in some scenes.
+
+    Args:
+        words: all words of the task in the scenarios' file.
+        name: of the frame (the situation) whose scenarios are checked; None for all.
+        scenes: episodes of the task.
+    """
     reports: list[ScenarioReport] = []
     for scenario in words.scenarios:
         if name in (None, scenario.fields.frame):
@@ -247,7 +253,10 @@ class _SceneChecker:
         return instruction
 
     def _chosen(self, request: InstructionRequest) -> Chosen | None:
-        """Return how the scenario says an episode; None if it does not fit."""
+        """Return how the scenario says an episode.
+
+        None if it does not fit, or its setting cannot express the episode.
+        """
         if _is_refused(request):
             return None
         scenario = self._report.scenario
@@ -299,7 +308,10 @@ def _is_refused(request: InstructionRequest) -> bool:
 
 
 def _served_scenes(reports: Sequence[ScenarioReport]) -> dict[str, set[str]]:
-    """Return the keys of the scenes that a user's scenarios fit, by setting."""
+    """Return the keys of the scenes that scenarios of a user's file fit, by setting.
+
+    For example ``{"direct": {"PickXtimes/train/3"}}``.
+    """
     served: dict[str, set[str]] = {}
     for report in reports:
         fields = report.scenario.fields
@@ -469,7 +481,7 @@ def _says_value(mention: Mention, instruction: Instruction) -> bool:
 
 
 def _kind_of(value: str) -> str:
-    """Return ``moment``, ``number`` or ``color``."""
+    """Return what a goal value is: ``before`` a ``moment``, ``2`` a ``number``, else ``color``."""
     if value in MOMENTS:
         return "moment"
     if value.isdecimal():
