@@ -253,7 +253,7 @@ def warn_once(sentence: str) -> None:
 
 
 def _is_json(line: bytes) -> bool:
-    """Return whether a line is JSON, so that nothing of it is missing."""
+    """Return whether a line is valid JSON; a line of which the end is missing is not."""
     try:
         json.loads(line)
     except (ValueError, RecursionError):

@@ -69,7 +69,7 @@ class _Destination:
     duplicates: int = 0
     conflicts: list[Summary] = field(default_factory=list)
 
-    def take(self, results: Iterable[Summary]) -> list[Summary]:
+    def keep_new(self, results: Iterable[Summary]) -> list[Summary]:
         """Keep results of one run; return those that must be copied into the merged run.
 
         They are those of new episodes, and verdicts (success or failure) that replace an error. The
@@ -96,8 +96,9 @@ class _Destination:
 def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
     """Copy the records, videos and logs of several runs into one folder.
 
-    If several runs have the same episode, the first verdict is kept; a verdict replaces an error.
-    Records are checked and copied one by one; the memory holds only their summaries.
+    If several runs have the same episode, the first verdict (success or failure) is kept; a verdict
+    replaces an error. Records are checked and copied one by one; the memory holds only their
+    summaries.
 
     Args:
         folders: output folders of the runs; they are not changed.
@@ -117,7 +118,7 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
         _check_versions([(out, store.stored.values()), *results])
         merged = _Destination(dict(store.stored))
         for folder, run in runs:
-            taken = merged.take(run.newest)
+            taken = merged.keep_new(run.newest)
             store.extend(_copied_lines(run, taken, folder, out))
     # Other arms are controls, in which words or seeds differ on purpose.
     usual = [result for result in merged.kept.values() if result.arm == TOLD]

@@ -469,7 +469,13 @@ class Record(Summary, kw_only=True, forbid_unknown_fields=True):  # type: ignore
     details: str | None = None
 
     def record_error(self, kind: ErrorKind, cause: str, details: str | None = None) -> None:
-        """Record that the episode ended in an error and cannot be judged."""
+        """Set the outcome to an error, as the episode cannot be judged, and clear its verdict.
+
+        Args:
+            kind: of the error.
+            cause: in words; cut if it is too long.
+            details: traceback, if there is one.
+        """
         self.outcome = "error"
         self.error = kind
         self.cause = clip_text(cause, MOST_CAUSE_LETTERS)

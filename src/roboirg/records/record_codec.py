@@ -91,7 +91,7 @@ def _read(decoder: msgspec.json.Decoder[Stored], line: bytes, path: Path, number
     try:
         stored = decoder.decode(line)
     except msgspec.ValidationError as error:
-        raise _explain(line, path, number, error) from error
+        raise _schema_error(line, path, number, error) from error
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise DamagedLineError(
             f"{path} line {number} is damaged: it is not JSON ({error})."
@@ -102,7 +102,9 @@ def _read(decoder: msgspec.json.Decoder[Stored], line: bytes, path: Path, number
     return stored
 
 
-def _explain(line: bytes, path: Path, number: int, error: msgspec.ValidationError) -> StoreError:
+def _schema_error(
+    line: bytes, path: Path, number: int, error: msgspec.ValidationError
+) -> StoreError:
     """Return the error to raise for a line that is JSON, but no record that can be read.
 
     It names the schema version of the line if that is another one, else the field that is wrong.
@@ -118,14 +120,14 @@ def _explain(line: bytes, path: Path, number: int, error: msgspec.ValidationErro
     except msgspec.ValidationError:
         version = None
     if version == SCHEMA_VERSION:
-        return StoreError(f"{path} line {number} is not a record: {_words(error)}.")
+        return StoreError(f"{path} line {number} is not a record: {_plain_complaint(error)}.")
     return StoreError(
         f"{path} line {number} has schema version {version!r}, but this roboirg reads only version "
         f"{SCHEMA_VERSION}; use the roboirg that wrote it, or another folder."
     )
 
 
-def _words(error: Exception) -> str:
+def _plain_complaint(error: Exception) -> str:
     """Return msgspec's complaint about a record in plain words.
 
     ``matching regex '...'`` becomes what the regular expression means.

@@ -24,26 +24,30 @@ def scene_facts(scene: Scene) -> SceneFacts:
     For example ``{"red cube × 1": 1.0, "x of red cube": 0.12, "acts × 2": 1.0}``; positions are
     in meters in the world frame.
     """
-    return {**dict(_standing(scene)), **dict(_moving(scene)), **dict(_shown(scene))}
+    return {
+        **dict(_object_features(scene)),
+        **dict(_motion_features(scene)),
+        **dict(_video_features(scene)),
+    }
 
 
-def _standing(scene: Scene) -> Iterator[tuple[str, float]]:
-    """Yield features of the objects: how many look alike, where they are, and what is nearest.
+def _object_features(scene: Scene) -> Iterator[tuple[str, float]]:
+    """Yield features of the objects: how many look alike, where they are, what is near.
 
     A scene with one red cube has ``("red cube × 1", 1.0)``, ``("x of red cube", 0.12)`` (meters)
-    and so on. Objects that look like others have no position, as a viewer cannot name one of them.
+    and so on. Objects that look like others have no position: a viewer cannot name them.
     """
-    counts = Counter(map(_look, scene.objects))
-    for look, count in counts.items():
-        yield f"{look} × {count}", 1.0
-    unique = [item for item in scene.objects if counts[_look(item)] == 1]
+    counts = Counter(map(_appearance, scene.objects))
+    for appearance, count in counts.items():
+        yield f"{appearance} × {count}", 1.0
+    unique = [item for item in scene.objects if counts[_appearance(item)] == 1]
     for item in unique:
-        look = _look(item)
-        yield f"x of {look}", item.position.x
-        yield f"y of {look}", item.position.y
+        appearance = _appearance(item)
+        yield f"x of {appearance}", item.position.x
+        yield f"y of {appearance}", item.position.y
         nearest = _nearest(item, unique)
         if nearest is not None:
-            yield f"nearest to {look}: {_look(nearest)}", 1.0
+            yield f"nearest to {appearance}: {_appearance(nearest)}", 1.0
 
 
 def _nearest(item: SceneObject, others: Iterable[SceneObject]) -> SceneObject | None:
@@ -56,7 +60,7 @@ def _nearest(item: SceneObject, others: Iterable[SceneObject]) -> SceneObject | 
     return min(colored, key=distance, default=None)
 
 
-def _moving(scene: Scene) -> Iterator[tuple[str, float]]:
+def _motion_features(scene: Scene) -> Iterator[tuple[str, float]]:
     """Yield features of what moves by itself: ``("Swap × 2", 1.0)``, ``("interval 30", 1.0)``, ….
 
     Intervals between the ends of a way are in control steps.
@@ -69,16 +73,16 @@ def _moving(scene: Scene) -> Iterator[tuple[str, float]]:
             yield f"interval {motion.interval}", 1.0
         elif isinstance(motion, Swap):
             for name in (motion.first, motion.second):
-                yield f"swapped: {_seen_as(scene, name)}", 1.0
+                yield f"swapped: {_appearance_of(scene, name)}", 1.0
 
 
-def _shown(scene: Scene) -> Iterator[tuple[str, float]]:
+def _video_features(scene: Scene) -> Iterator[tuple[str, float]]:
     """Yield features of the video's acts: the rank of each, that it occurs, and how often.
 
     A video that shows a button pressed twice has ``act 0: pressed button``, ``act 1: pressed
     button``, ``shown: pressed button``, ``shown: pressed button × 2`` and ``acts × 2``, each 1.0.
     """
-    acts = [_act(scene, fact) for fact in scene.past]
+    acts = [_act_name(scene, fact) for fact in scene.past]
     for rank, act in enumerate(acts):
         yield f"act {rank}: {act}", 1.0
     for act, count in Counter(acts).items():
@@ -87,23 +91,23 @@ def _shown(scene: Scene) -> Iterator[tuple[str, float]]:
     yield f"acts × {len(acts)}", 1.0
 
 
-def _act(scene: Scene, fact: Fact) -> str:
+def _act_name(scene: Scene, fact: Fact) -> str:
     """Return an act as it can be seen: ``placed red cube target``."""
-    return f"{fact.kind} {_seen_as(scene, fact.subject)} {_seen_as(scene, fact.place)}"
+    return f"{fact.kind} {_appearance_of(scene, fact.subject)} {_appearance_of(scene, fact.place)}"
 
 
-def _seen_as(scene: Scene, name: str | None) -> str:
+def _appearance_of(scene: Scene, name: str | None) -> str:
     """Return how the object of this name looks, with the color of the cube that it covers.
 
     For example ``red cube`` or ``container over red``; empty if there is no such object.
     """
     if name is None or all(item.name != name for item in scene.objects):
         return ""
-    look = _look(scene[name])
+    appearance = _appearance(scene[name])
     hidden = scene.hidden_in(name)
-    return look if hidden is None else f"{look} over {hidden.color}"
+    return appearance if hidden is None else f"{appearance} over {hidden.color}"
 
 
-def _look(item: SceneObject) -> str:
+def _appearance(item: SceneObject) -> str:
     """Return the kind of an object with its color, if it has one: ``red cube``."""
     return item.kind if item.color is None else f"{item.color} {item.kind}"

@@ -141,7 +141,7 @@ def score_rule(rule: str, instructed: InstructedEpisode) -> ShortcutScore:
 
 
 def rule_scores(instructed: InstructedEpisode) -> dict[str, ShortcutScore]:
-    """Return the scores of chance and of all surface rules, by name."""
+    """Return the scores of a blind guess (``chance``) and of all surface rules, by name."""
     scores = {CHANCE: score_chance(instructed)}
     for rule in SURFACE_RULES:
         scores[rule] = score_rule(rule, instructed)

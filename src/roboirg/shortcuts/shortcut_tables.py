@@ -265,6 +265,7 @@ def _episodes(task: str, splits: Sequence[Split], random_scenes: range) -> list[
 def _instructed(
     episodes: Iterable[Episode], setting: str, options: InstructionOptions
 ) -> list[InstructedEpisode]:
+    """Return the instruction of each episode in a setting, paired with its episode."""
     return list(instructions(episodes, (setting,), (options.form,), options))
 
 

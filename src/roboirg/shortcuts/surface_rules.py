@@ -37,7 +37,7 @@ class SlotWords:
         vocabulary: the values that it may take.
         named: the values that the text names, in order, with repetitions.
         command: the words of the last sentence.
-        parts: the number of values to find.
+        value_count: the number of values to find.
         pointed_index: at which of two named values the words before the command point, 0 or 1;
             None if at neither.
         ranks: indices of named values at which the command points: 0 for *the former*.
@@ -47,19 +47,19 @@ class SlotWords:
     vocabulary: SlotVocabulary
     named: tuple[Value, ...]
     command: Sentence
-    parts: int
+    value_count: int
     pointed_index: int | None = None
     ranks: tuple[int, ...] = ()
 
     @property
-    def different(self) -> tuple[Value, ...]:
+    def unique_values(self) -> tuple[Value, ...]:
         """The named values, each once."""
         return tuple(dict.fromkeys(self.named))
 
     @property
     def all_but_last(self) -> tuple[Value, ...]:
         """The named values, each once, without the one that is named last."""
-        return tuple(value for value in self.different if value != self.named[-1])
+        return tuple(value for value in self.unique_values if value != self.named[-1])
 
     @property
     def is_number(self) -> bool:
@@ -86,18 +86,18 @@ Where they are none, or missing, every value of the vocabulary is as likely.
 
 def take_first(words: SlotWords) -> list[Candidates]:
     """Take the values that are named first."""
-    return certain(words.named[: words.parts])
+    return certain(words.named[: words.value_count])
 
 
 def take_last(words: SlotWords) -> list[Candidates]:
     """Take the values that are named last."""
-    return certain(words.named[-words.parts :])
+    return certain(words.named[-words.value_count :])
 
 
 def take_unnamed(words: SlotWords) -> list[Candidates]:
     """Take a value that is not named; each is as likely."""
     unnamed = tuple(value for value in words.vocabulary.values if value not in words.named)
-    return [unnamed] * max(1, min(words.parts, len(unnamed)))
+    return [unnamed] * max(1, min(words.value_count, len(unnamed)))
 
 
 def take_by_cues(words: SlotWords) -> list[Candidates]:
@@ -115,7 +115,7 @@ def take_by_cues(words: SlotWords) -> list[Candidates]:
     """
     pointed = _pointed_values(words)
     if pointed:
-        return pointed[: words.parts]
+        return pointed[: words.value_count]
     if words.is_number:
         return _changed_number(words)
     if EXCLUSIONS.isdisjoint(words.command):
@@ -135,11 +135,11 @@ def _pointed_values(words: SlotWords) -> list[Candidates]:
     - *Red is gone; take the one that is left.* -> blue
     - *I mean the latter. Take both.* -> blue, then red
     """
-    values = words.different
+    values = words.unique_values
     if words.ranks and not words.is_number and max(words.ranks) < len(values):
         return certain(values[rank] for rank in words.ranks)
 
-    is_one_named_again = words.parts == 1 and len(values) < len(words.named)
+    is_one_named_again = words.value_count == 1 and len(values) < len(words.named)
     if is_one_named_again and not REST.isdisjoint(words.command):
         return certain(words.all_but_last[:1])
 
@@ -157,7 +157,7 @@ def _changed_number(words: SlotWords) -> list[Candidates]:
     change = _change(words)
     if change is None:
         return take_first(words)
-    return certain(change(int(value)) for value in words.named[: words.parts])
+    return certain(change(int(value)) for value in words.named[: words.value_count])
 
 
 def _change(words: SlotWords) -> Callable[[int], int] | None:

@@ -53,16 +53,16 @@ def guess_goal(rule: str, text: str, task: str) -> TextGuess:
     thing_total = thing_count(text, get_task(task).things.handled, vocabulary)
     guess: dict[str, tuple[Candidates, ...]] = {}
     for slot, slot_vocabulary in vocabulary.items():
-        parts = thing_total if slot_vocabulary.several else 1
-        candidates = _candidates(rule, text, slot, slot_vocabulary, parts)
+        value_count = thing_total if slot_vocabulary.several else 1
+        candidates = _candidates(rule, text, slot, slot_vocabulary, value_count)
         # Where a rule has nothing to go by, every value is as likely.
-        candidates += [slot_vocabulary.values] * parts
-        guess[slot] = tuple(candidates[:parts])
+        candidates += [slot_vocabulary.values] * value_count
+        guess[slot] = tuple(candidates[:value_count])
     return guess
 
 
 def _candidates(
-    rule: str, text: str, slot: str, vocabulary: SlotVocabulary, parts: int
+    rule: str, text: str, slot: str, vocabulary: SlotVocabulary, value_count: int
 ) -> list[Candidates]:
     """Return the possible values for each place of a goal slot.
 
@@ -73,7 +73,7 @@ def _candidates(
         text: the whole prompt.
         slot: name of the goal slot.
         vocabulary: of the slot.
-        parts: number of values to find.
+        value_count: number of values to find.
     """
     stated = stated_values(text, slot, vocabulary)
     if stated:
@@ -84,7 +84,7 @@ def _candidates(
         vocabulary=vocabulary,
         named=tuple(mention.value for mention in named),
         command=command_words(text),
-        parts=parts,
+        value_count=value_count,
         pointed_index=pointed_index(text),
         ranks=command_ranks(text),
     )

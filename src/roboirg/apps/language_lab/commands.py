@@ -280,7 +280,7 @@ def sample_texts(
 
 
 def _print(*parts: RenderableType) -> None:
-    """Print tables, which are neither cut nor folded in a file."""
+    """Print tables; where the output is a file, they are as wide as they need and not folded."""
     from rich.console import Console
 
     from roboirg.util.console_width import widen

@@ -54,7 +54,7 @@ def expression_order(counts: ClassCounts) -> tuple[str, ...]:
 
 
 def classes_in(counts: ClassCounts) -> set[str]:
-    """Return the classes that are counted in any group."""
+    """Return all classes with a count in any group: ``{"direct": {"it": 50}}`` has ``{"it"}``."""
     found: set[str] = set()
     for by_class in counts.values():
         found.update(by_class)

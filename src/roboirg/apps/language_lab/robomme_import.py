@@ -111,7 +111,7 @@ def _sentences(function: SentenceFunction, task: Task) -> dict[Goal, str]:
             # The difficulty decides how many picks or colors a goal has: others do not occur.
             if len(goal_fields(goal)) != field_count:
                 continue
-            said = _ask(function, task.name, goal, episode.difficulty)
+            said = _first_sentence(function, task.name, goal, episode.difficulty)
             if found.setdefault(goal, said) != said:
                 raise InvalidValueError(
                     f"RoboMME has two sentences for a goal of {task.name} "
@@ -121,7 +121,7 @@ def _sentences(function: SentenceFunction, task: Task) -> dict[Goal, str]:
 
 
 def _published_episodes(task: Task) -> Iterator[PublishedEpisode]:
-    """Yield RoboMME's episodes of a task."""
+    """Yield the episodes of a task whose scenes RoboMME has published, in all splits."""
     for split, size in SIZES.items():
         for index in range(size):
             episode = published_episode(task.name, split, index)
@@ -129,7 +129,7 @@ def _published_episodes(task: Task) -> Iterator[PublishedEpisode]:
                 yield episode
 
 
-def _ask(function: SentenceFunction, task: str, goal: Goal, difficulty: str) -> str:
+def _first_sentence(function: SentenceFunction, task: str, goal: Goal, difficulty: str) -> str:
     """Return the first sentence that RoboMME's function gives for a goal of a task.
 
     Raises:

@@ -29,8 +29,8 @@ def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
 
     A table that would be empty is left out.
     """
-    yield _lengths(instructions)
-    yield _tokens(instructions)
+    yield _word_count_table(instructions)
+    yield _token_count_table(instructions)
     yield expression_table(corpus_statistics.expression_counts(instructions))
     for title, name in _BY_TASK.items():
         counts = corpus_statistics.metadata_counts(instructions, name)
@@ -48,7 +48,7 @@ def expression_table(counts: ClassCounts) -> Table:
     return _count_table(title, "setting", counts, setting_names(), classes)
 
 
-def _lengths(instructions: Sequence[Instruction]) -> Table:
+def _word_count_table(instructions: Sequence[Instruction]) -> Table:
     """Return a table of the mean, smallest and largest number of words, by setting."""
     table = _table("Words per instruction", "setting", ("mean", "fewest", "most"))
     found = corpus_statistics.by_setting(instructions, lambda text: len(text.split()))
@@ -62,7 +62,7 @@ def _lengths(instructions: Sequence[Instruction]) -> Table:
     return table
 
 
-def _tokens(instructions: Sequence[Instruction]) -> Table:
+def _token_count_table(instructions: Sequence[Instruction]) -> Table:
     """Return a table of the median and largest number of tokens, by setting.
 
     Two more columns have the share of instructions that exceed usual limits of policies.

@@ -116,7 +116,7 @@ class HostProcess:
         self._output = os.dup(1)  # the policy may close it
 
     def serve(self) -> None:
-        """Carry out every call."""
+        """Carry out all calls of worlds until the supervisor closes its line."""
         with contextlib.suppress(EOFError, OSError):
             self._supervisor.send(b"!")  # it has started
             while True:
@@ -221,7 +221,7 @@ class HostProcess:
         return b""
 
     def _forget(self, episode: HostedEpisode) -> None:
-        """Hang up on an episode that has ended."""
+        """Close the line of an episode that has ended, and listen to it no longer."""
         self._episodes.discard(episode)
         with contextlib.suppress(KeyError, ValueError):
             self._ready.unregister(episode.line)

@@ -99,7 +99,7 @@ class HostedPolicy:
         self.version = outcome.version or self.version
 
     def act(self, observation: Observation) -> NDArray[np.float64]:
-        """Return the next actions (n, 8) or (n, 7)."""
+        """Return the policy's next actions, (n, 8) or (n, 7) float64, and keep its subgoal."""
         # The rows come as bytes of float64, one after the other.
         outcome = self._call(Call("act", value=observation))
         self.subgoal = outcome.subgoal
@@ -196,7 +196,10 @@ class HostedPlanner(HostedPolicy):
         self._new_ends += (end,)
 
     def plan(self, observation: Observation, step: int) -> str | None:
-        """Return the subgoal from now on."""
+        """Return the subgoal that the planner names for now; None for none.
+
+        The planner also gets the control step, and how subgoals ended since the last call.
+        """
         seen: dict[str, Any] = {**observation, "step": step, "ends": self._new_ends}
         self._new_ends = ()
         self.act(cast("Observation", seen))

@@ -117,7 +117,7 @@ class _PlanLoader(yaml.SafeLoader):
         return node
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        """Read any value; an alias is refused."""
+        """Return the node of any value; raise for an alias (``*name``), which could multiply."""
         if self.check_event(yaml.AliasEvent):
             line = self.peek_event().start_mark.line + 1  # type: ignore[no-untyped-call]
             raise yaml.YAMLError(f"line {line} has an alias, which a plan cannot have")

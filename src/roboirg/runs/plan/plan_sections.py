@@ -167,7 +167,7 @@ class WorkerNeeds:
         return min(rooms)
 
     def options(self) -> dict[str, Any]:
-        """Return the same as options of a Ray actor."""
+        """Return what a worker reserves, as options of a Ray actor: ``{"num_cpus": 1.0, …}``."""
         options: dict[str, Any] = {"num_cpus": self.cpus, "num_gpus": self.gpus}
         if self.memory_gb:
             options["memory"] = int(self.memory_gb * _BYTES_IN_GB)

@@ -205,7 +205,7 @@ class GuardedLoop(EpisodeLoop):
         self._record.ref = dataclasses.replace(ref, version=version)
 
     def act(self, observation: dict[str, Any]) -> NDArray[np.float64]:
-        """Return the policy's next actions, checked."""
+        """Return the policy's next actions, (n, size), checked; record the subgoal it names."""
         with self._guard.policy("policy's act()", "policy_act"):
             rows = check_rows(self.policy.act(cast("Observation", observation)), self._space)
             subgoal = policy_subgoal(self.policy)
@@ -301,7 +301,7 @@ class GuardedLoop(EpisodeLoop):
         return observation, info
 
     def hear(self, utterances: Sequence[Mapping[str, Any]]) -> None:
-        """Let the policy hear what has just been said, and write it under the video."""
+        """Pass new utterances on to the policy, record them, and show them below the video."""
         self._add_heard(utterances)
         if self._writer is not None:
             self._writer.caption = " ".join(utterance["text"] for utterance in self._heard)

@@ -161,7 +161,9 @@ class EpisodeRunner:
     def play_once(
         self, job: Job, writer: VideoWriter | None = None, *, alone: bool = False
     ) -> PlayedJob:
-        """Play one job once; errors of the policy or the environment end up in the record.
+        """Play one job once; return its record and actions.
+
+        Errors of the policy or the environment end up in the record.
 
         Args:
             job: what to play.
@@ -192,8 +194,8 @@ class EpisodeRunner:
                 limit = prompt_limit(needs)
                 # Refused before the episode is played, as the outcome would mean nothing.
                 if self.refuse_long and limit is not None:
-                    found = audit_job(job, limit, prepared.words.instruction)
-                    check_prompt(found.audit, found.verdict)
+                    audited = audit_job(job, limit, prepared.words.instruction)
+                    check_prompt(audited.audit, audited.verdict)
             loop = play_with(policy, prepared, needs, record, guard, writer)
         except EpisodeError as error:
             record.record_error(error.kind, error.cause, error.details)
@@ -201,7 +203,7 @@ class EpisodeRunner:
             if policy is not None:
                 _close_policy(policy, record, guard)
 
-        log = None
+        log = None  # of the actions
         if loop is not None:
             loop.conclude()
             log = loop.log
@@ -292,7 +294,7 @@ def load_hosted_policy(
 
 
 def _policy_of(prepared: PreparedJob) -> PolicyRef:
-    """Return the policy of a job."""
+    """Return the policy that plays a job; raise if the job names none."""
     ref = prepared.job.ref
     if ref is None:
         raise ValueError(f"{prepared.job.slug} names no policy to play it")

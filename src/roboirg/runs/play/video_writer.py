@@ -226,7 +226,7 @@ class VideoWriter:
         return True
 
     def discard(self) -> None:
-        """Delete an unfinished video; never raises."""
+        """Close and delete an unfinished video, so that a new one can begin; never raises."""
         video = self._video
         self._video = None
         self._last_frame = None

@@ -200,7 +200,11 @@ def use_watchdog(watchdog: Watchdog) -> None:
 
 @contextlib.contextmanager
 def watched(phase: Phase, limit_s: float | None = None) -> Iterator[None]:
-    """Write that a phase begins, and remove its deadline afterwards."""
+    """Report a phase to this process's supervisor while the block runs, with its time limit.
+
+    Afterwards the phase is the environment's, without a limit. Without a supervisor nothing is
+    reported.
+    """
     for watchdog in _watchdogs:
         watchdog.write(phase, limit_s)
     try:

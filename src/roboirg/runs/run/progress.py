@@ -61,7 +61,7 @@ class ConsoleReporter(Reporter):
         self._live = Live(console=console, get_renderable=self._render)
 
     def start(self, total: int, done: int) -> None:
-        """Start counting; the pace is that of this run only."""
+        """Start the bar with the episodes that were stored before, which do not count as pace."""
         self._total = total
         self._done = done
         self._start = time.monotonic()

@@ -27,7 +27,7 @@ class ClusterHead:
         self._answered_at = time.monotonic()
 
     def answers(self) -> bool:
-        """Return whether it answers now."""
+        """Return whether the head of the cluster accepts a connection now, and note when it did."""
         host, _, port = self._address.rpartition(":")
         try:
             socket.create_connection((host, int(port)), timeout=ANSWER_S).close()

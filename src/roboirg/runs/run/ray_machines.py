@@ -84,7 +84,7 @@ class HostAddress(NamedTuple):
     key: bytes
 
     def connect(self) -> socket.socket:
-        """Return a new line to the hosts."""
+        """Return a new connection to the machine's policy hosts, with the key already sent."""
         line = socket.socket(socket.AF_UNIX)
         line.connect(self.path)
         line.sendall(self.key)
@@ -254,7 +254,7 @@ class RemoteWorker:
         return RemoteResult(record, files=self._taken_files())
 
     def _worker_for(self, job: Job) -> Worker:
-        """Give a job to the supervised process, a new one if there is none."""
+        """Return the child process that plays jobs, with this one assigned; start it if needed."""
         if self._worker is None:
             self._worker = Worker(self._play, job, self._connect, limit_threads=True)
         else:

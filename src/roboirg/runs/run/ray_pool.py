@@ -175,7 +175,10 @@ class RayPool:
             self._check_waiting(len(jobs))
 
     def close(self) -> None:
-        """Kill all workers, and end the agents."""
+        """Kill all workers, and let the machines' agents remove their files before they are killed.
+
+        Nothing is done if the head of the cluster does not answer, as calls of Ray would block.
+        """
         if not self._head.answers():
             return
         for worker in self._workers:

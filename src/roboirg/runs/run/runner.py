@@ -153,7 +153,10 @@ def check_run(plan: Plan, folder: Path) -> None:
 
 
 def _check_writable(folder: Path) -> None:
-    """Raise if a run's folder cannot be written or made; nothing is written."""
+    """Raise if a run's folder cannot be written, or cannot be made where there is none.
+
+    Nothing is written.
+    """
     existing = folder
     if not folder.exists():
         existing = next(parent for parent in folder.absolute().parents if parent.exists())

@@ -63,7 +63,7 @@ class Worker:
         self.assign(job)
 
     def assign(self, job: Job) -> None:
-        """Send the next job to an idle worker."""
+        """Send a job to this idle worker; its time counts from now."""
         self.job = job
         self.started = time.monotonic()
         self.started_at = utc_now()
@@ -134,7 +134,7 @@ class Worker:
         return self._error_record(kind, f"{exit_} in the {phase}")
 
     def _error_record(self, kind: ErrorKind, message: str) -> Record:
-        """Return the record of a job that ended without its process."""
+        """Return the record of an error for the current job, whose process is lost."""
         record = lost_record(self.job, kind, message)
         record.started_at = self.started_at
         record.duration_s = round(time.monotonic() - self.started, 3)

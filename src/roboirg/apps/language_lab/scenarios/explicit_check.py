@@ -43,7 +43,7 @@ class ExplicitReport:
     unused: list[str] = field(default_factory=list)
 
     def add(self, goal: Goal, text: str) -> None:
-        """Add what is said of a goal."""
+        """Add a goal that is stated, and the text that states it; the first few texts are shown."""
         self.stated.add(goal)
         self.longest = max(self.longest, text, key=tokens_of)
         if text not in self.renderings and len(self.renderings) < SHOWN:

@@ -20,9 +20,9 @@ _COLOR_WORDS = frozenset(_COLORS) | frozenset(f"{name}s" for name in _COLORS)
 _TIME_WORDS = frozenset(
     ("before", "after", "earlier", "later", "previous", "previously", "next", "following")
 )
-_THINGS = re.compile(r"\b(?:that|the) one\b(?! time)|\bboth targets\b")
+_ONE_THING = re.compile(r"\b(?:that|the) one\b(?! time)|\bboth targets\b")
 """Of one thing, or of the two that are there, not the number."""
-_POINTERS = ("first", "second", "third", "one", "each", "other")
+_COUNTING_REFERENCES = ("first", "second", "third", "one", "each", "other")
 
 
 def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
@@ -31,7 +31,7 @@ def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
     Where the color is to be found in the context, *Lift the red cube* leaks ``red``. A landmark of
     the goal, such as *next to the bin*, leaks its place.
     """
-    text = _THINGS.sub("", _without_pointers(instruction).lower())
+    text = _ONE_THING.sub("", _without_references(instruction).lower())
     words = set(re.findall(r"[a-z0-9]+", text))
     leaked: set[str] = set()
     for slot in hidden_slots(instruction, goal):
@@ -59,7 +59,7 @@ def _spellings(value: SlotValue) -> frozenset[str]:
     return _TIME_WORDS
 
 
-def _without_pointers(instruction: Instruction) -> str:
+def _without_references(instruction: Instruction) -> str:
     """Return the command without words that point back with a number, such as *the first of them*.
 
     Their numbers are no values of the goal, so they leak nothing.
@@ -68,6 +68,6 @@ def _without_pointers(instruction: Instruction) -> str:
     last = len(instruction.utterances) - 1
     # From the end, so that the positions of earlier mentions stay right.
     for mention in reversed(instruction.mentions):
-        if mention.utterance == last and mention.expression in _POINTERS:
+        if mention.utterance == last and mention.expression in _COUNTING_REFERENCES:
             text = text[: mention.start] + text[mention.end :]
     return text

@@ -53,9 +53,10 @@ def draw_sample(tasks: Sequence[str], settings: Sequence[str], seed: int) -> lis
 
 
 def _texts(task: str, setting: str, seed: int) -> Iterator[SampledText]:
-    """Yield a text of a task for each frame (the situation in it); without frames `TEXTS`.
+    """Yield a text of a task for each frame (the situation that it tells of), up to `TEXTS`.
 
-    They are from random scenes that only this seed uses, in the words of the test pool.
+    They are from random scenes that only this seed uses, in the words of the test pool. In a
+    setting without frames, each scene gives a text.
     """
     options = InstructionOptions(wordings=POOL)
     first = seed * MOST_SCENES  # number of a random scene

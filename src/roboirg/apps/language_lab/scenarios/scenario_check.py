@@ -42,7 +42,7 @@ RANDOM_SCENES = 200
 """Scenes of a task beyond the published ones."""
 SHOWN = 3
 """Texts of a scenario that its report shows."""
-_RANKED = ("former", "latter", "first", "second", "third", "other")
+_CHOOSING_CLASSES = ("former", "latter", "first", "second", "third", "other")
 """Classes of words that choose one of a list."""
 
 
@@ -93,7 +93,13 @@ def scenes_of(task: str, random: int = RANDOM_SCENES) -> tuple[Episode, ...]:
 def check_scenarios(
     words: TaskScenarios, name: str | None, scenes: Sequence[Episode]
 ) -> list[ScenarioReport]:
-    """Check the scenarios of a task, or only those of one frame, in scenes."""
+    """Return a report on each scenario of a task, a template of texts, checked in some scenes.
+
+    Args:
+        words: all words of the task in the scenarios' file.
+        name: of the frame (the situation) whose scenarios are checked; None for all.
+        scenes: episodes of the task.
+    """
     reports: list[ScenarioReport] = []
     for scenario in words.scenarios:
         if name in (None, scenario.fields.frame):
@@ -173,7 +179,7 @@ class _SceneChecker:
                 self._check_texts(episode, replace(self.usual, frame="camera"))
         except InvalidValueError as error:
             complaint = f"cannot be said: {str(error).rstrip('.')}"
-            self._report.add(complaint, _with_goal(episode))
+            self._report.add(complaint, _key_with_goal(episode))
             return
         if instruction:
             self._add_fit(episode, implicit=instruction[0])
@@ -239,7 +245,7 @@ class _SceneChecker:
         instruction = self._instruction_of(request, chosen)
         if request.resolved:
             report.resolved.add(instruction.text)
-        for rule in _broken(request, chosen, instruction):
+        for rule in _broken_rules(request, chosen, instruction):
             report.add(rule, instruction.text)
         report.longest = max(report.longest, instruction.text, key=tokens_of)
         if request.options.distractor == "competing" and not report.competing:
@@ -247,7 +253,10 @@ class _SceneChecker:
         return instruction
 
     def _chosen(self, request: InstructionRequest) -> Chosen | None:
-        """Return how the scenario says an episode; None if it does not fit."""
+        """Return how the scenario says an episode.
+
+        None if it does not fit, or its setting cannot express the episode.
+        """
         if _is_refused(request):
             return None
         scenario = self._report.scenario
@@ -287,7 +296,7 @@ def unserved_settings(
             example = lacking[0]
             yield (
                 f"{setting} has no scenario that fits {counted(len(lacking), 'scene')}, such as "
-                f"{_with_goal(example)}, so a run refuses them; see why with `roboirg show "
+                f"{_key_with_goal(example)}, so a run refuses them; see why with `roboirg show "
                 f"{example.task} {example.index} --split {example.split} --words --wordings "
                 f"{path}`, and write one more"
             )
@@ -299,7 +308,10 @@ def _is_refused(request: InstructionRequest) -> bool:
 
 
 def _served_scenes(reports: Sequence[ScenarioReport]) -> dict[str, set[str]]:
-    """Return the keys of the scenes that a user's scenarios fit, by setting."""
+    """Return the keys of the scenes that scenarios of a user's file fit, by setting.
+
+    For example ``{"direct": {"PickXtimes/train/3"}}``.
+    """
     served: dict[str, set[str]] = {}
     for report in reports:
         fields = report.scenario.fields
@@ -308,7 +320,7 @@ def _served_scenes(reports: Sequence[ScenarioReport]) -> dict[str, set[str]]:
     return served
 
 
-def _with_goal(episode: Episode) -> str:
+def _key_with_goal(episode: Episode) -> str:
     """Return the key of an episode with its goal: ``PickXtimes/train/3 (red, twice)``."""
     return f"{episode.key} ({in_words(episode.goal)})"
 
@@ -331,7 +343,9 @@ def _in_both_pools(scenario: Scenario, words: TaskScenarios) -> Iterator[str]:
         yield f"the other pool has {shared!r}, too"
 
 
-def _broken(request: InstructionRequest, chosen: Chosen, instruction: Instruction) -> Iterator[str]:
+def _broken_rules(
+    request: InstructionRequest, chosen: Chosen, instruction: Instruction
+) -> Iterator[str]:
     """Yield a complaint for each rule that a text of a scenario breaks.
 
     Its grammar is checked, its meaning, that its command does not give the goal away, and that
@@ -345,7 +359,7 @@ def _broken(request: InstructionRequest, chosen: Chosen, instruction: Instructio
     leaked = find_leaks(instruction, request.episode.goal)
     if leaked:
         yield f"the command gives away {', '.join(sorted(leaked))}"
-    yield from _broken_pointers(instruction, chosen.scenario)
+    yield from _unclear_references(instruction, chosen.scenario)
 
 
 def _wrong_meaning(request: InstructionRequest, meaning: Meaning) -> Iterator[str]:
@@ -370,7 +384,7 @@ def _wrong_meaning(request: InstructionRequest, meaning: Meaning) -> Iterator[st
             yield f"say.{value.field} must stand for the goal's value; it stands for {words}"
 
 
-def _broken_pointers(instruction: Instruction, scenario: Scenario) -> Iterator[str]:
+def _unclear_references(instruction: Instruction, scenario: Scenario) -> Iterator[str]:
     """Yield a complaint for each word that points back, such as *it*, without a clear antecedent.
 
     An antecedent is an earlier mention of the value, such as *red* before *it*; there must be
@@ -386,10 +400,12 @@ def _broken_pointers(instruction: Instruction, scenario: Scenario) -> Iterator[s
             if instruction.utterances[mention.utterance].stage != "distractor":
                 antecedents.append(mention)
             continue
-        values = [str(other.value) for other in _of_its_kind(mention, antecedents, instruction)]
+        values = [
+            str(other.value) for other in _possible_antecedents(mention, antecedents, instruction)
+        ]
         words = repr(instruction.span(mention))
         yield from _wrong_antecedents(mention, words, values, is_named_again=is_named_again)
-        if mention.expression in _RANKED:
+        if mention.expression in _CHOOSING_CLASSES:
             has_chosen = True
         elif not (has_list and has_chosen):
             yield from _ambiguous(mention, words, values)
@@ -435,7 +451,7 @@ def _wrong_antecedents(
             yield f"{words} has {number} antecedents {part}"
 
 
-def _of_its_kind(
+def _possible_antecedents(
     pointer: Mention, before: Sequence[Mention], instruction: Instruction
 ) -> Sequence[Mention]:
     """Return the earlier mentions that a word such as *it* could mean, by their kind.
@@ -455,17 +471,17 @@ def _of_its_kind(
     if pointer.expression not in ("there", "that") or not of_value:
         return of_kind
     # "That cube" was named by its color, "the one there" by its place.
-    is_named = _is_named(of_value[0], instruction)
-    return [mention for mention in of_kind if _is_named(mention, instruction) == is_named]
+    is_named = _says_value(of_value[0], instruction)
+    return [mention for mention in of_kind if _says_value(mention, instruction) == is_named]
 
 
-def _is_named(mention: Mention, instruction: Instruction) -> bool:
+def _says_value(mention: Mention, instruction: Instruction) -> bool:
     """Return whether a mention says its value; else it describes it."""
     return instruction.span(mention) == mention.value
 
 
 def _kind_of(value: str) -> str:
-    """Return ``moment``, ``number`` or ``color``."""
+    """Return what a goal value is: ``before`` a ``moment``, ``2`` a ``number``, else ``color``."""
     if value in MOMENTS:
         return "moment"
     if value.isdecimal():

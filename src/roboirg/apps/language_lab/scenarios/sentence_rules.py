@@ -71,9 +71,9 @@ _VALUE = re.compile(
 )
 """Words that could be a value: *on the right*, but not *all right*; *once a day*, but not *once
 we're done*. *One* is a pronoun most of the time."""
-_SILENT = ("distractors", "cue")
+_WITHOUT_VALUES = ("distractors", "cue")
 """Fields that name no value at all."""
-_COMMAND = ("lead", "say", "remarks")
+_COMMAND_FIELDS = ("lead", "say", "remarks")
 """Fields of the command, which may point back only."""
 _FREE_SLOTS = PEOPLE | {"rank", "step"}
 _COUNTS = {"counts.0", "counts.1"}
@@ -105,7 +105,7 @@ def broken_sentences(scenario: Scenario, pointed: str) -> Iterator[str]:
     is_lifted = pointed in ("container", "hidden_cube")
     for name, texts in scenario.texts.items():
         for text in texts:
-            for complaint in _wrong(name, text, never):
+            for complaint in _sentence_complaints(name, text, never):
                 yield f"{name}: {complaint}"
             if is_lifted and name.startswith("say.") and not _names_container(text):
                 yield (
@@ -120,7 +120,7 @@ def _names_container(text: Text) -> bool:
     return "over " in literal(text) or not slots.isdisjoint(_DESCRIBED)
 
 
-def _wrong(name: str, text: Text, never: Mapping[str, str]) -> Iterator[str]:
+def _sentence_complaints(name: str, text: Text, never: Mapping[str, str]) -> Iterator[str]:
     """Yield a complaint for each rule that a sentence of a scenario breaks.
 
     Rules are about its words, the values that it names, and what it points back at.
@@ -138,7 +138,7 @@ def _wrong(name: str, text: Text, never: Mapping[str, str]) -> Iterator[str]:
             yield f"has the words {found[0]!r}; {reason}"
     if field in ("lead", "remarks") and not words.endswith(" "):
         yield f"must end with a space: {words!r}"
-    yield from _values_named(field, text)
+    yield from _value_complaints(field, text)
     if field == "competing":
         yield from _rival_named_last(text)
     pointers = list(pointers_in(text))
@@ -167,7 +167,7 @@ def _rival_named_last(text: Text) -> Iterator[str]:
             yield f"names {{{rival}}} last, which 'that one' would mean; say it before <... {slot}>"
 
 
-def _values_named(field: str, text: Text) -> Iterator[str]:
+def _value_complaints(field: str, text: Text) -> Iterator[str]:
     """Yield a complaint for each value that a sentence names where it may only point back.
 
     In a ``lead``, the beginning of a command, neither *red* may be said nor the slot ``{color}``;
@@ -177,7 +177,7 @@ def _values_named(field: str, text: Text) -> Iterator[str]:
         field: of the scenario, to which the sentence belongs.
         text: the sentence.
     """
-    if field in _SILENT or field in _COMMAND:
+    if field in _WITHOUT_VALUES or field in _COMMAND_FIELDS:
         values = _values_in_words(field, text)
         if values:
             yield f"names {', '.join(sorted(values))}, which could be a value"
@@ -196,7 +196,7 @@ def _values_in_words(field: str, text: Text) -> set[str]:
     """
     outside = tuple(part for part in text if not isinstance(part, Pointer))
     values = set(_VALUE.findall(literal(outside).lower()))
-    if field in _COMMAND and any(pointers_in(text)):
+    if field in _COMMAND_FIELDS and any(pointers_in(text)):
         values -= {"twice", "two"}  # "twice as often as that" is a relation of the table
     return values
 

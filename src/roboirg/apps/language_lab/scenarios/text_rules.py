@@ -93,16 +93,16 @@ def broken_text(
         chosen: how a scenario says the episode, with the values that it lists.
         request: with the episode.
     """
-    yield from _found(GRAMMAR, "\n".join(instruction.turns))
+    yield from _complaints(GRAMMAR, "\n".join(instruction.turns))
     patterns = dict(MENTIONED)
     length = len(chosen.introduced.values.get("list", ()))
     patterns |= OF_LISTS.get(length, {})
     if request.episode.scene.motions_of(Swap):
         patterns |= MOVED
-    yield from _found(patterns, _marked(instruction))
+    yield from _complaints(patterns, _with_marked_mentions(instruction))
 
 
-def _found(patterns: Patterns, text: str) -> Iterator[str]:
+def _complaints(patterns: Patterns, text: str) -> Iterator[str]:
     """Yield a complaint for each pattern of wrong words that a text has, with the reason."""
     for pattern, reason in patterns.items():
         found = re.search(pattern, text)
@@ -110,7 +110,7 @@ def _found(patterns: Patterns, text: str) -> Iterator[str]:
             yield f"says {found[0]!r}; {reason}"
 
 
-def _marked(instruction: Instruction) -> str:
+def _with_marked_mentions(instruction: Instruction) -> str:
     """Return the text with its referring words marked, as the patterns of rules need it.
 
     *Lift it.* becomes ``Lift <it red:it>.``: class of the expression, value, and the words; None
