@@ -257,7 +257,7 @@ def test_a_spot_such_as_on_the_left_is_true_of_one_object_only(task):
 
 @pytest.mark.parametrize("task", TASKS_WITH_PLACES)
 def test_nearly_all_published_scenes_have_everyday_words_for_a_goal_object(task):
-    """Two of three have a spot, a place that can be said without a noun: *on the left*."""
+    """Three of five have a spot, a place that can be said without a noun: *on the left*."""
     kind = get_task(task).things.pointed
     with_spot = []
     unusual = []
@@ -274,7 +274,7 @@ def test_nearly_all_published_scenes_have_everyday_words_for_a_goal_object(task)
         with_spot.append(any(place.spot for place in places))
         unusual.append(all(place.kind == PlaceClass.UNUSUAL for place in places))
 
-    assert sum(with_spot) >= 0.66 * len(with_spot)
+    assert sum(with_spot) >= 0.6 * len(with_spot)
     assert sum(unusual) <= 0.04 * len(unusual)
 
 
