@@ -247,17 +247,17 @@ def learn_reader(
 
     words = PlanWords(context, plan, TRAINING, READER_OPTIONS)
     check_output_file(out)
-    body_plan = load_body(body)
+    trained_body = load_body(body)
     if tasks == "all":
-        tasks = ",".join(body_plan.goals.tasks)
+        tasks = ",".join(trained_body.goals.tasks)
     reader_plan = _reader_plan(words, words.tasks(tasks), settings)
     for task in reader_plan.tasks:
-        known_name("task of this body", task, body_plan.goals.tasks)
+        known_name("task of this body", task, trained_body.goals.tasks)
     check_words(reader_plan)
     work = out.parent / "reader-work"
     work.mkdir(exist_ok=True)
     reader = train_policy_reader(
-        body_plan, reader_plan, work, out.stem, worker_count(workers), _print_tenths()
+        trained_body, reader_plan, work, out.stem, worker_count(workers), _print_tenths()
     )
     save_reader(reader, out)
     print_policy(PolicyFiles(body, out), reader_plan)

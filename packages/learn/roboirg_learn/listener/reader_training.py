@@ -164,7 +164,7 @@ class ReaderCourse(Course[Lesson]):
         return even_batches(lessons, rng, _length)
 
     def loss(self, batch: Sequence[Lesson]) -> torch.Tensor:
-        """Return the mean cross-entropy; lessons are scored singly, as tasks differ in goals."""
+        """Return the mean cross-entropy; lessons go one by one, as tasks differ in goals."""
         losses = []
         for lesson, scores in self._scored(batch):
             goal = torch.tensor([lesson.goal])
