@@ -148,7 +148,7 @@ def test_children_do_not_outlive_a_parent_that_is_killed(tmp_path):
         f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
         "import test_child_process as own\n"
         "if __name__ == '__main__':\n"
-        "    child = own.ChildProcess.spawn(own.answer)\n"
+        "    child = own.ChildProcess.spawn(own.answer_messages)\n"
         "    child.send('who'); print(child.receive()[0], flush=True)\n"
         "    child.send('ignore'); child.receive()\n"
     )
@@ -179,7 +179,7 @@ def test_a_parallel_map_names_the_item_at_which_a_process_died_and_raises_its_ex
         list(parallel_map(square_root_but_for_7_and_9, [9], 2))
     with pytest.raises(ValueError, match="seven") as caught:
         list(parallel_map(square_root_but_for_7_and_9, [7], 1))
-    assert "in root" in caught.value.__notes__[0]  # where it was raised
+    assert "in square_root_but_for_7_and_9" in caught.value.__notes__[0]  # where it was raised
 
 
 def test_a_parallel_map_that_is_closed_early_ends_its_processes():

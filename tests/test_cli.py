@@ -46,8 +46,8 @@ def roboirg(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
             code = 0
         except SystemExit as left:
             code = left.code if isinstance(left.code, int) else 0
-        told = capsys.readouterr()
-        return SimpleNamespace(code=code, out=told.out, err=told.err)
+        result = capsys.readouterr()
+        return SimpleNamespace(code=code, out=result.out, err=result.err)
 
     return call
 
@@ -105,11 +105,11 @@ def test_a_wrong_command_line_is_one_sentence_with_exit_code_2_and_writes_nothin
     roboirg, tmp_path, monkeypatch, words, sentence
 ):
     monkeypatch.chdir(tmp_path)
-    said = roboirg(*words)
+    result = roboirg(*words)
 
-    assert (said.code, said.out, said.err.count("\n")) == (2, "", 1)
-    assert said.err.startswith("roboirg: ")
-    assert sentence in said.err
+    assert (result.code, result.out, result.err.count("\n")) == (2, "", 1)
+    assert result.err.startswith("roboirg: ")
+    assert sentence in result.err
     assert not list(tmp_path.iterdir())
 
 
@@ -140,9 +140,9 @@ def test_a_command_whose_reader_has_closed_the_pipe_prints_no_error():
 def test_help_and_version_are_printed(roboirg):
     assert roboirg("--version").out == f"roboirg {version('roboirgbench')}\n"
     for words in (("--help",), ("run", "-h")):
-        said = roboirg(*words)
-        assert (said.code, said.err) == (0, "")
-        assert "Usage" in said.out
+        result = roboirg(*words)
+        assert (result.code, result.err) == (0, "")
+        assert "Usage" in result.out
     assert roboirg().code in {0, 2}  # Click before 8.2 sees no fault in it
 
 
@@ -150,9 +150,9 @@ def test_without_pyav_a_run_with_videos_is_refused_before_anything_is_played(
     roboirg, tmp_path, monkeypatch
 ):
     monkeypatch.setitem(sys.modules, "av", None)
-    said = roboirg("run", "--plan", "demo", "--out", tmp_path / "out")
+    result = roboirg("run", "--plan", "demo", "--out", tmp_path / "out")
 
-    assert (said.code, said.out, said.err.count("\n")) == (2, "", 1)
+    assert (result.code, result.out, result.err.count("\n")) == (2, "", 1)
     assert not (tmp_path / "out").exists()
 
 
@@ -175,10 +175,10 @@ def test_videos_that_could_not_be_written_are_reported_once_and_change_no_verdic
         tmp_path,
     )
 
-    said = roboirg(*words)
+    result = roboirg(*words)
 
-    assert said.code == 0
-    assert said.err == (
+    assert result.code == 0
+    assert result.err == (
         "10 of 10 videos could not be written; the verdicts are not affected. "
         "First error: OSError: disk full\n"
     )
@@ -189,10 +189,10 @@ def test_videos_that_could_not_be_written_are_reported_once_and_change_no_verdic
 def test_the_same_run_command_plays_nothing_twice_and_report_writes_its_page(roboirg, tmp_path):
     """Two episodes in five settings each."""
     command = (*RUN_RANDOM, "--episodes", "2", "--workers", "0", "--out", tmp_path)
-    said = roboirg(*command)
-    assert said.code == 0, said.err
+    result = roboirg(*command)
+    assert result.code == 0, result.err
     lines = (tmp_path / "records.jsonl").read_text().splitlines()
-    assert "[1/10] random PickXtimes test/0 direct: success" in said.out
+    assert "[1/10] random PickXtimes test/0 direct: success" in result.out
     assert len(lines) == 10
     keys = {"policy", "task", "split", "episode", "seed", "difficulty", "options"}
     assert keys | {"policy_seed", "outcome", "cause", "steps"} <= set(json.loads(lines[0]))
@@ -200,10 +200,10 @@ def test_the_same_run_command_plays_nothing_twice_and_report_writes_its_page(rob
     again = roboirg(*command)
     assert "10 of 10 episodes already stored." in again.out
 
-    told = roboirg("report", tmp_path)
-    assert told.code == 0
-    assert "PickXtimes" in told.out
-    assert told.out.splitlines()[-1] == str(tmp_path / "report.html")
+    result = roboirg("report", tmp_path)
+    assert result.code == 0
+    assert "PickXtimes" in result.out
+    assert result.out.splitlines()[-1] == str(tmp_path / "report.html")
     assert (tmp_path / "report.html").exists()
 
 
@@ -218,21 +218,21 @@ def test_a_run_with_errors_has_exit_code_2_until_they_were_played_again(
         "steps": 2,
     }
     command = (*RUN_RANDOM, "--episodes", "1", "--workers", "0", "--out", tmp_path)
-    said = roboirg(*command)
+    result = roboirg(*command)
 
-    assert said.code == 2
-    assert "5 of 5 episodes ended in an error" in said.err
-    assert "Action value 3 is nan" in said.err
+    assert result.code == 2
+    assert "5 of 5 episodes ended in an error" in result.err
+    assert "Action value 3 is nan" in result.err
 
     player_without_simulator.result = {"outcome": "success"}
     assert roboirg(*command).code == 0
 
 
 def test_instructions_are_printed(roboirg, snapshot):
-    said = roboirg(
+    result = roboirg(
         "show", "PickXtimes", "3", "--words", "--settings", "contextual", "--stages", "1,5"
     )
-    assert said.out + roboirg("show", "VideoUnmask", "0", "--words").out == snapshot
+    assert result.out + roboirg("show", "VideoUnmask", "0", "--words").out == snapshot
 
     wrong = roboirg("show", "VideoUnmask", "99", "--words")
     assert (wrong.code, wrong.err.count("\n")) == (2, 1)
@@ -245,12 +245,12 @@ def test_run_and_report_list_ten_failures_and_count_the_others(
         "outcome": "failure",
         "cause": "pressed the button too early",
     }
-    said = roboirg(*RUN_RANDOM, "--episodes", "3", "--workers", "0", "--out", tmp_path)
+    result = roboirg(*RUN_RANDOM, "--episodes", "3", "--workers", "0", "--out", tmp_path)
 
-    assert said.code == 0
-    assert "random: 15 episodes without success" in said.out
-    assert "  PickXtimes test/0 explicit: pressed the button too early\n" in said.out
-    assert "and 5 more" in said.out
+    assert result.code == 0
+    assert "random: 15 episodes without success" in result.out
+    assert "  PickXtimes test/0 explicit: pressed the button too early\n" in result.out
+    assert "and 5 more" in result.out
     assert "and 5 more" in roboirg("report", tmp_path).out
 
 
@@ -262,13 +262,13 @@ def test_an_episode_is_shown(roboirg, tmp_path, monkeypatch, snapshot):
     picture = StripMoment(7, "the end", np.zeros((256, 256, 3), np.uint8))
     played = playthrough.Playthrough("success", 7, (picture,))
     monkeypatch.setattr(playthrough, "play_through", lambda _: played)
-    said = roboirg("show", "VideoPlaceButton", "3", "--split", "val")
+    result = roboirg("show", "VideoPlaceButton", "3", "--split", "val")
 
-    assert (said.code, said.err) == (0, "")
+    assert (result.code, result.err) == (0, "")
 
     names = [f"VideoPlaceButton-val-3{end}.png" for end in ("", "-dark")]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
-    assert said.out == snapshot
+    assert result.out == snapshot
 
 
 def test_help_imports_no_large_library():
@@ -361,9 +361,9 @@ def test_an_option_on_the_command_line_replaces_that_of_the_plan_file(
     del player_without_simulator
     plan = tmp_path / "plan.yaml"
     plan.write_text("policies: [random]\ntasks: StopCube\nsettings: explicit\nepisodes: 3\n")
-    said = roboirg("run", "--plan", plan, "--episodes", "2", "--workers", "0", "--out", tmp_path)
+    result = roboirg("run", "--plan", plan, "--episodes", "2", "--workers", "0", "--out", tmp_path)
 
-    assert said.code == 0
+    assert result.code == 0
 
     made = read_plan(tmp_path)
     assert made is not None
@@ -375,12 +375,14 @@ def test_a_dry_run_prints_episodes_and_model_calls_and_plays_nothing(roboirg, tm
     model = "p=planner:stateless?model=x&base_url=http://localhost:1/v1"
     words = ("run", "--plan", "paper", "--policy", model, "--dry-run", "--out", tmp_path / "out")
 
-    said = roboirg(*words)
+    result = roboirg(*words)
 
-    assert "least calls of models" in said.out
-    assert said.code == 0
-    assert "150 + 150" in said.out
-    assert "13,650 episodes, 0 already stored. Workers: one per core" in " ".join(said.out.split())
+    assert "least calls of models" in result.out
+    assert result.code == 0
+    assert "150 + 150" in result.out
+    assert "13,650 episodes, 0 already stored. Workers: one per core" in " ".join(
+        result.out.split()
+    )
     assert not (tmp_path / "out").exists()
 
 
@@ -391,9 +393,9 @@ def test_a_dry_run_counts_model_calls_only_for_episodes_that_are_not_stored(robo
     store(tmp_path, [make_record(job, "success") for job in played])
     words = ("--tasks", "PickXtimes", "--settings", "direct", "--episodes", "3", "--dry-run")
 
-    said = roboirg("run", "--policy", model, *words, "--out", tmp_path)
+    result = roboirg("run", "--policy", model, *words, "--out", tmp_path)
 
-    assert re.search(r"p\W+direct\W+2\W", said.out)
+    assert re.search(r"p\W+direct\W+2\W", result.out)
 
 
 @pytest.mark.parametrize(
@@ -406,8 +408,8 @@ def test_a_dry_run_counts_model_calls_only_for_episodes_that_are_not_stored(robo
 def test_a_dry_run_names_the_forms_of_instructions_whose_episodes_it_counts(
     roboirg, tmp_path, words, caption
 ):
-    said = roboirg(*RUN_RANDOM, *words, "--dry-run", "--out", tmp_path / "out")
-    assert caption in map(str.strip, said.out.splitlines())
+    result = roboirg(*RUN_RANDOM, *words, "--dry-run", "--out", tmp_path / "out")
+    assert caption in map(str.strip, result.out.splitlines())
 
 
 @pytest.mark.parametrize(
@@ -433,10 +435,10 @@ def test_a_dry_run_refuses_an_output_folder_as_the_run_itself_does(
 
     # First as a dry run, then as a run.
     for last in (["--dry-run"], []):
-        said = roboirg(*RUN_RANDOM, "--out", tmp_path / "out", *given, *last)
-        assert said.code == 2, said
-        assert sentence.format(**places) in said.err
-        assert len(said.err.splitlines()) == 1
+        result = roboirg(*RUN_RANDOM, "--out", tmp_path / "out", *given, *last)
+        assert result.code == 2, result
+        assert sentence.format(**places) in result.err
+        assert len(result.err.splitlines()) == 1
         if last:
             assert sorted(tmp_path.rglob("*")) == before
 
@@ -479,9 +481,9 @@ def test_a_relative_output_folder_stays_the_same_although_a_policy_changes_direc
     monkeypatch.setattr("roboirg.runs.run.runner.EpisodeRunner", Wanderer)
     monkeypatch.setattr(Wanderer, "away", away)
 
-    said = roboirg(*RUN_RANDOM, "--episodes", "2", "--workers", "0", "--out", "mine")
+    result = roboirg(*RUN_RANDOM, "--episodes", "2", "--workers", "0", "--out", "mine")
 
-    assert said.code == 0, said.err
+    assert result.code == 0, result.err
     assert (home / "mine" / "records.jsonl").exists()
     assert list(away.iterdir()) == []
 

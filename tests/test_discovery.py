@@ -11,10 +11,10 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.tasks import Task, get_task
 from roboirg.util import discovery
 
-OUTSIDE = dataclasses.replace(get_task("PickXtimes"), name="Outside", suite="lab")
-OTHER = dataclasses.replace(OUTSIDE, name="Other")
-MODULE = ModuleType("outside")
-MODULE.TASK = OUTSIDE
+TASK_OF_A_LAB = dataclasses.replace(get_task("PickXtimes"), name="Outside", suite="lab")
+SECOND_TASK_OF_THE_LAB = dataclasses.replace(TASK_OF_A_LAB, name="Other")
+MODULE_WITH_A_TASK = ModuleType("outside")
+MODULE_WITH_A_TASK.TASK = TASK_OF_A_LAB
 
 
 def raise_error():
@@ -46,17 +46,20 @@ def tasks_found():
     return list(discovery.discover("roboirg.tasks", "TASK", Task, tasks.ENTRY_POINTS).values())
 
 
-@pytest.mark.parametrize("thing", [OUTSIDE, MODULE], ids=["object", "module"])
+@pytest.mark.parametrize("thing", [TASK_OF_A_LAB, MODULE_WITH_A_TASK], ids=["object", "module"])
 def test_another_packages_entry_point_may_name_a_task_or_the_module_that_has_it(
     install_entry_points, thing
 ):
     """An entry point is a name under which an installed package offers something."""
-    install_entry_points(lambda: thing, lambda: OTHER)
-    assert tasks_found()[-2:] == [OUTSIDE, OTHER]
+    install_entry_points(lambda: thing, lambda: SECOND_TASK_OF_THE_LAB)
+    assert tasks_found()[-2:] == [TASK_OF_A_LAB, SECOND_TASK_OF_THE_LAB]
     assert (
         len(tasks_found()) == len(discovery.discover_in_modules("roboirg.tasks", "TASK", Task)) + 2
     )
-    assert discovery.find_entry("outside-1", "TASK", Task, tasks.ENTRY_POINTS) is OTHER
+    assert (
+        discovery.find_entry("outside-1", "TASK", Task, tasks.ENTRY_POINTS)
+        is SECOND_TASK_OF_THE_LAB
+    )
 
 
 @pytest.mark.parametrize(
@@ -69,7 +72,7 @@ def test_another_packages_entry_point_may_name_a_task_or_the_module_that_has_it(
         (lambda: 7, r"of a-lab in the group 'roboirg.tasks' is 7; it must be a Task, or a module"),
         (lambda: ModuleType("empty"), "is None; it must be a Task, or a module with one as TASK"),
         (lambda: get_task("BinFill"), "a-lab adds 'BinFill' .* a name that roboirg has; choose"),
-        (lambda: OTHER, "a-lab adds 'Other' .* a name that a-lab has; choose"),
+        (lambda: SECOND_TASK_OF_THE_LAB, "a-lab adds 'Other' .* a name that a-lab has; choose"),
     ],
     ids=["raises", "no task", "empty module", "taken", "taken by another"],
 )
@@ -77,13 +80,13 @@ def test_a_bad_entry_point_is_one_sentence_that_names_its_package(
     install_entry_points, load, sentence
 ):
     get_task("BinFill")  # known before the entry points change
-    install_entry_points(load, lambda: OTHER)
+    install_entry_points(load, lambda: SECOND_TASK_OF_THE_LAB)
     with pytest.raises(InvalidValueError, match=sentence):
         tasks_found()
 
 
 def test_a_task_of_another_package_may_not_join_a_suite_of_the_benchmark(install_entry_points):
     """Averages over the suite would change with what is installed."""
-    install_entry_points(lambda: dataclasses.replace(OUTSIDE, suite="counting"))
+    install_entry_points(lambda: dataclasses.replace(TASK_OF_A_LAB, suite="counting"))
     with pytest.raises(InvalidValueError, match="Outside of another package is in the suite"):
         tasks._registry.__wrapped__()

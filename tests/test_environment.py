@@ -321,7 +321,7 @@ def test_a_policy_gets_the_history_and_the_video_that_it_declares():
     with pytest.raises(InvalidValueError, match=r"needs observe_every=5, but .* has None"):
         play(wrong, policy)
 
-    name = f"{__name__}:Choosy"
+    name = f"{__name__}:NeedsHistory"
     job = job_of(policy=name, task="PickXtimes", split="test", episode=2, setting="direct")
     env = make_env(
         PreparedJob(job), PolicyNeeds(cameras=(), demonstration_frames="none", observe_every=5)

@@ -104,9 +104,9 @@ def refused(folder_with_a_run, monkeypatch, capsys):
         monkeypatch.setattr(sys, "argv", ["roboirg", *name.split(), *words])
         with pytest.raises(SystemExit) as left:
             cli.main()
-        told = capsys.readouterr()
-        assert left.value.code == 2, told
-        return told
+        printed = capsys.readouterr()
+        assert left.value.code == 2, printed
+        return printed
 
     return call
 
@@ -116,11 +116,11 @@ def test_a_wrong_command_line_is_one_sentence_with_exit_code_2_and_writes_nothin
     name, words, folder_with_a_run, refused
 ):
     before = sorted(folder_with_a_run.rglob("*"))
-    told = refused(name, words)
+    printed = refused(name, words)
 
-    assert told.out == ""
-    assert told.err.startswith("roboirg: ")
-    assert told.err.count("\n") == 1
+    assert printed.out == ""
+    assert printed.err.startswith("roboirg: ")
+    assert printed.err.count("\n") == 1
     assert sorted(folder_with_a_run.rglob("*")) == before
 
 

@@ -22,39 +22,45 @@ def sentences_of(first: list, second: list) -> str:
     return "\n".join(sentences(comparison_of(first, second), GOOD, POOR))
 
 
-def results_of_case(name: str) -> tuple[list, list]:
-    """Return the results of the good policy and of the poor one."""
-    settings = ("explicit", "direct", "reasoning", "contextual")
-    good, poor = {
+def results_of_policy(policy: str, outcomes_and_fields: list) -> list:
+    found = []
+    for outcomes, fields in outcomes_and_fields:
+        found += make_results(outcomes, policy=policy, **fields)
+    return found
+
+
+SETTINGS = ("explicit", "direct", "reasoning", "contextual")
+
+
+@pytest.mark.parametrize(
+    ("good", "poor"),
+    [
         # Settings in which they differ, and do not.
-        "better": ([("1" * 20, {}), ("1" * 20, {"setting": "direct"})],
-                   [("1" * 20, {}), ("1" * 5 + "0" * 15, {"setting": "direct"})]),
+        pytest.param([("1" * 20, {}), ("1" * 20, {"setting": "direct"})],
+                     [("1" * 20, {}), ("1" * 5 + "0" * 15, {"setting": "direct"})], id="better"),
         # 3 of 20 against 6 of 20, differing on 5: a gap of 15 points with a discordance of 25.
         # By the normal approximation it takes 7.85 * 0.25 / 0.15**2 = 87 episodes.
-        "open": ([("111" + "0" * 17, {})], [("11" + "0" * 14 + "1111", {})]),
-        "tasks": ([("1" * 15 + "0" * 5, {}), ("0" * 20, {"task": "BinFill"})],
-                  [("0" * 20, {}), ("1" * 20, {"task": "BinFill"})]),
+        pytest.param([("111" + "0" * 17, {})], [("11" + "0" * 14 + "1111", {})], id="open"),
+        pytest.param([("1" * 15 + "0" * 5, {}), ("0" * 20, {"task": "BinFill"})],
+                     [("0" * 20, {}), ("1" * 20, {"task": "BinFill"})], id="tasks"),
         # Trials without a counterpart, and one without a verdict.
-        "left out": ([("1111!1", {}), ("11", {"setting": "direct"})], [("0000-", {})]),
+        pytest.param([("1111!1", {}), ("11", {"setting": "direct"})], [("0000-", {})],
+                     id="left out"),
         # 6 of 20 episodes differ, all to one side: p = 0.031 alone, 0.125 among four settings.
-        "interval and p": (
-            [("1" * 20, {"setting": setting}) for setting in settings],
-            [("1" * 14 + ("0" if setting == "direct" else "1") * 6, {"setting": setting})
-             for setting in settings]),
-    }[name]  # fmt: skip
-    sides = []
-    for policy, side in ((GOOD, good), (POOR, poor)):
-        found = []
-        for outcomes, fields in side:
-            found += make_results(outcomes, policy=policy, **fields)
-        sides.append(found)
-    return tuple(sides)
+        pytest.param([("1" * 20, {"setting": setting}) for setting in SETTINGS],
+                     [("1" * 14 + ("0" if setting == "direct" else "1") * 6, {"setting": setting})
+                      for setting in SETTINGS], id="interval and p"),
+    ],
+)  # fmt: skip
+def test_the_sentences_of_a_comparison_are_as_stored(snapshot, good, poor):
+    """Which is better, what stays open and what it would take, and what is left out.
 
+    A letter is an episode: 1 won, 0 lost, ! an error, - not played.
+    """
+    good_results = results_of_policy("listener", good)
+    poor_results = results_of_policy("forgetful", poor)
 
-@pytest.mark.parametrize("name", ["better", "open", "tasks", "left out", "interval and p"])
-def test_the_sentences_of_a_comparison_are_as_stored(snapshot, name):
-    """Which is better, what stays open and what it would take, and what is left out."""
-    assert sentences_of(*results_of_case(name)) == snapshot
+    assert sentences_of(good_results, poor_results) == snapshot
 
 
 def test_episodes_without_instruction_do_not_count_in_a_comparison():

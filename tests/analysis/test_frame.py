@@ -143,7 +143,7 @@ def test_shuffled_results_in_two_runs_are_the_same_table_as_one_run_in_order(pla
 
 def test_an_episode_played_in_two_runs_counts_in_each_under_a_name_of_its_own():
     """Won in run a and lost in run b: 1 and 0. Would find a mean of both under one name."""
-    both = [make_result(outcome, 0, started_at=outcome) for outcome in OUTCOMES[:2]]
+    both = [make_result(outcome, 0, started_at=outcome) for outcome in ("success", "failure")]
 
     twice = make_frame([("a", both[:1]), ("none", []), ("b", both[1:])])
 
@@ -152,7 +152,7 @@ def test_an_episode_played_in_two_runs_counts_in_each_under_a_name_of_its_own():
 
 
 def test_an_added_column_has_the_value_of_each_row_although_records_come_in_another_order():
-    both = [make_result(outcome, 0, started_at=outcome) for outcome in OUTCOMES[:2]]
+    both = [make_result(outcome, 0, started_at=outcome) for outcome in ("success", "failure")]
     twice = make_frame([("a", both[:1]), ("b", both[1:])])
     reads = {"cause": lambda record: record.outcome, "1": lambda _: 1, "true": lambda _: True}
 

@@ -27,9 +27,14 @@ def results_of_rows(*rows: tuple[str, str], **fields: object) -> list[Summary]:
     ]
 
 
-def results_with_cut_prompts() -> list[Summary]:
+def test_a_table_has_rates_over_prompts_that_were_read_whole_next_to_rates_over_all():
+    """A prompt longer than the model reads is *cut*; without a tokenizer this is *unknown*.
+
+    Columns: prompts, % cut (0–50 with an unknown one), % success, prompts heard, % success of
+    these. Rates of all tasks are means over tasks: (33.33 + 50) / 2 = 41.67.
+    """
     contextual = {"setting": "contextual"}
-    return [
+    results = [
         *results_of_rows(("success", "heard"), ("failure", "heard")),
         *results_of_rows(
             ("failure", "cut"),
@@ -43,15 +48,8 @@ def results_with_cut_prompts() -> list[Summary]:
         ),
         *results_of_rows(("success", "unknown"), policy="other"),
     ]
+    data = RunData(frame_of(results))
 
-
-def test_a_table_has_rates_over_prompts_that_were_read_whole_next_to_rates_over_all():
-    """A prompt longer than the model reads is *cut*; without a tokenizer this is *unknown*.
-
-    Columns: prompts, % cut (0–50 with an unknown one), % success, prompts heard, % success of
-    these. Rates of all tasks are means over tasks: (33.33 + 50) / 2 = 41.67.
-    """
-    data = RunData(frame_of(results_with_cut_prompts()))
     table = make_heard_table(data)
     rows = {(row.group, row.name): [entry.text for entry in row.entries] for row in table.rows}
     assert rows == {

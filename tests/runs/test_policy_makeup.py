@@ -160,12 +160,15 @@ def test_a_policy_at_another_address_or_typed_in_another_way_is_the_same_policy(
     assert refs[0].makeup == refs[1].makeup != ()
 
 
-def test_a_policy_at_another_address_goes_on_in_its_run_and_is_merged_without_a_word(
+def test_a_policy_typed_in_another_way_goes_on_in_its_run_and_is_merged_without_a_word(
     two_records, tmp_path
 ):
-    found = what_is_said_where_they_meet(
-        tmp_path, two_records, *(policy_of_version_7(spec) for spec in PAIRS_OF_EQUAL_POLICIES[1])
-    )
+    """08 is 8, and how long to wait and whether to encrypt make no other policy."""
+    before = policy_of_version_7("openpi://gpu:8000?execute=8")
+    now = policy_of_version_7("openpi://gpu:8000?execute=08&timeout=9&tls=yes")
+
+    found = what_is_said_where_they_meet(tmp_path, two_records, before, now)
+
     assert found == {"resumed": "", "merged": "", "stored": "", "labels": ["random"], "mixed": []}
 
 

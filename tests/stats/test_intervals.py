@@ -23,10 +23,10 @@ from roboirg.stats.paired_tests import Pairs, measure_gap
 
 LONG = "ROBOIRG_LONG_TESTS" in os.environ
 """Ten times as many simulated runs."""
-RUNS = 6000 if LONG else 300
-DRAWS = 1000
+SIMULATIONS = 6000 if LONG else 300
+RESAMPLES = 1000
 NOMINAL = (0.93, 0.97)
-SLACK = 2.6 * np.sqrt(0.05 * 0.95 / RUNS)
+SLACK = 2.6 * np.sqrt(0.05 * 0.95 / SIMULATIONS)
 """What chance alone does to a simulated share, in 99 of 100 cases."""
 
 
@@ -42,17 +42,17 @@ def cell_of_verdicts(won: np.ndarray) -> Cell:
 
 
 def simulated_verdicts(
-    rng: np.random.Generator, rate: float, episodes: int, seeds: int, alike: float
+    rng: np.random.Generator, rate: float, episodes: int, seeds: int, correlation: float
 ) -> np.ndarray:
-    """Verdicts whose correlation between the seeds of an episode is `alike`."""
+    """Verdicts whose correlation between the seeds of an episode is `correlation`."""
     chances = np.full(episodes, rate)
-    if alike:
-        spread = 1 / alike - 1
+    if correlation:
+        spread = 1 / correlation - 1
         chances = rng.beta(rate * spread, (1 - rate) * spread, size=episodes)
     return rng.random((episodes, seeds)) < chances[:, None]
 
 
-def is_nominal(share: float) -> bool:
+def is_about_95_percent(share: float) -> bool:
     return NOMINAL[0] - SLACK <= share <= NOMINAL[1] + SLACK
 
 
@@ -110,22 +110,24 @@ def test_one_episode_or_none_has_no_interval():
     assert cell_interval(Cell(), rng) is None
 
 
-@pytest.mark.parametrize(("rate", "alike"), [(0.3, 0.5), (0.5, 0.0), (0.8, 0.5)])
-def test_the_interval_over_episodes_contains_the_true_rate_in_95_of_100_simulations(rate, alike):
-    """50 episodes, 3 trials each, whose correlation is `alike`.
+@pytest.mark.parametrize(("rate", "correlation"), [(0.3, 0.5), (0.5, 0.0), (0.8, 0.5)])
+def test_the_interval_over_episodes_contains_the_true_rate_in_95_of_100_simulations(
+    rate, correlation
+):
+    """50 episodes, 3 trials each, whose correlation is `correlation`.
 
     Would find an interval that takes these trials for independent: it would be too narrow.
     """
     rng = np.random.default_rng(11)
     hits = 0
 
-    for _ in range(RUNS):
+    for _ in range(SIMULATIONS):
         interval = clustered_interval(
-            [cell_of_verdicts(simulated_verdicts(rng, rate, 50, 3, alike))], rng, DRAWS
+            [cell_of_verdicts(simulated_verdicts(rng, rate, 50, 3, correlation))], rng, RESAMPLES
         )
         hits += interval is not None and interval.low <= rate <= interval.high
 
-    assert is_nominal(hits / RUNS)
+    assert is_about_95_percent(hits / SIMULATIONS)
 
 
 @pytest.mark.parametrize("seeds", [1, 3])
@@ -134,18 +136,18 @@ def test_intervals_of_gap_and_retention_contain_the_truth_in_95_of_100_simulatio
     rng = np.random.default_rng(13)
     gap_hits = 0
     retention_hits = 0
-    for _ in range(RUNS):
+    for _ in range(SIMULATIONS):
         ease = rng.beta(2, 2, size=(50, 1))
         second, first = (
             cell_of_verdicts(rng.random((50, seeds)) < share * ease) for share in (1, 0.6)
         )
-        gap = measure_gap([Pairs.of(first, second)], rng, DRAWS)
-        gap_hits += covers(gap.interval, -0.2)
-        retention_hits += covers(gap.retention_interval, 0.6)
+        gap = measure_gap([Pairs.of(first, second)], rng, RESAMPLES)
+        gap_hits += contains(gap.interval, -0.2)
+        retention_hits += contains(gap.retention_interval, 0.6)
 
-    assert is_nominal(gap_hits / RUNS)
-    assert is_nominal(retention_hits / RUNS)
+    assert is_about_95_percent(gap_hits / SIMULATIONS)
+    assert is_about_95_percent(retention_hits / SIMULATIONS)
 
 
-def covers(interval, true):
+def contains(interval, true):
     return interval is not None and interval.low <= true <= interval.high
