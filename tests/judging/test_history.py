@@ -60,3 +60,4 @@ def test_time_is_counted_from_reset_or_from_a_timer_that_starts_once():
     assert not history.holds(Elapsed(10))
     assert history.holds(Elapsed(6, 6, timer="pick"))
     assert not history.holds(Elapsed(0, 5, timer="pick"))
+    assert history.next_change(Elapsed(0, 5)) > history.step
