@@ -72,3 +72,4 @@ def test_elapsed_time_counts_from_the_reset_or_from_the_first_start_of_a_timer()
     assert not history.holds(Elapsed(10))
     assert history.holds(Elapsed(6, 6, timer="pick"))
     assert not history.holds(Elapsed(0, 5, timer="pick"))
+    assert history.next_change(Elapsed(0, 5)) > history.step
