@@ -57,8 +57,8 @@ for task, splits in list(shipped_splits().items())[::4]:
     assert fingerprint_of(task, splits.passed_over) == splits.sha256, task
 every = test_golden.expressible_options
 test_golden.expressible_options = lambda one: [o for o in every(one) if o.setting not in {added!r}]
-for task, expected in list(test_golden.GOLDEN.items())[::4]:
-    assert test_golden.digest(task) == expected, task
+for task, expected in list(test_golden.DIGESTS.items())[::4]:
+    assert test_golden.digest_of_first_instructions(task) == expected, task
 """
 
 
