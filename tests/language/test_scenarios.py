@@ -842,7 +842,9 @@ def test_a_place_before_containers_move_is_said_to_be_one_at_the_start():
     for scenario in task_scenarios("VideoUnmaskSwap").scenarios:
         said = f"{literal(scenario.text('introduction'))} {literal(scenario.text('say.colors.0'))}"
         if scenario.fields.setting == "spatial" or "aside" in str(scenario.texts):
-            assert re.search("start|beginning|early in the video|before .* moved|as soon as they moved", said)
+            assert re.search(
+                "start|beginning|early in the video|before .* moved|as soon as they moved", said
+            )
 
 
 def test_the_latter_may_follow_one_cube_named_by_place_and_one_by_color():
