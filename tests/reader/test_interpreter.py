@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from roboirg import reader
 from roboirg.language import instruct
 from roboirg.reader import interpret
-from roboirg.reader.phrases import Chunks
+from roboirg.reader.phrases import PlaceholderText
 from roboirg.reader.things import read_things
 from roboirg.reader.tokens import FILLERS, split_sentences
 from roboirg.reader.vocabulary import is_known
@@ -65,9 +65,9 @@ def test_a_place_nested_300_times_is_given_up_without_a_goal():
 
 def test_the_same_container_over_it_still_means_the_one_shown_in_the_video():
     """*Over it* adds a place; it must not erase that *the same* refers to the video."""
-    chunks = Chunks("lift the same container over it")
-    read_things(chunks)
-    _, container = chunks.tokens()
+    sentence = PlaceholderText("lift the same container over it")
+    read_things(sentence)
+    _, container = sentence.tokens()
     assert container.value.is_shown
 
 

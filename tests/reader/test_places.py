@@ -4,7 +4,7 @@ import pytest
 
 from roboirg.core.episode import Point, Scene, SceneObject
 from roboirg.language.landmarks import FRAMES, selectors
-from roboirg.reader.command import read_command
+from roboirg.reader.command import parse_sentence
 from roboirg.reader.referents import Referents
 from roboirg.reader.tokens import split_sentences
 from roboirg.tasks import every_task, get_task
@@ -14,9 +14,9 @@ from roboirg.tasks.splits import get_episode
 def things_meant_by(scene, noun, words):
     """Return the names of the things that words can mean."""
     (sentence,) = split_sentences(f"Take the {noun} {words}.")
-    (act,) = read_command(sentence).acts
-    (thing,) = act.values("thing")
-    assert not read_command(sentence).unread, words
+    (clause,) = parse_sentence(sentence).clauses
+    (thing,) = clause.values("thing")
+    assert not parse_sentence(sentence).unread, words
     return sorted(item.name for item in Referents(scene).things_at(thing, thing.place))
 
 

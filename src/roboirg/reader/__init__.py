@@ -3,10 +3,10 @@
 It reads commands that state their values, in our words or in other people's. It does not read what
 comes before a command. `docs/interpreter.md` says more.
 
-A text is split into *sentences* (`tokens`). Each becomes a *reading* (`command`): *acts*, such as
-to lift, with what is said of them, and the words that no rule reads. The last run of readings that
-command is the *command*, and what is before it *remarks*. The acts then leave some of the scene's
-*goals* (`constraints`).
+A text is split into sentences (`tokens`). Each is parsed into clauses, a verb with its arguments,
+and the words that no rule reads (`command`). The last sentences that are commands make up the
+*command*; what is before them is *remarks*. The clauses of the command then leave some of the
+scene's goals (`constraints`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from roboirg.core.episode import Goal, Scene, SlotValue, values_in
-from roboirg.reader.command import Act, Reading, read_command
+from roboirg.reader.command import Clause, ParsedSentence, parse_sentence
 from roboirg.reader.constraints import UnfitWordsError, fitting_goals
 from roboirg.reader.tokens import ADVERBS, Sentence, color_of, number_of, split_sentences, word_set
 from roboirg.reader.vocabulary import UNSEEN_COLORS, is_known
@@ -48,10 +48,10 @@ class Interpretation(NamedTuple):
 def interpret(text: str, scene: Scene, task: str) -> Interpretation:
     """Return all goals of a task that fit a command in plain English: the last sentences of a text.
 
-    It reads commands that state their values, *Lift the red cube twice*, in our words or in other
-    people's as far as it knows these. What comes before the command is not read, so a command that
-    points back at it is refused. What an instruction means by declaration is in
-    `roboirg.language.meaning`.
+    *Lift the red cube twice* gives the goal with ``color`` red and ``repeats`` 2. It reads commands
+    that state their values, in our words or in other people's as far as it knows these. What comes
+    before the command is not read, so a command that points back at it is refused. What an
+    instruction means by declaration is in `roboirg.language.meaning`.
 
     Args:
         text: the command, or a whole text that ends with it.
@@ -62,29 +62,29 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         UnknownNameError: there is no such task.
     """
     goals = _possible_goals(scene, task)
-    split_text = _split_off_command(split_sentences(text))
-    unread = [reading for reading in split_text.command if not reading.is_command]
-    acts: list[Act] = []
-    for reading in split_text.command:
-        acts += reading.acts
-    if unread or not _ask_for_something(acts):
+    command, remarks = _split_off_command(split_sentences(text))
+    unread = [sentence for sentence in command if not sentence.is_command]
+    clauses: list[Clause] = []
+    for sentence in command:
+        clauses += sentence.clauses
+    if unread or not _ask_for_something(clauses):
         return _without_goals(unread)
     # "Lift it." means once only if nothing before it says how often.
-    is_alone = not any(map(_speaks_of_number, split_text.remarks))
+    once_by_default = not any(map(_speaks_of_number, remarks))
     try:
-        fitting = fitting_goals(acts, goals, scene, is_alone=is_alone)
+        fitting = fitting_goals(clauses, goals, scene, once_by_default=once_by_default)
     except UnfitWordsError as error:
         return Interpretation((), (str(error),))
     return Interpretation(fitting, _complaints_about(fitting))
 
 
-def _ask_for_something(acts: Iterable[Act]) -> bool:
-    """Return whether any of some acts has a verb, or a thing to handle."""
-    return any(act.verb or act.has("thing", "each") for act in acts)
+def _ask_for_something(clauses: Iterable[Clause]) -> bool:
+    """Return whether any clause has a verb, or a thing to handle: *the red cube, please*."""
+    return any(clause.verb or clause.has("thing", "each") for clause in clauses)
 
 
 def _complaints_about(fitting: Sequence[Goal]) -> tuple[str, ...]:
-    """Return why a command does not mean a single goal; empty if one fits it."""
+    """Return why a command does not mean a single goal, in words; empty if one goal fits it."""
     if not fitting:
         return ("no goal of the task fits everything that the text says",)
     if len(fitting) > 1:
@@ -96,11 +96,11 @@ class _SplitText(NamedTuple):
     """A text as its command and what comes before.
 
     Attributes:
-        command: the last run of sentences that command, as they were read.
-        remarks: the sentences before it.
+        command: the last sentences that are commands, parsed.
+        remarks: the sentences before them.
     """
 
-    command: list[Reading]
+    command: list[ParsedSentence]
     remarks: list[Sentence]
 
 
@@ -111,38 +111,43 @@ def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
 
 
 def _split_off_command(sentences: Sequence[Sentence]) -> _SplitText:
-    """Return a text as its command, the last sentences that ask for acts, and what is before.
+    """Return a text as its command, the last sentences that ask for something, and its remarks.
 
     *It is late. Lift the red cube. Then press the button. Thank you.* has the command *Lift the red
-    cube. Then press the button.* and the remark *It is late.* The sentences are read from the last
-    one. One with words that no rule reads ends the run. It belongs to the command if it is the last
-    one or asks to handle a thing, and counts as a remark as well.
+    cube. Then press the button.* and the remark *It is late.*
+
+    The sentences are read from the last one. The first one found with words that no rule reads ends
+    the command. It belongs to the command if nothing but thanks comes after it or if it asks to
+    handle a thing, *lift the big cube*, and counts as a remark as well.
     """
-    command: list[Reading] = []
+    command: list[ParsedSentence] = []
     for position in range(len(sentences) - 1, -1, -1):
         words = sentences[position]
-        reading = read_command(words)
-        if not reading.acts and not reading.unread:
+        parsed = parse_sentence(words)
+        if not parsed.clauses and not parsed.unread:
             continue  # "Thank you."
-        if reading.is_command:
-            command.insert(0, reading)
+        if parsed.is_command:
+            command.insert(0, parsed)
             continue
 
         # This sentence has words that are not read: the command begins after it or in it.
         remarks = list(sentences[:position])
         if not command:
             lead_in = _split_at_colon(words)
-            after_colon = read_command(lead_in.command)
+            after_colon = parse_sentence(lead_in.command)
             if lead_in.remark and after_colon.is_command:
                 return _SplitText([after_colon], [*remarks, lead_in.remark])
-        if not command or reading.is_like_command:
-            command.insert(0, reading)
+        if not command or parsed.is_like_command:
+            command.insert(0, parsed)
         return _SplitText(command, [*remarks, words])
     return _SplitText(command, [])
 
 
 class _LeadIn(NamedTuple):
-    """A sentence as the words before a colon, empty if there are none, and the rest."""
+    """A sentence as the words before its last colon, empty without one, and the command after it.
+
+    *my task for you : lift the cube* has the remark *my task for you*.
+    """
 
     remark: Sentence
     command: Sentence
@@ -152,7 +157,8 @@ def _split_at_colon(words: Sentence) -> _LeadIn:
     """Return a sentence as the words before its last colon, a remark, and the command after it.
 
     *My task for you: lift the red cube* is split at the colon. A sentence without a colon is all
-    command, and so is one with a color before the colon that the words after it do not repeat.
+    command. So is one with a color before the colon that the words after it do not repeat, *the red
+    one: lift it*, as the remark would be part of what is asked.
     """
     unsplit = _LeadIn((), words)
     if ":" not in words:
@@ -163,7 +169,7 @@ def _split_at_colon(words: Sentence) -> _LeadIn:
     remark = words[:colon]
     command = words[colon + 1 :]
     colors = {color_of(word.removesuffix("'s")) for word in remark}
-    colors.discard(None)  # which other words give
+    colors.discard(None)  # of words that are no color
     if not colors.issubset(map(color_of, command)):
         return unsplit
     return _LeadIn(remark, command)
@@ -174,17 +180,19 @@ def _speaks_of_number(words: Iterable[str]) -> bool:
     return any(word in _COUNTING_WORDS or word in ADVERBS or number_of(word) for word in words)
 
 
-def _without_goals(readings: Sequence[Reading]) -> Interpretation:
-    """Return the result for a text that is not understood: no goals, and complaints in sentences.
+def _without_goals(sentences: Sequence[ParsedSentence]) -> Interpretation:
+    """Return the result for a text that is not understood: no goals, and why, in sentences.
 
-    `readings` are the sentences of the command with words that no rule reads; empty if there is
-    none.
+    `sentences` are those of the command with words that no rule reads, *stack the cube*, which
+    gives ``finds no command`` and ``does not know the word "stack"``. There may be none, as in *do
+    it*.
     """
     unread: dict[str, None] = {}  # each word once, in the order of speaking
     has_verb = False
-    for reading in readings:
-        unread |= dict.fromkeys(reading.unread)
-        has_verb = has_verb or any(act.verb for act in reading.acts)
+    for sentence in sentences:
+        unread |= dict.fromkeys(sentence.unread)
+        if any(clause.verb for clause in sentence.clauses):
+            has_verb = True
     known = [word for word in unread if is_known(word)]
     unknown = tuple(word for word in unread if not is_known(word))
 

@@ -1,7 +1,7 @@
-"""Commands: a sentence as acts, each with its things, places to go and repetitions.
+"""Parse a sentence into clauses, each a verb with its arguments.
 
-*Put the red cube on the target twice* is one act: the verb ``put`` and three parts, of the kinds
-``thing``, ``goal`` and ``times``. What is left when all rules have been applied is *unread*.
+*Put the red cube on the target twice* is one clause: the verb ``put`` with three arguments, of the
+kinds ``thing``, ``goal`` and ``times``. Words that no rule reads are returned as *unread*.
 """
 
 from __future__ import annotations
@@ -11,7 +11,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from roboirg.reader.phrases import Chunks, FoundPhrase, PhraseRule, Rewrites, Token, Value, compiled
+from roboirg.reader.phrases import (
+    PhraseKind,
+    PhraseMatch,
+    PhraseRule,
+    PlaceholderText,
+    Rewrites,
+    Token,
+    Value,
+    compiled,
+)
 from roboirg.reader.series import TARGET_RULES, TIMES_RULES
 from roboirg.reader.things import Description, read_things
 from roboirg.reader.tokens import Sentence, word_set
@@ -56,6 +65,7 @@ _PARTS = {
     r"(?:NUMBER|and|to|,))*|motion|procedure|sequence|movement|cycle|operation|swing"
     r"|pick and place(?: action)?|pick up and place(?: action)?)(?: again)?)",
 }
+# In this order: each rule sees what those before it have left.
 _TALK = Rewrites(
     r"^(?:(?:and|then|,|please) )*(?:(?:first )?(?:watch|look at)|(?:after|having|when you "
     r"have|once you "
@@ -93,6 +103,7 @@ _TALK = Rewrites(
     r"again (?:and again)=>again , again",
     parts=_PARTS,
 )
+"""Polite and roundabout wordings become plain ones: *could you lift it* -> *lift it*."""
 _PRESSING = Rewrites(
     r"(?:when|once|after|as soon as) (?:you )?(?:have |had )?PRESS (BUTTON)=>press \1 ,",
     r"(?:when|once|after|as soon as) (BUTTON) (?:has been|have been|is|are|was|were) PRESS"
@@ -107,7 +118,10 @@ _PRESSING = Rewrites(
     r"but (?:first )?press (BUTTON)(?: first)?=>, press \1",
     parts={**_PARTS, "BUTTON": r"button#\d+"},
 )
-"""When the button is pressed says nothing about the goal."""
+"""Pressing the button becomes a clause: *after pressing button#1, …* -> *press button#1 , …*.
+
+When it is pressed says nothing about the goal.
+"""
 _ORDER = Rewrites(
     r"(?:do )?(?:exactly )?the same (?:thing )?(?:for|with|to)=>take",
     r"(^|[,;] |then )(?:, )?before (?:you )?TAKEN ([^,;]*) , (?:VERB (?:up )?)?(.*)"
@@ -121,9 +135,13 @@ _ORDER = Rewrites(
     r"VERB (?:up )?(the [^,;]*?) before (?:you have |you )?(?:TAKEN )?(the .*)=>take \1 , take \2",
     parts=_PARTS,
 )
-"""Of two picks, the one that comes first goes first."""
+"""Of two picks, the one that is to be done first comes first: *before lifting the red one, lift the
+blue one* -> *take the blue one , take the red one*.
+"""
+# The order of two picks is part of the goal only where containers are lifted.
 _COVERS = compiled("containers?|uncover(?:ing)?")
 _BUTTON = compiled("BUTTONS", _PARTS)
+# "on target#1", "into the bin", "back to the table"
 _GOAL = compiled(
     r"(?:(?:right |directly |back )?(?:on top of|to the top of|on to|on|to|over|in|in "
     r"to|at|above|atop|toward"
@@ -131,6 +149,7 @@ _GOAL = compiled(
     r")?(?:same )?"
     r"(?:bin|table|box|targets|other target))"
 )
+# "down", "back on the table"
 _DOWN = compiled(
     r"(?:back |down |again )*(?:on|to) (?:the )?(?:table|its place|where it was)"
     r"|(?:down|back)(?: again)?"
@@ -139,236 +158,246 @@ _AGAIN = compiled(r"(?:repeat it )?again")
 _IT = compiled(
     r"(?:both of )?(?:it|them|this one|that one|those|these|the same (?:one|thing)|this|that)"
 )
-_JOINTS = word_set(", ; : . and then")
+_CONJUNCTIONS = word_set(", ; : . and then")
 _OPENERS = word_set("first then next finally")
-"""Words before the verb of a step."""
+"""Words that may stand before the first verb of a sentence."""
 _PARTICLES = word_set("up away out off down also now too")
 """Words that change nothing once everything else is read."""
 
 
-class ActPart(NamedTuple):
-    """What is said of an act.
+class Argument(NamedTuple):
+    """What a clause says about its verb, such as a thing to handle.
 
     Attributes:
-        kind: ``thing``, ``goal``, ``times`` …, as chunks have it.
-        value: what the words mean.
+        kind: one of those that `roboirg.reader.phrases` lists, such as ``thing`` or ``times``.
+        value: the meaning of the words, whose type depends on the kind.
     """
 
-    kind: str
+    kind: PhraseKind
     value: Value
 
 
 @dataclass
-class Act:
-    """One act of a command.
+class Clause:
+    """A verb with its arguments.
+
+    *lift the red cube twice* is ``Clause("take", [Argument("thing", ...), Argument("times", 2)])``.
 
     Attributes:
-        verb: the act, a value of `vocabulary.VERB_OF`; empty without a verb.
-        parts: what is said of it, in order.
+        verb: one of the values of `vocabulary.VERB_OF`; empty without a verb.
+        arguments: in the order of speaking.
     """
 
     verb: str
-    parts: list[ActPart] = field(default_factory=list)
+    arguments: list[Argument] = field(default_factory=list)
 
     @property
     def takes_no_more(self) -> bool:
-        """Whether another thing is a new act: *put it down, then the red one*."""
+        """Whether another thing begins a new clause: *put it down, then the red one*."""
         if self.verb == "press":
             return True
         return self.verb == "put" and self.has("it", "thing") and self.has("down")
 
-    def values(self, kind: str) -> list[Value]:
-        """Return the values of all parts of a kind."""
-        return [part.value for part in self.parts if part.kind == kind]
+    def values(self, kind: PhraseKind) -> list[Value]:
+        """Return the meanings of all arguments of a kind: ``[2]`` for the kind ``times``."""
+        return [argument.value for argument in self.arguments if argument.kind == kind]
 
-    def has(self, *kinds: str) -> bool:
-        """Return whether a part is of one of some kinds."""
-        return any(part.kind in kinds for part in self.parts)
+    def has(self, *kinds: PhraseKind) -> bool:
+        """Return whether any argument is of one of these kinds."""
+        return any(argument.kind in kinds for argument in self.arguments)
 
 
 @dataclass
-class Reading:
-    """A sentence as acts.
+class ParsedSentence:
+    """A sentence as clauses.
 
     Attributes:
-        acts: in the order of speaking.
+        clauses: in the order of speaking.
         unread: words that no rule reads.
-        asks: whether it begins with a verb, or a step of it: *Watch out, first lift it*.
+        is_imperative: whether it begins with a verb, or has one right after a word like *first* or
+            *then*: *Watch out, first lift it*.
     """
 
-    acts: list[Act]
+    clauses: list[Clause]
     unread: tuple[str, ...]
-    asks: bool
+    is_imperative: bool
 
     @property
     def is_command(self) -> bool:
-        """Whether it is a command that is read to the end, or part of one.
+        """Whether every word is read and it asks for something.
 
-        It has to press the button, or say more of an act than *it* and *first*.
+        It has to press the button, or say more than *it* and *first* about a verb: *lift it twice*
+        is a command, *lift it* alone is not.
         """
         if self.unread:
             return False
-        for act in self.acts:
-            if act.verb == "press":
+        for clause in self.clauses:
+            if clause.verb == "press":
                 return True
-            if any(part.kind not in ("it", "first") for part in act.parts):
+            if any(argument.kind not in ("it", "first") for argument in clause.arguments):
                 return True
         return False
 
     @property
     def is_like_command(self) -> bool:
-        """Whether a clause asks to handle a thing, read to the end or not."""
-        if not self.acts or not self.asks:
+        """Whether it asks to handle a thing, even if words are left unread: *lift the big cube*."""
+        if not self.clauses or not self.is_imperative:
             return False
-        first = self.acts[0]
+        first = self.clauses[0]
         return first.verb in ("take", "move", "put", "press") and first.has("thing", "button")
 
 
 @functools.lru_cache(maxsize=4096)
-def read_command(words: Sentence) -> Reading:
-    """Return a sentence as acts, and the words in it that no rule reads.
+def parse_sentence(words: Sentence) -> ParsedSentence:
+    """Return a sentence as clauses, and the words in it that no rule reads.
 
-    *would you lift the red cube twice* becomes one act: the verb ``take``, a thing and a number of
-    times. First polite and winding words are rewritten, to *lift the red cube twice*; then each
-    phrase becomes a chunk, ``lift thing#1 times#0``; then the chunks after a verb become parts of
-    its act.
+    *would you lift the red cube twice* becomes one clause: the verb ``take`` with a thing and a
+    number of times. First, polite and roundabout words are rewritten, to *lift the red cube twice*;
+    then a placeholder replaces each phrase, ``lift thing#1 times#0``; then the phrases after a verb
+    become its arguments. The result is cached: do not change it.
     """
     text = _TALK.apply(" ".join(words))
     if _COVERS.search(text) is not None:
         text = _ORDER.apply(text)
-    chunks = Chunks(text)
-    # Each step takes its words away from those after it, and some are made of earlier chunks.
-    chunks.apply(TARGET_RULES)  # may hold a button: "the target used after pressing the button"
-    chunks.apply(_BUTTON_RULES)
-    chunks.text = _PRESSING.apply(chunks.text)  # is about buttons
-    chunks.apply(TIMES_RULES)  # before things: of "one time", "one" could be a thing
-    read_things(chunks)
-    chunks.apply(_REST_RULES)  # goals are targets and things
-    return _acts(chunks)
+    sentence = PlaceholderText(text)
+    # Each step takes its words away from those after it, and some build on earlier placeholders.
+    sentence.apply(TARGET_RULES)  # may hold a button: "the target used after pressing the button"
+    sentence.apply(_BUTTON_RULES)
+    sentence.text = _PRESSING.apply(sentence.text)  # is about buttons
+    sentence.apply(TIMES_RULES)  # before things: of "one time", "one" could be a thing
+    read_things(sentence)
+    sentence.apply(_REST_RULES)  # goals are targets and things
+    return _parse_tokens(list(sentence.tokens()))
 
 
-def _words(found: FoundPhrase) -> str:
-    """Return the words themselves, where the kind of the chunk says enough."""
-    return found.text
+def _read_words(match: PhraseMatch) -> str:
+    """Return the words of a phrase, where its kind says enough: ``"the button"``."""
+    return match.text
 
 
-def _goal(found: FoundPhrase) -> Value:
+def _read_goal(match: PhraseMatch) -> Value:
     """Return where a phrase says to put something: *on target#1*, *into the bin*.
 
-    In the text, a phrase that has been read stands as its kind and number, ``target#1``. Such a
-    phrase gives what it means, a noun gives itself, ``"bin"``. None if the words are a thing that
-    is no box.
+    A placeholder gives its meaning, such as a `Target`; a noun gives itself, ``"bin"``. None, so
+    that the phrase stays unread, if it is on a thing that can be no box: *on the red cube*.
     """
-    words = found["goal"]  # after "on" or "to": "target#1", "the same bin"
+    words = match["goal"]  # after "on" or "to": "target#1", "the same bin"
     if "#" not in words:
         return words.rpartition(" ")[2]  # of "the same bin", the noun
-    value = found.value("goal")
-    if isinstance(value, Description) and (value.noun not in ("box", "one") or value.is_open):
+    value = match.value("goal")
+    if isinstance(value, Description) and (
+        value.noun not in ("box", "one") or value.leaves_color_open
+    ):
         return None
     return value
 
 
-_BUTTON_RULES = (PhraseRule("button", _BUTTON, _words),)
+_BUTTON_RULES = (PhraseRule("button", _BUTTON, _read_words),)
 _REST_RULES = (
     # Before what begins one: "back on target#1".
-    PhraseRule("goal", _GOAL, _goal),
+    PhraseRule("goal", _GOAL, _read_goal),
     # Before what ends one: "down again".
-    PhraseRule("down", _DOWN, _words),
+    PhraseRule("down", _DOWN, _read_words),
     # Before what it may begin with: "repeat it again".
-    PhraseRule("again", _AGAIN, _words),
-    PhraseRule("it", _IT, _words),
+    PhraseRule("again", _AGAIN, _read_words),
+    PhraseRule("it", _IT, _read_words),
 )
 
 
-def _acts(chunks: Chunks) -> Reading:
-    """Return the acts that a sentence asks for, and its words that no rule reads.
+def _parse_tokens(tokens: Sequence[Token]) -> ParsedSentence:
+    """Return a sentence as clauses, given its words and read phrases in order.
 
-    Its phrases have been replaced by chunks: ``lift thing#1 then press button#0`` is two acts,
-    ``take`` with a thing, and ``press`` with a button.
+    ``lift thing#1 then press button#0`` has two clauses: ``take`` with a thing, and ``press`` with
+    a button.
     """
-    builder = _ActBuilder()
-    tokens = list(chunks.tokens())
+    builder = _ClauseBuilder()
     for token in tokens:
-        if token.value is None:  # a word outside of all chunks
-            builder.add_word(token.kind)
+        if token.kind is None:
+            builder.add_word(token.text)
         else:
-            builder.add_chunk(token)
-    return Reading(builder.acts, tuple(builder.unread), _has_imperative(tokens))
+            builder.add_phrase(token.kind, token)
+    return ParsedSentence(builder.clauses, tuple(builder.unread), _is_imperative(tokens))
 
 
-def _has_imperative(tokens: Sequence[Token]) -> bool:
+def _is_imperative(tokens: Sequence[Token]) -> bool:
     """Return whether a sentence begins with a verb, or has one right after *first* or *then*.
 
-    A comma is not enough: *okay, get ready* asks nothing of the robot's things.
+    A comma is not enough: *okay, get ready* asks to handle nothing.
     """
     may_be_verb = True
     for token in tokens:
-        if may_be_verb and token.kind in VERB_OF:
+        if may_be_verb and token.text in VERB_OF:
             return True
-        may_be_verb = token.kind in _OPENERS
+        may_be_verb = token.text in _OPENERS
     return False
 
 
-class _ActBuilder:
-    """Makes acts of verbs and of what is said after each."""
+class _ClauseBuilder:
+    """Makes clauses of the words and phrases of a sentence, which are added in order.
+
+    Attributes:
+        clauses: so far.
+        unread: the words so far that belong to no clause.
+    """
 
     def __init__(self) -> None:
-        self.acts: list[Act] = []
+        self.clauses: list[Clause] = []
         self.unread: list[str] = []
-        self._is_joined = False  # whether a comma, *and* or *then* stands just before
+        self._follows_conjunction = False  # whether a comma, *and* or *then* stands just before
 
     def add_word(self, word: str) -> None:
-        """Add a word of a sentence: a verb begins an act, *lift*; other words count as not read.
+        """Add a word of a sentence: a verb begins a clause, *lift*; other words count as unread.
 
-        Joining words (*and*, commas) and words that change nothing (*also*) are skipped. *First*
-        after a verb is kept with its act, and *release* also says that the thing is put down.
+        Conjunctions (*and*, commas) and words that change nothing (*also*) are skipped. *First*
+        after a verb becomes an argument, and *release* also says that the thing is put down.
         """
         if word in VERB_OF:
-            act = Act(VERB_OF[word])
-            if word in LOWERING:  # "release it" says where, too
-                act.parts.append(ActPart("down", word))
-            self.acts.append(act)
-        elif word == "first" and self.acts:
-            self.acts[-1].parts.append(ActPart(word, word))
-        elif word not in _JOINTS and word not in _PARTICLES:
+            clause = Clause(VERB_OF[word])
+            if word in LOWERING:
+                clause.arguments.append(Argument("down", word))
+            self.clauses.append(clause)
+        elif word == "first" and self.clauses:
+            self.clauses[-1].arguments.append(Argument("first", word))
+        elif word not in _CONJUNCTIONS and word not in _PARTICLES:
             self.unread.append(word)
-        self._is_joined = word in _JOINTS
+        self._follows_conjunction = word in _CONJUNCTIONS
 
-    def add_chunk(self, chunk: Token) -> None:
-        """Add a phrase that has been read, such as a thing, to the act that it is about."""
-        act = self._act_for(chunk.kind)
-        part = self._part_of(act, chunk)
-        if part is None:
-            self.unread += chunk.text.split()
+    def add_phrase(self, kind: PhraseKind, phrase: Token) -> None:
+        """Add a phrase, such as *the red cube*, as an argument of the clause that it belongs to."""
+        clause = self._clause_for(kind)
+        argument = self._argument_of(clause, kind, phrase.value)
+        if argument is None:
+            self.unread += phrase.text.split()
         else:
-            act.parts.append(part)
-        self._is_joined = False
+            clause.arguments.append(argument)
+        self._follows_conjunction = False
 
-    def _part_of(self, act: Act, chunk: Token) -> ActPart | None:
-        """Return what a phrase that has been read says of an act; None if it does not fit there.
+    def _argument_of(self, clause: Clause, kind: PhraseKind, value: Value) -> Argument | None:
+        """Return a phrase as an argument of a clause; None if it does not fit there.
 
-        A place alone is a thing only right after a verb: *take on the left*, what is there. *Twice
-        more* after a comma or *and* adds to the number; elsewhere it is unclear, ``extra``.
+        Two kinds depend on what stands before:
+
+        - A place alone is a thing only right after a verb: *take on the left*, what is there.
+        - *Twice more* adds to a number after a conjunction, *lift it once and twice more*. In *lift
+          it twice more* it may be the total, so it is ``extra``.
         """
-        if chunk.kind == "place":
-            if not act.verb or act.parts:
+        if kind == "place":
+            if not clause.verb or clause.arguments:
                 return None
-            # "Take on the left": what is there.
-            return ActPart("thing", Description("one", is_definite=True, place=chunk.value))
-        if chunk.kind == "more" and not self._is_joined and act.verb != "repeat":
-            # "Lift it twice more" may mean twice in all, or twice after once.
-            return ActPart("extra", chunk.value)
-        return ActPart(chunk.kind, chunk.value)
+            return Argument("thing", Description("one", is_definite=True, place=value))
+        if kind == "more" and not self._follows_conjunction and clause.verb != "repeat":
+            return Argument("extra", value)
+        return Argument(kind, value)
 
-    def _act_for(self, kind: str) -> Act:
-        """Return the act that the next phrase is about: the last one, or a new one without a verb.
+    def _clause_for(self, kind: PhraseKind) -> Clause:
+        """Return the clause that a phrase of a kind belongs to: the last one, or a new one.
 
-        *Put it down, then the red one*: the red one is to be taken. `kind` is that of the phrase,
-        ``thing``.
+        A new one has the verb that is left out: *put it down, then the red one* asks to take the
+        red one. Before any verb it has none.
         """
-        if not self.acts:
-            self.acts.append(Act(""))
-        last = self.acts[-1]
+        if not self.clauses:
+            self.clauses.append(Clause(""))
+        last = self.clauses[-1]
         if kind == "thing" and last.takes_no_more:
-            self.acts.append(Act("take" if last.verb == "put" else ""))
-        return self.acts[-1]
+            self.clauses.append(Clause("take" if last.verb == "put" else ""))
+        return self.clauses[-1]

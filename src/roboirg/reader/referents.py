@@ -1,4 +1,4 @@
-"""Referents: the colors that a description of a thing can mean in a scene."""
+"""Resolve references: which objects and colors of a scene a description can mean."""
 
 from __future__ import annotations
 
@@ -11,16 +11,20 @@ from roboirg.reader.things import Description
 from roboirg.tasks.shared.swapping import places_at_last
 
 _CHOOSABLE_KINDS = ("box", "tape", "cube")
-"""Of these kinds, the first that a scene has is the one among which goals choose."""
+"""Goals choose among the objects of the first of these kinds that a scene has several of."""
 MIN_TO_CHOOSE = 2
-"""Things of a kind from which on goals choose among them."""
+"""Objects of a kind from which on goals choose among them."""
 
 
 class Referents:
-    """What descriptions can mean in a scene.
+    """What descriptions can mean in one scene.
+
+    In a scene with a red and a blue cube, ``colors_of`` the description of *the red cube* is
+    ``{"red"}``.
 
     Attributes:
-        chosen: the kind of things among whose colors the goals choose.
+        chosen: the kind of objects among whose colors the goals choose: ``box``, ``tape`` or
+            ``cube``.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -30,22 +34,23 @@ class Referents:
             if len(things_of(scene, kind)) >= MIN_TO_CHOOSE:
                 self.chosen = kind
                 break
-        self._pointed = self.chosen  # what "the one on the left" is
-        # Where there is a button, the cubes lie open at first.
+        # The kind that "the one on the left" means. Cubes under containers cannot be seen, unless
+        # there is a button: then they lie open at first.
+        self._kind_of_one = self.chosen
         if scene.of_kind("container") and not scene.of_kind("button"):
-            self._pointed = "container"
+            self._kind_of_one = "container"
 
     def colors_of(self, thing: Description) -> set[str] | None:
-        """Return the colors that a description can mean; None if it says nothing about them.
+        """Return the colors that a description can mean; None if it says nothing about the color.
 
-        *the red cube* gives ``{"red"}``, *the cube on the left* the colors of what may be meant
-        there, and *the container over the red cube* that of the cube. Empty if nothing in the scene
-        fits.
+        *the red cube* gives ``{"red"}``, *the cube on the left* the colors of all objects that may
+        be meant there, and *the container over the red cube* the color of the cube. The set is
+        empty if nothing in the scene fits.
         """
-        if thing.like is not None:
-            return self.colors_of(thing.like)
-        if thing.under is not None:
-            return self.colors_of(thing.under)
+        if thing.same_color_as is not None:
+            return self.colors_of(thing.same_color_as)
+        if thing.covers is not None:
+            return self.colors_of(thing.covers)
         colors: set[str] | None = None
         if thing.color is not None:
             colors = {thing.color} & self.colors  # empty if nothing there has it
@@ -61,39 +66,41 @@ class Referents:
 
     @property
     def colors(self) -> set[str]:
-        """The colors of all things that have one."""
+        """The colors of all objects that have one."""
         return {item.color for item in self._scene.objects if item.color}
 
     def _color(self, item: SceneObject) -> str | None:
-        """Return the color of a thing; of a container, that of the cube under it."""
+        """Return the color of an object; of a container, that of the cube under it.
+
+        None for a container without a cube, and for objects without a color.
+        """
         if item.kind != "container":
             return item.color
         cube = self._scene.hidden_in(item.name)
         return None if cube is None else cube.color
 
     def things_at(self, thing: Description, place: Place) -> Things:
-        """Return the things of a description's kind and color that its place may mean.
+        """Return the objects of a description's kind and color that may be meant at a place.
 
-        *Now on the left* is meant of the end, after all swaps, and *on the left at first* of the
-        start; without such words it may be either.
+        Swaps move objects: *now on the left* is meant of their end, *on the left at first* of the
+        start. A description that does not say when may mean either.
         """
         names: dict[str, None] = {}  # each once, in order
-        if thing.moment in ("first", None):
-            names |= dict.fromkeys(
-                item.name for item in self._find_at_place(thing, place, self._scene)
-            )
-        if thing.moment in ("last", None):
-            at_last = scene_at_last(self._scene)
-            names |= dict.fromkeys(item.name for item in self._find_at_place(thing, place, at_last))
+        if thing.moment in ("start", None):
+            at_start = self._find_at_place(thing, place, self._scene)
+            names |= dict.fromkeys(item.name for item in at_start)
+        if thing.moment in ("end", None):
+            at_end = self._find_at_place(thing, place, scene_at_last(self._scene))
+            names |= dict.fromkeys(item.name for item in at_end)
         return [self._scene[name] for name in names]
 
     def _find_at_place(self, thing: Description, place: Place, scene: Scene) -> Things:
-        """Return the things that a description can mean at its place, as they stand in `scene`.
+        """Return the objects that a description can mean at a place, as they stand in `scene`.
 
-        Where several have its color, they are compared with each other, and with no others: *the
-        red cube on the left* need not be left of the blue ones.
+        Objects of its kind are compared. If several have its color, only these are: *the red cube
+        on the left* need not be left of the blue cubes. `scene` is that of the start or of the end.
         """
-        kind = self._pointed if thing.noun == "one" else thing.noun
+        kind = self._kind_of_one if thing.noun == "one" else thing.noun
         candidates = things_of(scene, kind)
         of_color = _of_color(candidates, thing.color)
         if len(of_color) > 1:
@@ -101,16 +108,18 @@ class Referents:
 
         def find_anchors(anchor: object) -> Things:
             if isinstance(anchor, Description):
-                return self._find_anchor(anchor, scene)
-            fixtures = scene.of_kind(str(anchor))
+                return self._find_described_anchor(anchor, scene)
+            fixtures = scene.of_kind(str(anchor))  # "bin"
             return fixtures if len(fixtures) == 1 else ()
 
         return find_objects(place, candidates, find_anchors)
 
-    def _find_anchor(self, thing: Description, scene: Scene) -> Things:
-        """Return the things that words like *next to the red cube* may name: here the red cube.
+    def _find_described_anchor(self, thing: Description, scene: Scene) -> Things:
+        """Return the objects that the reference object of a place may be.
 
-        By its color it must be the only one; else none is returned.
+        In *next to the red cube* it is the red cube, and in *next to the cube on the left* any that
+        may be meant on the left. By color alone it must be the only one of its kind, or none is
+        returned.
         """
         if thing.place is not None:
             return self._find_at_place(thing, thing.place, scene)
@@ -128,7 +137,7 @@ def scene_at_last(scene: Scene) -> Scene:
 
 
 def _of_color(things: Things, color: str | None) -> Things:
-    """Return the things of a color; none without a color."""
+    """Return the objects of a color, in their order; none if the color is None."""
     if color is None:
         return ()
     return [thing for thing in things if thing.color == color]

@@ -1,8 +1,8 @@
-"""Things: the words for a cube, a tape, a box or a container, and for where it stands.
+"""Read descriptions of objects, *the red cube next to the button*, and of places on the table.
 
-- *description*: all that words say of a thing, ``Description``.
-- *place*: words for where it stands; *anchor*: another thing in them, *next to the button*.
-- *chunk*: what has been read stands in the patterns as ``thing#3``, ``place#4``.
+The objects (*things*) are cubes, tapes, boxes and containers. An *anchor* is the reference object
+of a place: in *next to the button*, the button. In patterns, ``thing#3`` and ``place#4`` are
+placeholders for phrases that were read before (`roboirg.reader.phrases`).
 """
 
 from __future__ import annotations
@@ -12,28 +12,32 @@ import re
 from collections.abc import Mapping
 from typing import Literal, NamedTuple, cast
 
-from roboirg.reader.phrases import Chunks, FoundPhrase, PhraseRule, Rewrites, compiled
+from roboirg.reader.phrases import PhraseMatch, PhraseRule, PlaceholderText, Rewrites, compiled
 from roboirg.reader.places import Place, Side
 from roboirg.reader.tokens import color_of, number_of, ordinal_of
 
-PlaceMoment = Literal["first", "last"]
+Moment = Literal["start", "end"]
+"""Before the first swap of things, or after the last one."""
 ALL_OF_THEM = -1
-"""The number of *all red cubes*."""
+"""The number in the description *all red cubes*."""
 
 
 class Description(NamedTuple):
-    """A description of one thing or of several.
+    """What words say of one thing or of several; None where they say nothing.
+
+    *two red cubes* gives ``Description("cube", color="red", number=2)``, *the container over the
+    red one* ``Description("container", number=1, is_definite=True, covers=...)``.
 
     Attributes:
         noun: ``cube``, ``container``, ``box`` or ``tape``; ``one`` for any of them.
         color: of the thing.
-        number: how many of them, or `ALL_OF_THEM`; None if the words do not say.
+        number: how many of them, or `ALL_OF_THEM`.
         is_definite: whether it is *the* or *that*, so that it may have been named before.
         is_shown: whether it is the one that the video shows.
         place: where it stands.
-        moment: of the place: before or after things change places.
-        under: what a container covers.
-        like: what has the same color.
+        moment: when it stands at its place, which swaps may change.
+        covers: the cube under a container.
+        same_color_as: another thing, in *one more of the same color as the red cube*.
     """
 
     noun: str
@@ -42,16 +46,15 @@ class Description(NamedTuple):
     is_definite: bool = False
     is_shown: bool = False
     place: Place | None = None
-    moment: PlaceMoment | None = None
-    under: Description | None = None
-    like: Description | None = None
+    moment: Moment | None = None
+    covers: Description | None = None
+    same_color_as: Description | None = None
 
     @property
-    def is_open(self) -> bool:
-        """Whether the words say nothing about the color."""
-        return (
-            self.color is None and self.place is None and self.under is None and self.like is None
-        )
+    def leaves_color_open(self) -> bool:
+        """Whether nothing tells the color, as in *a cube*: no color, place or other thing."""
+        clues = (self.color, self.place, self.covers, self.same_color_as)
+        return all(clue is None for clue in clues)
 
 
 _PARTS = {
@@ -94,7 +97,10 @@ _BEHIND_NOUNS = Rewrites(
     r"((?:DET)?)(front|back|rear) (THINGS)=>\1\3 in the \2",
     parts=_PARTS,
 )
-"""Words for a place that stand before a noun go behind it."""
+"""Words for a place move behind the noun: *the left cube* -> *the cube on the left*.
+
+The order counts, so that the longer of two wordings is found.
+"""
 _PLACES: Mapping[str, Place] = {
     r"(?:(?:in|at|near|NEAREST to|toward|towards) )?OWN(?P<depth>front|back|rear|top|bottom)(?: "
     r"and)? "
@@ -111,14 +117,14 @@ _PLACES: Mapping[str, Place] = {
         Place("side"),
     r"RANKEDACROSSmost(?:PICTURE)?": Place("side"),
     r"(?:on|to|at) OWNACROSS(?! of (?:ANCHOR|the (?:table|button)))EDGE(?:PICTURE)?":
-        Place("side", is_loose=True),
+        Place("side", allows_several=True),
     r"RANKEDNEAREST(?: to| from)? YOU|all the way (?:in|at|to) the front": Place("depth", depth=-1),
     r"RANKEDfarthest(?: away)?(?: from| to)? YOU|farthest away(?! from)"
     r"|all the way (?:in|at|to) the back": Place("depth", depth=1),
     r"(?:in|at) (?:the )?front|(?:close|near|right next) to YOU": Place("depth", None, -1,
-                                                                        is_loose=True),
+                                                                        allows_several=True),
     r"(?:in|at) (?:the )?(?:back|rear)|far (?:away )?from YOU": Place("depth", None, 1,
-                                                                      is_loose=True),
+                                                                      allows_several=True),
     r"in (?:the )?(?:exact |very )?middle(?: of the (?:table|row|workspace|three))?":
         Place("middle"),
     r"between ANCHOR and OTHER": Place("between"),
@@ -126,16 +132,23 @@ _PLACES: Mapping[str, Place] = {
     r"RANKEDNEAREST to ANCHOR": Place("distance", depth=-1),
     r"RANKEDfarthest (?:away )?from ANCHOR": Place("distance", depth=1),
     r"(?:right )?(?:next to|by|near|close to|beside|adjacent to|near to) ANCHOR":
-        Place("distance", depth=-1, is_loose=True),
+        Place("distance", depth=-1, allows_several=True),
 }  # fmt: skip
+"""Wordings of places, in the order in which they are tried, and what each says by itself.
+
+`_read_place` adds what the words name: the side, the rank, the anchors.
+"""
 _MAX_DEPTH = 3
-"""Anchors that other anchors describe; deeper ones are not read."""
+"""Anchors that are described by further anchors, up to this many deep, are read."""
 _BACK = ("back", "far", "top", "rear")
+"""Words for the side of the table that is away from the robot."""
+# "place#1 of the two place#2": on the left of the two in the back
 _AMONG = compiled(
     r"place#(?P<place>\d+) (?:among|of) (?:the )?(?P<size>NUMBER) (?:(?:cubes|containers|ones) )?"
     r"place#(?P<group>\d+)"
 )
 
+# "the red cube", "two more cubes", "the same container"
 _NAMED = compiled(
     r"(?P<det>DET)?(?:(?P<count>NUMBER) (?:more |of the |of those |of )?)?"
     r"(?P<shown>(?:very )?same |video |shown |demonstrated |correct )?(?:single |moving )?"
@@ -143,38 +156,46 @@ _NAMED = compiled(
     r"(?:like|of|COLOR)\b)(?P<noun>cube|container|tape|box|one)(?:e?s)?",
     _PARTS,
 )
+# "blue", "two greens": without a noun
 _COLORED = compiled(
     r"(?P<det>DET)?(?:(?P<count>NUMBER) (?:more |of the )?)?(?P<color>COLOR)s?", _PARTS
 )
-"""*blue*, *two greens*: without a noun."""
+# "blue's container", "the red cube's container", "the blue container"
 _OWNED = compiled(
     r"(?:the )?(?P<color>COLOR)(?:'s| (?:cube|one)'s)(?: container| one)?"
     r"|(?:the )?(?P<other>COLOR) container",
     _PARTS,
 )
-_LIKE = compiled(
+# "one more of the same color as thing#1", "two like thing#1"
+_SAME_COLOR = compiled(
     r"(?P<count>NUMBER|an?)(?: more)?(?: cubes?)? (?:like|(?:of|in|with) the (?:same )?color "
     r"(?:as|of)|the (?:same )?color (?:as|of)) thing#(?P<like>\d+)"
 )
+# "thing#1 that was place#2": the cube that was on the left
 _STANDING = compiled(
     r"thing#(?P<thing>\d+)(?P<words>(?: WHERE| LATER| EARLIER)*) place#(?P<place>\d+)"
     r"(?P<time> LATER| EARLIER)?",
     _PARTS,
 )
+# "thing#1 over thing#2": the container over the red cube
 _COVERING = compiled(
     r"thing#(?P<thing>\d+) OVER thing#(?P<under>\d+)(?: (?:HIDDEN )?BELOW it| in it| HIDDEN| "
     r"BELOW)?"
     r"(?: in VIDEO)?",
     _PARTS,
 )
+# "thing#1 over it"
 _COVERING_IT = compiled(r"thing#(?P<thing>\d+) OVER (?:it|them)", _PARTS)
+# "thing#1 over place#2": the container over what is on the left
 _COVERING_PLACE = compiled(r"thing#(?P<thing>\d+) (?:over|above|on top of) place#(?P<place>\d+)")
+# "thing#1 under which thing#2 is hidden"
 _COVERED = compiled(
     r"thing#(?P<thing>\d+) (?:(?:BELOW|on|at) which|where|that|which|you (?:can )?find"
     r"|(?:that|where) you (?:can )?find)(?: is)? thing#(?P<under>\d+)(?: is| was)?(?: HIDDEN)?"
     r"(?: BELOW)?",
     _PARTS,
 )
+# "thing#1 that was lifted in the video"
 _SHOWN = compiled(
     r"thing#(?P<thing>\d+)(?: (?:as|like|used|shown|moved|handled|seen|that|which|you|the robot|was"
     r"|were|had|being|been|it|saw|has|did|is|previously|picked|lifted|picks|lifts|up|down|and|put"
@@ -183,48 +204,49 @@ _SHOWN = compiled(
     r"|(?:picked|lifted)(?: up)?(?: before| earlier| previously)?|before|earlier)",
     _PARTS,
 )
+# "two of each color"
 _EACH = compiled(r"(?P<count>NUMBER|an?) (?:cube )?(?:(?:of|from|in) (?:each|every)|per) color")
 
 
-def read_things(chunks: Chunks) -> None:
-    """Replace the words for things, and for where they stand, by chunks.
+def read_things(sentence: PlaceholderText) -> None:
+    """Replace the descriptions of things in a sentence by placeholders.
 
-    A chunk is one word for a phrase that was read: *the red cube on the left* first becomes
-    ``thing#0 place#1``, and then ``thing#2``, which another description can follow.
+    *lift the red cube on the left* first becomes ``lift thing#0 place#1``, and then ``lift
+    thing#2``: the meaning of number 2 is a `Description` with color and place.
     """
-    chunks.text = _BEHIND_NOUNS.apply(chunks.text)
-    chunks.apply(_NAMES)
+    sentence.text = _BEHIND_NOUNS.apply(sentence.text)
+    sentence.apply(_NAMES)
     # Descriptions may follow descriptions: "the cube on the left of the cube next to the bin".
-    while chunks.apply(_DESCRIPTIONS):
+    while sentence.apply(_DESCRIPTIONS):
         pass
-    chunks.apply(_LIKENESSES)
+    sentence.apply(_LIKENESSES)
 
 
-def _place(found: FoundPhrase, place: Place) -> Place | None:
-    """Return a place with what its words name: a side, a rank, and the things that it refers to.
+def _read_place(match: PhraseMatch, place: Place) -> Place | None:
+    """Return a place with what its words name: a side, a rank, and the anchors.
 
-    Of *second from the left*, the side ``left`` and the rank 2; of *next to the bin*, the bin, an
-    anchor. None if the anchors are described by too many others to be read.
+    *second from the left* has the side ``left`` and the rank 2; *next to the bin* has the anchor
+    ``"bin"``. None if anchors are nested too deep to be read.
 
     Args:
-        found: the words, *second from the left*.
-        place: of the kind that such words name.
+        match: the words, *second from the left*.
+        place: what all places with this wording have, ``Place("side")``.
     """
-    if found["depth"]:
-        place = place._replace(depth=1 if found["depth"] in _BACK else -1)
-    anchors = tuple(_anchor(found, name) for name in ("anchor", "other") if found[name])
-    if any(map(_is_deep, anchors)):
+    if match["depth"]:  # "at the back left"
+        place = place._replace(depth=1 if match["depth"] in _BACK else -1)
+    anchors = tuple(_anchor(match, group) for group in ("anchor", "other") if match[group])
+    if any(map(_is_too_deep, anchors)):
         return None
     return place._replace(
-        side=cast("Side | None", found["side"] or None),
-        rank=ordinal_of(found["rank"]) or 1,
-        is_mirrored="picture" in found.text or "camera" in found.text,
+        side=cast("Side | None", match["side"] or None),
+        rank=ordinal_of(match["rank"]) or 1,
+        is_in_picture="picture" in match.text or "camera" in match.text,
         anchors=anchors,
     )
 
 
-def _is_deep(anchor: object) -> bool:
-    """Return whether a thing is described by a thing that is described by another, and so on.
+def _is_too_deep(anchor: object) -> bool:
+    """Return whether an anchor is described by an anchor that is described by another, and so on.
 
     *the cube next to the cube next to the cube next to the cube by the bin* is too deep to be read.
     """
@@ -235,47 +257,57 @@ def _is_deep(anchor: object) -> bool:
     return levels >= _MAX_DEPTH
 
 
-def _anchor(found: FoundPhrase, name: str) -> object:
-    """Return the description of a thing, or the kind of a fixture: ``target#1``, ``the bin``."""
-    kind, _, _ = found[name].partition("#")
+def _anchor(match: PhraseMatch, group: str) -> object:
+    """Return the reference object of a place, as `Place` keeps it in `anchors`.
+
+    ``thing#3`` gives the `Description` that it stands for; a fixture gives its kind, ``the bin``
+    the text ``"bin"`` and ``target#1`` ``"target"``.
+    """
+    kind, _, _ = match[group].partition("#")
     if kind == "thing":
-        return found.value(name)
+        return match.value(group)
     return kind.removeprefix("the ")
 
 
-def _member(found: FoundPhrase) -> Place:
-    """Return a place among a few things, *on the left of the two in the back*."""
-    place: Place = found.value("place")
-    return place._replace(group=found.value("group"), size=number_of(found["size"]) or 0)
+def _read_place_in_group(match: PhraseMatch) -> Place:
+    """Return a place among a few things: *on the left of the two in the back*.
 
-
-def _number_of_each(found: FoundPhrase) -> int:
-    """Return how many there are of each color."""
-    return number_of(found["count"]) or 1
-
-
-def _named(found: FoundPhrase) -> Description:
-    """Return what a phrase with a noun, a color or both says of a thing.
-
-    *two red cubes* has the noun ``cube``, the color ``red`` and the number 2. Without a noun it is
-    ``one``; *the* and *this* make it definite.
+    It is the place *on the left*, with the group *in the back* of the size 2.
     """
-    determiner, _, _ = found["det"].partition(" ")  # of "all of the", the first word
-    if found["count"]:
-        number = number_of(found["count"])
+    place: Place = match.value("place")
+    return place._replace(group=match.value("group"), group_size=number_of(match["size"]) or 0)
+
+
+def _read_number_of_each(match: PhraseMatch) -> int:
+    """Return how many cubes of each color are meant: 2 for *two of each color*, 1 for *a cube*."""
+    return number_of(match["count"]) or 1
+
+
+def _read_named(match: PhraseMatch) -> Description:
+    """Return the description of a thing by a noun, a color or both.
+
+    *two red cubes* gives ``Description("cube", "red", 2)``, and *blue* without a noun
+    ``Description("one", "blue", 1)``. *The*, *this* and the like make it definite.
+    """
+    determiner, _, _ = match["det"].partition(" ")  # of "all of the", the first word
+    if match["count"]:
+        number = number_of(match["count"])
     else:
-        number = _number_by(determiner, is_plural=found.text.endswith("s"))
+        number = _number_by_determiner(determiner, is_plural=match.text.endswith("s"))
     return Description(
-        found["noun"] or "one",
-        color_of(found["color"]),
+        match["noun"] or "one",
+        color_of(match["color"]),
         number,
         is_definite=determiner in ("the", "this", "that", "those", "these", "your"),
-        is_shown=bool(found["shown"]),
+        is_shown=bool(match["shown"]),
     )
 
 
-def _number_by(determiner: str, *, is_plural: bool) -> int | None:
-    """Return how many things words without a number mean: *a cube* is one; None if unclear."""
+def _number_by_determiner(determiner: str, *, is_plural: bool) -> int | None:
+    """Return how many things are meant where no number is said.
+
+    *all cubes* gives `ALL_OF_THEM`, *a cube* or *the cube* 1, and *the cubes* None: unclear.
+    """
     if determiner in ("all", "each", "every", "both"):
         return ALL_OF_THEM
     if determiner in ("a", "an", "another", "the", "") and not is_plural:
@@ -283,103 +315,109 @@ def _number_by(determiner: str, *, is_plural: bool) -> int | None:
     return None
 
 
-def _like(found: FoundPhrase) -> Description:
+def _read_same_color(match: PhraseMatch) -> Description:
     """Return cubes of the color of another thing: *one more of the same color as the red one*."""
-    number = number_of(found["count"]) or 1
-    return Description("cube", number=number, like=found.value("like"))
+    number = number_of(match["count"]) or 1
+    return Description("cube", number=number, same_color_as=match.value("like"))
 
 
-def _standing(found: FoundPhrase) -> Description | None:
-    """Return a thing with the place that words after it name; None if it is described already.
+def _read_standing(match: PhraseMatch) -> Description | None:
+    """Return a thing with the place that the words after it name: *the cube on the left*.
 
-    *the cube that was on the left* also says when it stood there: at first.
+    *the cube that was on the left* also says when it stood there: at the start. None if the thing
+    has a place already or covers something, so that the words stay unread.
     """
-    thing: Description = found.value("thing")
-    if thing.place is not None or thing.under is not None:
+    thing: Description = match.value("thing")
+    if thing.place is not None or thing.covers is not None:
         return None
-    moment = _moment(found["words"], found["time"])
-    return thing._replace(place=found.value("place"), moment=moment)
+    moment = _moment(match["words"], match["time"])
+    return thing._replace(place=match.value("place"), moment=moment)
 
 
-def _covering(found: FoundPhrase) -> Description | None:
-    """Return a container over a thing."""
-    return _over(found.value("thing"), found.value("under"))
+def _read_covering(match: PhraseMatch) -> Description | None:
+    """Return a container by what it covers: *the container over the red cube*; None if unfit."""
+    return _container_over(match.value("thing"), match.value("under"))
 
 
-def _covering_place(found: FoundPhrase) -> Description | None:
-    """Return a container over what stands at a place."""
-    under = Description("cube", is_definite=True, place=found.value("place"))
-    return _over(found.value("thing"), under)
+def _read_covering_place(match: PhraseMatch) -> Description | None:
+    """Return a container by where its cube is: *the container over the place on the left*.
+
+    None if it cannot be one, as in *the red cube over the place on the left*.
+    """
+    cube = Description("cube", is_definite=True, place=match.value("place"))
+    return _container_over(match.value("thing"), cube)
 
 
-def _covering_it(found: FoundPhrase) -> Description:
-    """Return a thing as it is: *over it* says no more."""
-    thing: Description = found.value("thing")
+def _read_covering_it(match: PhraseMatch) -> Description:
+    """Return a thing as it is: in *the container over it*, the last two words say no more."""
+    thing: Description = match.value("thing")
     return thing
 
 
-def _shown(found: FoundPhrase) -> Description:
-    """Return a thing as the one that the video shows."""
-    thing: Description = found.value("thing")
+def _read_shown(match: PhraseMatch) -> Description:
+    """Return a thing as the one of the video: *the cube that was lifted in the video*."""
+    thing: Description = match.value("thing")
     return thing._replace(is_shown=True)
 
 
-def _owned(found: FoundPhrase) -> Description:
-    """Return the container over a cube, *blue's container*."""
-    cube = Description("cube", color_of(found["color"] or found["other"]))
-    return Description("container", is_definite=True, under=cube)
+def _read_owned(match: PhraseMatch) -> Description:
+    """Return the container over a cube of a color: *blue's container*, *the blue container*."""
+    cube = Description("cube", color_of(match["color"] or match["other"]))
+    return Description("container", is_definite=True, covers=cube)
 
 
-def _over(thing: Description, under: Description) -> Description | None:
-    """Return the container over a cube, as the description of one thing by another.
+def _container_over(container: Description, cube: Description) -> Description | None:
+    """Return a container that is described by the cube under it.
 
-    *the container over the red cube*. None if the first thing can be no container, the second no
-    cube, or if the container has another description already.
+    None if the first description cannot be of a container or the second of a cube, or if the
+    container is described already, as in *the red container over the blue cube*.
     """
-    if thing.noun not in ("container", "one") or under.noun not in ("cube", "one"):
+    if container.noun not in ("container", "one") or cube.noun not in ("cube", "one"):
         return None
-    if thing.color is not None or thing.place is not None or thing.under is not None:
+    if not container.leaves_color_open:
         return None
-    return thing._replace(noun="container", under=under._replace(noun="cube"))
+    return container._replace(noun="container", covers=cube._replace(noun="cube"))
 
 
-def _moment(*words: str) -> PlaceMoment | None:
-    """Return at which moment of the scene a thing stands at its place: ``first`` or ``last``.
+def _moment(*words: str) -> Moment | None:
+    """Return when a thing stands at its place, by the words around the place.
 
-    *now* is the last one, *was* and *at first* the first. None if no word says it.
+    *now* and *currently* mean ``end``; *was*, *at first*, *initially* or *in the video* mean
+    ``start``. None if no word says it.
     """
     text = " ".join(words)
     if re.search(r"\b(?:now|currently|at the moment)\b", text):
-        return "last"
+        return "end"
     if re.search(r"\b(?:was|were|stood|sat|started|start|beginning|first|\w+ally|video)\b", text):
-        return "first"
+        return "start"
     return None
 
 
+# Rules apply from first to last, and take their words from those after them.
 _NAMES = (
     # "two of each color" and "blue's container" hold a number, a color or a noun of their own.
-    PhraseRule("each", _EACH, _number_of_each),
-    PhraseRule("thing", _OWNED, _owned),
+    PhraseRule("each", _EACH, _read_number_of_each),
+    PhraseRule("thing", _OWNED, _read_owned),
     # With a noun before those without: "red cube", then "red".
-    PhraseRule("thing", _NAMED, _named),
-    PhraseRule("thing", _COLORED, _named),
+    PhraseRule("thing", _NAMED, _read_named),
+    PhraseRule("thing", _COLORED, _read_named),
 )
-"""Things by their names."""
+"""Descriptions by a noun or color."""
 _PLACE_RULES = [
-    PhraseRule("place", compiled(pattern, _PARTS), functools.partial(_place, place=place))
+    PhraseRule("place", compiled(pattern, _PARTS), functools.partial(_read_place, place=place))
     for pattern, place in _PLACES.items()
 ]
 _DESCRIPTIONS = (
     *_PLACE_RULES,
-    PhraseRule("place", _AMONG, _member),
+    PhraseRule("place", _AMONG, _read_place_in_group),
     # A place goes to the nearest thing: "the container over the cube in the middle".
-    PhraseRule("thing", _STANDING, _standing),
-    PhraseRule("thing", _COVERING, _covering),
-    PhraseRule("thing", _COVERING_PLACE, _covering_place),
-    PhraseRule("thing", _COVERING_IT, _covering_it),
-    PhraseRule("thing", _COVERED, _covering),
-    PhraseRule("thing", _SHOWN, _shown),
+    PhraseRule("thing", _STANDING, _read_standing),
+    PhraseRule("thing", _COVERING, _read_covering),
+    PhraseRule("thing", _COVERING_PLACE, _read_covering_place),
+    PhraseRule("thing", _COVERING_IT, _read_covering_it),
+    PhraseRule("thing", _COVERED, _read_covering),
+    PhraseRule("thing", _SHOWN, _read_shown),
 )
-"""Places, and words that describe a thing and stand behind it."""
-_LIKENESSES = (PhraseRule("thing", _LIKE, _like),)
-"""Things of the color of another one, whose description has been read."""
+"""Places, and words behind a thing that describe it: *on the left*, *from the video*."""
+_LIKENESSES = (PhraseRule("thing", _SAME_COLOR, _read_same_color),)
+"""Descriptions by another one, which has to be read first: *one more of the color of thing#1*."""

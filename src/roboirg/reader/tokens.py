@@ -6,14 +6,18 @@ import re
 from collections.abc import Iterable
 
 Sentence = tuple[str, ...]
+"""A sentence as its words, numbers and commas: ``("lift", "it", ",", "then", "press")``."""
 
+# In this order: "2nd", "3.5", "don't", "42", punctuation, and any other sign that is no space.
 _WORD = re.compile(
     r"[0-9]+(?:st|nd|rd|th)\b|[0-9]+[.][0-9]+|[^\W\d_]+(?:'[^\W\d_]+)?|[0-9]+|[,;:]|[^\W_]"
 )
 _SENTENCE_END = re.compile(r"(?:[.](?![0-9])|[!?\n])+")
+"""Full stops and other ends of sentences, but not the point in *3.5*."""
 _LIST_MARK = re.compile(r"(?:^|(?<=[.;:,\n]))\s*(?:step )?(?:[0-9][.):]|[-*•])\s+", re.MULTILINE)
 """*1.*, *2)*, *Step 3:* and the like, in front of the sentences of a plan."""
 _MINUS = re.compile(r"(?<!\w)[-−](?=[0-9])")
+"""The sign before a negative number; not a hyphen."""
 _SPELLINGS = (
     ("’", "'"),
     ("->", " to "),
@@ -60,7 +64,7 @@ for _name in _COLOR_NAMES:
 
 
 def word_set(words: str) -> frozenset[str]:
-    """Return the words of a string, for membership tests."""
+    """Return the words of a string as a set: ``"them these"`` gives ``{"them", "these"}``."""
     return frozenset(words.split())
 
 
@@ -90,7 +94,10 @@ _LARGEST_NUMBER = 10**9
 
 
 def _alternatives(words: Iterable[str]) -> str:
-    """Return a regular expression for any of these words, the longest first."""
+    """Return a regular expression for any of these words: ``"seventh|seven"``.
+
+    The longest comes first, as the regular expression takes the first alternative that fits.
+    """
     return "|".join(sorted(words, key=len, reverse=True))
 
 
@@ -103,13 +110,14 @@ COLOR = rf"(?:{_alternatives(_COLOR_NAMES)})"
 
 
 def split_sentences(text: str) -> tuple[Sentence, ...]:
-    """Return the sentences of a text, each as its words and commas, spelled in one way.
+    """Return the sentences of a text, each as a tuple of normalized words and commas.
 
-    ``"Please lift it. It's grey!"`` gives ``(("lift", "it"), ("it", "is", "gray"))``: capitals and
-    filler words are dropped, British spelling and short forms give the same words as others, and
-    known synonyms become one word.
+    ``"Please lift the block. It's grey!"`` gives ``(("lift", "the", "cube"), ("it", "is",
+    "gray"))``: words become lower case, fillers such as *please* are dropped, spelling variants and
+    contractions are replaced by one form, and synonyms by one word.
     """
     text = _LIST_MARK.sub("\n", text.lower())
+    # In the order of the table: "can't" must be replaced before "n't".
     for variant, usual in _SPELLINGS:
         text = text.replace(variant, usual)
     text = _MINUS.sub("minus ", text)
@@ -122,17 +130,20 @@ def split_sentences(text: str) -> tuple[Sentence, ...]:
 
 
 def number_of(word: str) -> int | None:
-    """Return the number that a word or a string of digits names."""
+    """Return the number that a word or a string of digits names, such as *three* or *3*.
+
+    None for any other word. Numbers of ten digits or more are cut to `_LARGEST_NUMBER`.
+    """
     if word.isascii() and word.isdigit():
         return int(word) if len(word) < len(str(_LARGEST_NUMBER)) else _LARGEST_NUMBER
     return _NUMBERS.get(word)
 
 
 def ordinal_of(word: str) -> int | None:
-    """Return 1 for ``first``, 2 for ``second``, ..."""
+    """Return 1 for ``first``, 2 for ``second`` or ``2nd``, up to 10; None for any other word."""
     return _ORDINALS.get(word)
 
 
 def color_of(word: str) -> str | None:
-    """Return the color that a word names, as an adjective or a noun."""
+    """Return the color that a word names: ``"red"`` for *red* or *reds*; None for other words."""
     return _COLORS.get(word)

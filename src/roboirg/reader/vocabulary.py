@@ -25,14 +25,14 @@ _VERBS: Mapping[str, str] = {
     "stop": "stop stopping halt halting freeze freezing",
     "repeat": "repeat repeating do doing perform performing",
 }
-"""The words for each act; the first one stands for all."""
+"""Verbs of commands by what they ask for; the first verb of a line stands for all in it."""
 VERB_OF: dict[str, str] = {}
 for _verb, _words in _VERBS.items():
     VERB_OF.update(dict.fromkeys(_words.split(), _verb))
-"""The act of each verb."""
+"""The verb that stands for each verb: ``VERB_OF["grab"]`` is ``"take"``."""
 
 LOWERING = word_set("lower lowering release releasing return returning")
-"""Verbs that put something down without another word."""
+"""Verbs that say by themselves that something is put down: *release it*."""
 UNSEEN_COLORS = word_set(
     "orange pink white black brown cyan magenta violet turquoise silver gold "
     "beige maroon teal navy crimson scarlet lime olive"
@@ -41,7 +41,10 @@ UNSEEN_COLORS = word_set(
 
 
 def is_known(word: str) -> bool:
-    """Return whether a rule reads a word."""
+    """Return whether the interpreter knows a word: a verb, number, color, or word of a pattern.
+
+    A known word may still be left unread, where no pattern fits it with the words around it.
+    """
     if number_of(word) is not None or ordinal_of(word) is not None or color_of(word) is not None:
         return True
     return word in VERB_OF or word in KNOWN_WORDS or word in FILLERS or word in tokens.SYNONYMS
@@ -50,8 +53,8 @@ def is_known(word: str) -> bool:
 def register_words(synonyms: Mapping[str, str]) -> None:
     """Make the interpreter read new words of another package as words that it knows.
 
-    Call it in the module of the task or setting that uses the words; a second call with the same
-    words changes nothing:
+    It adds them to `tokens.SYNONYMS` for the whole process. Call it in the module of the task or
+    setting that uses the words; a second call with the same words changes nothing:
 
         register_words({"crate": "box", "hoist": "lift"})
 
