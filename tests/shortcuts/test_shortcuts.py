@@ -24,7 +24,7 @@ from roboirg.shortcuts.goal_learner import LEARNED_FLOORS
 from roboirg.shortcuts.goal_vocabulary import goal_vocabulary
 from roboirg.shortcuts.shortcut_scores import (
     CHANCE,
-    counted_places,
+    counted_positions,
     counted_slots,
     hidden_slots,
     rule_scores,
@@ -302,7 +302,7 @@ def test_of_two_containers_one_of_which_is_named_only_the_other_is_scored():
         episode = get_episode("ButtonUnmaskSwap", "test", index)
         told = episode, instruct(episode, "spatial")
         if len(episode.goal["colors"]) == 2:
-            (at,) = counted_places(told)["colors"]
+            (at,) = counted_positions(told)["colors"]
             found.add(at)
             named = {1 - at: (episode.goal["colors"][1 - at],)}
             guess = {"colors": [named.get(place, ()) or COLORS for place in (0, 1)]}

@@ -1,4 +1,8 @@
-"""Shortcuts: how far rules and models come that see the words only, and understand none of them."""
+"""Shortcuts: how far rules and models come that do not understand the words of an instruction.
+
+A rule guesses a goal from the words alone, by their position or key words (`surface_rules`,
+`text_guess`); models learn from the words or from the scene alone (`goal_learner`).
+"""
 
 from __future__ import annotations
 

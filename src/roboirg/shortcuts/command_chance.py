@@ -1,7 +1,7 @@
-"""What an instruction leaves open: all of it, its command alone, and a blind guess.
+"""Which goals of a scene fit an instruction: all of it, or its command (last utterance) alone.
 
-All of it is asked of the declared meaning. Words without one, such as scrambled ones, leave no
-goal.
+An instruction declares its meaning (`roboirg.language.meaning`), of which these functions ask. One
+without a meaning, such as scrambled words, fits no goal.
 """
 
 from __future__ import annotations
@@ -16,25 +16,32 @@ from roboirg.tasks import get_task
 
 
 def understood_goals(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals of the scene that fit a whole instruction; none if it has no meaning."""
+    """Return the goals of the scene that fit a whole instruction: one if it leaves nothing open.
+
+    Empty if the instruction has no meaning.
+    """
     if instruction.meaning is None:
         return ()
     return meaning.meant_goals(instruction.meaning, episode)
 
 
 def goals_of_command(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals of the scene that fit the last utterance alone; none without a meaning."""
+    """Return the goals of the scene that fit the last utterance alone.
+
+    *The red one is Bob's. Lift it twice.* -> the goals with two repetitions, of every color. Empty
+    if the instruction has no meaning.
+    """
     if instruction.meaning is None:
         return ()
     return meaning.command_goals(instruction.meaning, episode)
 
 
 def blind_goals(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals of the scene among which a blind guesser chooses.
+    """Return the goals of the scene among which a guesser chooses that understands the command.
 
     They are those that fit the command, the last utterance. Where the text before it names
-    candidates, such as a color and its rival, only these count: to pick one of two takes no
-    understanding of which one is meant. Without a declared meaning there are none.
+    candidates, *the red or the blue one*, only these count: to pick one of two takes no
+    understanding of which one is meant. Empty if the instruction has no meaning.
     """
     if instruction.meaning is None:
         return ()
@@ -42,7 +49,7 @@ def blind_goals(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
 
 
 def right_share(goals: Sequence[Goal], episode: Episode) -> Fraction | None:
-    """Return the share of some goals of the scene that are right; None without goals."""
+    """Return the share of some goals of the scene that are right, 0 to 1; None without goals."""
     if not goals:
         return None
     right = [goal for goal in goals if is_right(goal, episode)]
@@ -50,9 +57,9 @@ def right_share(goals: Sequence[Goal], episode: Episode) -> Fraction | None:
 
 
 def is_right(goal: Goal, episode: Episode) -> bool:
-    """Return whether a goal of the scene has the stages of the right one.
+    """Return whether a goal of the scene counts as the episode's goal.
 
-    Goals with the same stages are the same to the judge.
+    So does every goal with the same stages, as the judge sees no difference.
     """
     task = get_task(episode.task)
     return goal == episode.goal or task.stages(episode.scene, goal) == episode.stages

@@ -1,10 +1,14 @@
-"""Learners that do not understand: of the words alone, of the scene alone, and of either.
+"""Baselines that learn to guess goals without understanding: from the words or the scene alone.
 
-Each predicts every place of a goal by itself, and sees it in several ways: the text as it is, to
-predict the value; the text in which every named value is its rank in the order of mention, to
-predict which of them is meant; and what can be seen, to predict the value. Each view has a linear
-model and a small neural network. A floor takes for each place what is right most often on
-instructions that were not learned from.
+A *learned floor* is such a baseline: what a policy that understands has to exceed. For each value
+of a goal it is the best of several models, by their right guesses on validation instructions that
+they were not fitted on. Models differ in their *view*, what they see:
+
+- ``words``: the text as it is; they predict the value, ``blue``.
+- ``order``: the text with ranks for named values, *rank0 and rank1*; they predict the rank.
+- ``scene``: what can be seen of the scene, without the words; they predict the value.
+
+Each view has a linear model and a small neural network.
 """
 
 from __future__ import annotations
@@ -12,7 +16,7 @@ from __future__ import annotations
 import itertools
 import warnings
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, cast, get_args
 
@@ -29,15 +33,15 @@ from roboirg.shortcuts.text_guess import TextGuess
 LearnedFloor = Literal["majority", "text-only", "scene-only", "union"]
 LEARNED_FLOORS: tuple[LearnedFloor, ...] = get_args(LearnedFloor)
 View = Literal["words", "order", "scene"]
-Model = Literal["linear", "network"]
-MODELS: tuple[Model, ...] = get_args(Model)
+ModelKind = Literal["linear", "network"]
+MODEL_KINDS: tuple[ModelKind, ...] = get_args(ModelKind)
 
 
-class Way(NamedTuple):
-    """One way to learn: what the model sees of an instruction, and the kind of model."""
+class ModelSpec(NamedTuple):
+    """A model to fit: what it sees of an instruction, and its kind."""
 
     view: View
-    model: Model
+    kind: ModelKind
 
 
 _VIEWS_OF_FLOOR: Mapping[LearnedFloor, tuple[View, ...]] = {
@@ -46,14 +50,17 @@ _VIEWS_OF_FLOOR: Mapping[LearnedFloor, tuple[View, ...]] = {
     "scene-only": ("scene",),
     "union": ("words", "order", "scene"),
 }
-_WAYS = [Way(view, model) for view, model in itertools.product(_VIEWS_OF_FLOOR["union"], MODELS)]
+"""Among the models of these views each floor has its choice; ``majority`` has no model."""
+_MODEL_SPECS = [
+    ModelSpec(view, kind) for view, kind in itertools.product(_VIEWS_OF_FLOOR["union"], MODEL_KINDS)
+]
 _NGRAMS = (1, 3)
-"""Lengths of the n-grams, in words."""
+"""Lengths of the n-grams, in words: the shortest and the longest."""
 _SEED = 0
 _NONE = "none"
-"""Stands for a place that a goal does not have."""
+"""Label of a position that a goal does not have, such as a second color."""
 _UNNAMED = "unnamed"
-"""Stands for a value that the text does not name, where the others are ranks."""
+"""Label of a value that the text does not name, where the other labels are ranks."""
 
 InstructedEpisode = tuple[Episode, Instruction]
 """An episode and one of its instructions."""
@@ -63,15 +70,15 @@ class LearnerInput(NamedTuple):
     """What learners get of an instruction and its scene, without the goal.
 
     Attributes:
-        text: all of its words.
-        open: the slots that the command does not state.
+        text: all words of the instruction.
+        open_slots: the goal slots that the command does not state; only these are predicted.
         candidates: by slot, the values that the text introduces on equal terms, in the order of
             mention.
-        facts: of the scene; none for learners of the words.
+        facts: features of the scene; none for learners of the words.
     """
 
     text: str
-    open: Collection[str] = ()
+    open_slots: Collection[str] = ()
     candidates: Mapping[str, tuple[Value, ...]] = MappingProxyType({})
     facts: SceneFacts = MappingProxyType({})
 
@@ -110,20 +117,19 @@ def open_slots(instructed: InstructedEpisode) -> frozenset[str]:
 
 
 def check_learning_support() -> None:
-    """Check early that floors can be learned."""
+    """Raise `MissingDependencyError` if scikit-learn is missing, before work starts."""
     with extra_needed("The learned floors need scikit-learn", "report"):
         import sklearn.neural_network  # noqa: F401
 
 
 class GoalLearner:
-    """Baselines that learn to guess goals without understanding, for one task in one setting.
+    """Learned floors for one task in one setting: they guess goals without understanding.
 
-    The same input gives the same predictions. Each baseline is a *learned floor*: what a policy
-    that understands has to exceed.
+    The same input gives the same predictions.
 
     Args:
         training: instructions of the task to learn from, with their episodes.
-        validation: others, on which the best view and model of each place are chosen.
+        validation: others, on which the best model for each value of a goal is chosen.
     """
 
     def __init__(
@@ -134,42 +140,46 @@ class GoalLearner:
             raise InvalidValueError("The learned floors have no instruction to learn from.")
         episode, _ = training[0]
         self._vocabulary = goal_vocabulary(episode.task)
-        examples = _examples(training)
-        tests = _examples(validation)
-        self._learners: dict[str, list[_PlaceLearner]] = {}
+        training_examples = _examples(training)
+        validation_examples = _examples(validation)
+        # By slot, a learner for each value that the slot may hold: the first color, the second.
+        self._learners: dict[str, list[_ValueLearner]] = {}
         for slot, vocabulary in self._vocabulary.items():
-            learners: list[_PlaceLearner] = []
-            for number in range(vocabulary.longest):
-                place = _FieldPlace(slot, number, vocabulary)
-                learners.append(_PlaceLearner(place, examples, tests))
-            self._learners[slot] = learners
+            self._learners[slot] = [
+                _ValueLearner(
+                    _SlotPosition(slot, index, vocabulary), training_examples, validation_examples
+                )
+                for index in range(vocabulary.longest)
+            ]
 
     def guesses(self, floor: LearnedFloor, inputs: Sequence[LearnerInput]) -> list[TextGuess]:
-        """Return a baseline's guess of the goal of each instruction of the task.
+        """Return the goal that a floor guesses for each of some instructions of the task.
 
-        A guess has, by goal slot, a value for each place: of two colors to pick, the first and the
-        second. For example ``{"colors": (("red",), ("blue",)), "repeats": ((2,),)}``.
-
-        Values that the command states plainly are read from it, unless the baseline sees no words;
-        a learner predicts all others.
+        Each guess is certain: it has one value for each position of a slot, ``{"colors":
+        (("red",), ("blue",)), "repeats": ((2,),)}``. Values that the command states plainly are
+        read from it, unless the floor sees no words; models predict all others.
         """
         guesses: list[dict[str, tuple[Candidates, ...]]] = [{} for _ in inputs]
         for slot, learners in self._learners.items():
-            # A list for each place, with a value for each instruction: it is faster to predict the
-            # values of all instructions at once.
-            by_place = [learner.predict(floor, inputs) for learner in learners]
-            for number, instruction in enumerate(inputs):
-                predicted = [predictions[number] for predictions in by_place]
-                present = [value for value in predicted if value is not None]
-                stated = self._stated(floor, instruction, slot)
-                guesses[number][slot] = tuple(certain(stated or present))
+            # The values of all instructions at once, which is faster: a list for each position.
+            predictions = [learner.predict(floor, inputs) for learner in learners]
+            for number, given in enumerate(inputs):
+                values = self._stated(floor, given, slot)
+                if not values:
+                    values = _without_none(position[number] for position in predictions)
+                guesses[number][slot] = tuple(certain(values))
         return list(guesses)
 
     def _stated(self, floor: LearnedFloor, given: LearnerInput, slot: str) -> tuple[Value, ...]:
         """Return the values of a slot that a command states; none if the floor sees no words."""
-        if slot in given.open or "words" not in _VIEWS_OF_FLOOR[floor]:
+        if slot in given.open_slots or "words" not in _VIEWS_OF_FLOOR[floor]:
             return ()
         return stated_values(given.text, slot, self._vocabulary[slot])
+
+
+def _without_none(values: Iterable[Value | None]) -> tuple[Value, ...]:
+    """Return the values that are there, without None for those that a goal does not have."""
+    return tuple(value for value in values if value is not None)
 
 
 class _Example(NamedTuple):
@@ -186,118 +196,124 @@ def _examples(texts: Sequence[InstructedEpisode]) -> list[_Example]:
     ]
 
 
-class _FieldPlace(NamedTuple):
-    """One place of a goal slot, from 0: of the colors of two containers, the first one, say."""
+class _SlotPosition(NamedTuple):
+    """One value of a goal slot, by its index: of two colors, the first one is 0.
+
+    Attributes:
+        slot: its name.
+        value_index: of the value in the slot, from 0.
+        vocabulary: of the slot.
+    """
 
     slot: str
-    number: int
+    value_index: int
     vocabulary: SlotVocabulary
 
     def value_in(self, goal: Goal) -> Value | None:
-        """Return what a goal has at the place; None if its slot is shorter."""
+        """Return the value that a goal has here, ``"red"``; None if its slot holds fewer values."""
         values = values_in(goal[self.slot])
-        return values[self.number] if self.number < len(values) else None
+        return values[self.value_index] if self.value_index < len(values) else None
 
     def open_in(self, examples: Sequence[_Example]) -> list[_Example]:
-        """Return the examples whose command leaves the slot open."""
-        return [example for example in examples if self.slot in example.given.open]
+        """Return the examples whose command does not state the slot."""
+        return [example for example in examples if self.slot in example.given.open_slots]
 
 
-class _PlaceLearner:
-    """Predicts one value of a goal: all fitted models, and which of them each floor uses.
+class _ValueLearner:
+    """Predicts one value of a goal, such as the second color, with the best model of each floor.
 
-    Learns from instructions whose command does not name the value. Without any, it predicts the
-    most frequent value.
+    It learns from the instructions whose command does not name the value. Without any, it predicts
+    the most frequent value. None, where a goal does not have the value, counts as a value.
     """
 
     def __init__(
-        self, place: _FieldPlace, training: Sequence[_Example], validation: Sequence[_Example]
+        self, position: _SlotPosition, training: Sequence[_Example], validation: Sequence[_Example]
     ) -> None:
-        self._place = place
-        # By frequency; None, where a goal does not have the place, counts as a value.
-        counts = Counter(place.value_in(example.goal) for example in training)
+        self._position = position
+        counts = Counter(position.value_in(example.goal) for example in training)
         self._by_frequency = [value for value, _ in counts.most_common()]
-        self._models: dict[Way, Any] = {}
-        self._best_ways: dict[LearnedFloor, Way] = {}
-        open_examples = place.open_in(training)
+        self._models: dict[ModelSpec, Any] = {}
+        self._best_specs: dict[LearnedFloor, ModelSpec] = {}
+        open_examples = position.open_in(training)
         if open_examples and len(self._by_frequency) > 1:
-            self._learn(open_examples, place.open_in(validation))
+            self._learn(open_examples, position.open_in(validation))
 
     def _learn(self, training: Sequence[_Example], validation: Sequence[_Example]) -> None:
-        """Fit a model for every way; each floor gets the one that is right most often.
+        """Fit all models, and choose for each floor the one that is right most often.
 
         Args:
             training: to fit the models.
             validation: other instructions, on which right predictions are counted.
         """
-        numbers_right: dict[Way, int] = {}
-        for way in _WAYS:
-            self._models[way] = self._fit(way, training)
-            numbers_right[way] = self._count_right(way, validation)
+        numbers_right: dict[ModelSpec, int] = {}
+        for spec in _MODEL_SPECS:
+            self._models[spec] = self._fit(spec, training)
+            numbers_right[spec] = self._count_right(spec, validation)
         for floor, views in _VIEWS_OF_FLOOR.items():
-            ways = [way for way in _WAYS if way.view in views]
-            if ways:
-                self._best_ways[floor] = max(ways, key=numbers_right.__getitem__)
+            specs = [spec for spec in _MODEL_SPECS if spec.view in views]
+            if specs:  # of equally good ones the first
+                self._best_specs[floor] = max(specs, key=numbers_right.__getitem__)
 
-    def _count_right(self, way: Way, validation: Sequence[_Example]) -> int:
+    def _count_right(self, spec: ModelSpec, validation: Sequence[_Example]) -> int:
         """Return for how many instructions a fitted model predicts the goal's value."""
         if not validation:
             return 0
-        predicted = self._predict(way, [example.given for example in validation])
+        predicted = self._predict(spec, [example.given for example in validation])
         count = 0
         for value, example in zip(predicted, validation, strict=True):
-            if value == self._place.value_in(example.goal):
+            if value == self._position.value_in(example.goal):
                 count += 1
         return count
 
     def predict(self, floor: LearnedFloor, inputs: Sequence[LearnerInput]) -> list[Value | None]:
         """Return the value that a floor predicts for each instruction.
 
-        None predicts that the goal has no value at this place, such as no second color.
+        None predicts that the goal has no such value, for example no second color.
         """
-        if floor not in self._best_ways or not inputs:
+        if floor not in self._best_specs or not inputs:
             return [self._by_frequency[0]] * len(inputs)
-        return self._predict(self._best_ways[floor], inputs)
+        return self._predict(self._best_specs[floor], inputs)
 
-    def _fit(self, way: Way, examples: Sequence[_Example]) -> Any:  # noqa: ANN401 - scikit-learn has no types
-        """Return a scikit-learn pipeline, fitted on all examples, which it sees in one way."""
-        labels = [self._label(way.view, example) for example in examples]
-        features = self._model_inputs(way.view, [example.given for example in examples])
-        model = _unfitted_model(way, is_constant=len(set(labels)) == 1)
+    def _fit(self, spec: ModelSpec, examples: Sequence[_Example]) -> Any:  # noqa: ANN401 - scikit-learn has no types
+        """Return a scikit-learn pipeline, fitted on all examples."""
+        labels = [self._label(spec.view, example) for example in examples]
+        features = self._model_inputs(spec.view, [example.given for example in examples])
+        model = _unfitted_model(spec, is_constant=len(set(labels)) == 1)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that an iteration more would be better
             return model.fit(features, labels)
 
-    def _predict(self, way: Way, inputs: Sequence[LearnerInput]) -> list[Value | None]:
-        """Return the value that the model of a way predicts for each instruction.
+    def _predict(self, spec: ModelSpec, inputs: Sequence[LearnerInput]) -> list[Value | None]:
+        """Return the value that a fitted model predicts for each instruction.
 
-        None predicts that the goal has no value at this place.
+        None predicts that the goal has no such value.
         """
-        labels = self._models[way].predict(self._model_inputs(way.view, inputs))
+        labels = self._models[spec].predict(self._model_inputs(spec.view, inputs))
         pairs = zip(inputs, labels, strict=True)
-        return [self._value_of_label(way.view, instruction, label) for instruction, label in pairs]
+        return [self._value_of_label(spec.view, given, label) for given, label in pairs]
 
     def _model_inputs(self, view: View, inputs: Sequence[LearnerInput]) -> list[str | SceneFacts]:
-        return [self._model_input(view, instruction) for instruction in inputs]
+        return [self._model_input(view, given) for given in inputs]
 
     def _model_input(self, view: View, given: LearnerInput) -> str | SceneFacts:
-        """Return what a model sees of an instruction: the scene, the words, or marked words.
+        """Return what a model sees of an instruction: features of the scene, or a text.
 
-        In the last view, ``order``, ranks stand for named values: *rank0 and rank1; the rank0 one*.
+        In the view ``words`` that is the text as it is, *red and blue; the red one*, and in
+        ``order`` the text with ranks for the slot's values, *rank0 and rank1; the rank0 one*.
         """
         if view == "scene":
             return given.facts
         if view == "words":
             return given.text
-        return marked_text(given.text, self._place.slot, self._place.vocabulary)
+        return marked_text(given.text, self._position.slot, self._position.vocabulary)
 
     def _label(self, view: View, example: _Example) -> str:
-        """Return the class that a model should predict for a example, as a text.
+        """Return the label that a model should predict for an example; see `_value_of_label`.
 
-        It is the goal's value: ``"blue"``. In the view ``order`` it is the value's rank among the
-        values that the text names, from 0: ``"1"`` for blue after red.
+        It is the goal's value as a text, ``"blue"``. In the view ``order`` it is the value's rank
+        among the values that the text names, from 0: ``"1"`` for blue after red.
         """
-        value = self._place.value_in(example.goal)
+        value = self._position.value_in(example.goal)
         if value is None:
             return _NONE
         if view != "order":
@@ -308,7 +324,8 @@ class _PlaceLearner:
     def _value_of_label(self, view: View, given: LearnerInput, label: str) -> Value | None:
         """Return the value that a predicted label stands for, the reverse of `_label`.
 
-        In the view ``order``, ``"1"`` is the second value that the text names.
+        In the view ``order``, ``"1"`` is the second value that the text names. ``"unnamed"``, or a
+        rank that is too high, is the most frequent value that it does not name.
         """
         if label == _NONE:
             return None
@@ -317,7 +334,6 @@ class _PlaceLearner:
         named = self._introduced(given)
         if label != _UNNAMED and int(label) < len(named):
             return named[int(label)]
-        # The label is `_UNNAMED`, or a rank above the number of named values.
         for value in self._by_frequency:
             if value is not None and value not in named:
                 return value
@@ -328,17 +344,17 @@ class _PlaceLearner:
 
         If the instruction lists no candidates, all values that the text names count.
         """
-        if self._place.slot in given.candidates:
-            return given.candidates[self._place.slot]
-        named = named_values(given.text, self._place.slot, self._place.vocabulary)
+        if self._position.slot in given.candidates:
+            return given.candidates[self._position.slot]
+        named = named_values(given.text, self._position.slot, self._position.vocabulary)
         return tuple(dict.fromkeys(mention.value for mention in named))
 
 
-def _unfitted_model(way: Way, *, is_constant: bool) -> Any:  # noqa: ANN401 - scikit-learn has no types
+def _unfitted_model(spec: ModelSpec, *, is_constant: bool) -> Any:  # noqa: ANN401 - scikit-learn has no types
     """Return a scikit-learn pipeline, not fitted, that turns a view into numbers and classifies it.
 
     Args:
-        way: the view and the kind of model.
+        spec: the view and the kind of model.
         is_constant: whether there is only one class, which most classifiers refuse.
     """
     from sklearn.dummy import DummyClassifier
@@ -351,11 +367,11 @@ def _unfitted_model(way: Way, *, is_constant: bool) -> Any:  # noqa: ANN401 - sc
 
     if is_constant:
         return DummyClassifier()
-    if way.model == "linear":
+    if spec.kind == "linear":
         predictor = LogisticRegression(C=10.0, max_iter=200)
     else:
         predictor = MLPClassifier((32,), alpha=1e-3, max_iter=30, random_state=_SEED)
-    if way.view == "scene":
+    if spec.view == "scene":
         return make_pipeline(DictVectorizer(), MaxAbsScaler(), predictor)
     # An n-gram counts once in a text; one that only a single text has cannot help with others.
     ngrams = CountVectorizer(ngram_range=_NGRAMS, binary=True, min_df=2)

@@ -1,4 +1,4 @@
-"""The goals that a task can have at all: its slots, and the values that each may take."""
+"""The goals that a task can have in any scene: its slots, and the values that each may take."""
 
 from __future__ import annotations
 
@@ -21,18 +21,19 @@ class SlotVocabulary(NamedTuple):
     """What a slot of a goal, such as ``color``, may hold.
 
     Attributes:
-        values: every value, in order.
-        longest: the largest number of values at a time.
-        several: whether the slot holds a sequence of values.
+        values: every value, numbers by size and words by the alphabet.
+        longest: the largest number of values that the slot holds at a time.
+        is_sequence: whether the slot holds a sequence of values, ``("blue", "red")``, and not a
+            single one, ``"red"``.
     """
 
     values: tuple[Value, ...]
     longest: int
-    several: bool
+    is_sequence: bool
 
 
 GoalVocabulary = Mapping[str, SlotVocabulary]
-"""By name of the slot, in the order of the goal's slots."""
+"""The vocabulary of each slot by its name, in the order of the goal's slots."""
 
 
 @functools.cache
@@ -51,26 +52,26 @@ def goal_vocabulary(task: str) -> GoalVocabulary:
 
 
 def _vocabulary(contents: set[SlotValue]) -> SlotVocabulary:
-    """Return what a slot may hold, given all that it was seen to hold.
+    """Return what a slot may hold, given all contents that it has in some goals.
 
     ``("red",)`` and ``("blue", "red")`` -> the values blue and red, at most two at a time.
     """
     values: set[Value] = set()
     longest = 0
-    has_sequence = False
+    is_sequence = False
     for content in contents:
         found = values_in(content)
         values.update(found)
         longest = max(longest, len(found))
         if isinstance(content, tuple):
-            has_sequence = True
+            is_sequence = True
     # A slot holds numbers or words, no mixture; numbers are sorted by their size.
     in_order = sorted(values, key=lambda value: (isinstance(value, str), value))
-    return SlotVocabulary(tuple(in_order), longest, several=has_sequence)
+    return SlotVocabulary(tuple(in_order), longest, is_sequence)
 
 
-def orders(goal: Goal) -> Iterator[Mapping[str, SlotValue]]:
-    """Yield the values of a goal by slot, in every order that means the same goal.
+def wordings_of(goal: Goal) -> Iterator[Mapping[str, SlotValue]]:
+    """Yield the slots of a goal in every order of values in which the goal can be said.
 
     Two red cubes and a blue one -> ``colors`` red, blue with ``counts`` 2, 1, then blue, red with
     1, 2. A goal without counts is yielded once, as the order of its values matters.

@@ -1,4 +1,7 @@
-"""Find the words of a text that name a value of a slot. No grammar, and nothing of the scene."""
+"""Find the words of a text that name a value of a goal slot, such as *red* for the slot ``color``.
+
+It goes by single words and their neighbors, without grammar, and knows nothing of the scene.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ from roboirg.reader.tokens import (
 from roboirg.shortcuts.goal_vocabulary import GoalVocabulary, SlotVocabulary, Value
 
 ORDINAL_TYPES = ("visit", "placement")
-"""Slot types whose values are said as ordinals too."""
+"""Types of slots whose values can be said as ordinals: *the second visit*."""
 
 POINTING = word_set("the that this those these which other each every any no")
 """Before a cardinal they make it a pronoun: *the one there*, *those two*."""
@@ -28,7 +31,7 @@ PRONOUNS = word_set("them these those")
 COMPARISONS = word_set("fewer less more earlier later")
 """One or two words after a number they make it a difference: *one time fewer*."""
 STEPS = word_set("before after")
-"""The same for ordinals: *two visits before that*."""
+"""The same in slots for ordinals: *two visits before that*."""
 EXCLUSIONS = word_set("other another different new not neither nor except unlike")
 """Before a word they say that its value is not the one meant."""
 REFERENCES = word_set("than as half twice double before after following preceding")
@@ -42,12 +45,13 @@ OPPOSITES = word_set("other not no")
 ONE = word_set("one ones")
 """After an ordinal: *the second one* is no number, and no element of a series."""
 _AFTER_RANK = ONE | {"of"}
+"""After an ordinal they say that it is no value: *the second one*, *the second of them*."""
 _RANKED = word_set("of color place one")
 """After *the* and an ordinal they say that it is the rank of something introduced."""
 _REACH = 5
-"""Words before a value that may exclude it: *not the one right before*."""
+"""How many words before a value one of `EXCLUSIONS` may stand: *not the one right before*."""
 _NUMBER_REACH = 3
-"""Words before a number that may say that it is counted from: *two more than three*."""
+"""How many words before a number one of `REFERENCES` may stand: *two more than three*."""
 
 
 class NamedValue(NamedTuple):
@@ -55,11 +59,12 @@ class NamedValue(NamedTuple):
 
     Attributes:
         value: the value; a number need not be in the slot's vocabulary.
-        stated: whether the last sentence states it plainly, so that nothing is left to a rule.
+        is_stated: whether the last sentence states it plainly, *take the red one*, so that nothing
+            is left to guess.
     """
 
     value: Value
-    stated: bool
+    is_stated: bool
 
 
 def named_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[NamedValue, ...]:
@@ -67,6 +72,11 @@ def named_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[Name
 
     *There is a red cube. Take the blue one.* -> red, not stated, and blue, stated. The last
     sentence is taken for the command; only the command can state a value.
+
+    Args:
+        text: of the instruction.
+        slot: name of the goal slot, such as ``color``.
+        vocabulary: the values that the slot may hold.
     """
     sentences = _sentences(text)
     found: list[NamedValue] = []
@@ -79,9 +89,12 @@ def named_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[Name
 
 
 def stated_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[Value, ...]:
-    """Return the values of a slot that a command states plainly, in order."""
+    """Return the values of a goal slot that the last sentence states plainly, in order.
+
+    *There is a red cube. Take the blue one.* -> blue.
+    """
     named = named_values(text, slot, vocabulary)
-    return tuple(mention.value for mention in named if mention.stated)
+    return tuple(mention.value for mention in named if mention.is_stated)
 
 
 def marked_text(text: str, slot: str, vocabulary: SlotVocabulary) -> str:
@@ -96,7 +109,7 @@ def marked_text(text: str, slot: str, vocabulary: SlotVocabulary) -> str:
         words = list(sentence)
         for mention in _mentions(sentence, slot, vocabulary):
             rank = ranks.setdefault(mention.value, len(ranks))
-            words[mention.place] = f"rank{rank}"
+            words[mention.word_index] = f"rank{rank}"
         marked_words += words
     return " ".join(marked_words)
 
@@ -108,7 +121,7 @@ def _sentences(text: str) -> tuple[Sentence, ...]:
 
 
 def command_words(text: str) -> Sentence:
-    """Return the words of the last sentence."""
+    """Return the words of the last sentence, ``("take", "the", "cube")``; empty without one."""
     sentences = _sentences(text)
     return sentences[-1] if sentences else ()
 
@@ -116,8 +129,8 @@ def command_words(text: str) -> Sentence:
 def pointed_index(text: str) -> int | None:
     """Return at which of two named values the sentences before the command point.
 
-    0 is the first, 1 the second, None neither: *I mean the latter.* -> 1, *It is not the second
-    one.* -> 0.
+    *I mean the latter.* -> 1, the second; *It is not the second one.* -> 0, the first; None if they
+    point at neither.
 
     The last such word decides. *Other*, *not* or *no* anywhere in its sentence reverse it; that is
     a heuristic, which misreads *not the former but the latter*.
@@ -143,19 +156,20 @@ def _has_pointer(words: Sentence) -> bool:
 
 
 def thing_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
-    """Return how many things a command seems to ask for: the largest of several counts.
+    """Return how many things a command seems to ask for, by its surface: at least 1.
 
-    It counts words such as *the second one*, stated values, and nouns: *Take the red cube and the
-    blue cube* -> 2. A goal's largest number of values is the limit.
+    That is the largest of several counts: of words such as *the second one*, of stated values, and
+    of nouns. *Take the red cube and the blue cube* -> 2. A goal's largest number of values is the
+    limit.
 
     Args:
         text: an instruction, whose last sentence is the command.
-        thing: noun for what the task handles, in the singular.
+        thing: noun for what the task handles, in the singular: ``cube``.
         vocabulary: of the task's goals.
     """
     counts = [1, len(command_ranks(text))]
     for slot, slot_vocabulary in vocabulary.items():
-        if slot_vocabulary.several:
+        if slot_vocabulary.is_sequence:
             counts.append(len(stated_values(text, slot, slot_vocabulary)))
     nouns = (thing, f"{thing}s", f"{thing}es")
     counts.append(sum(word in nouns for word in command_words(text)))
@@ -165,79 +179,80 @@ def thing_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
 
 
 def command_ranks(text: str) -> tuple[int, ...]:
-    """Return which of the things that were named before a command asks for, from 0.
+    """Return which of the things that were named before a command asks for, as indices from 0.
 
     *Take the former* -> 0; *take the second one and the third one* -> 1 and 2; *take the red one*
     -> none.
     """
     words = command_words(text)
-    found: list[int] = []
-    for place, word in enumerate(words):
-        rank = ordinal_of(word)
+    ranks: list[int] = []
+    for index, word in enumerate(words):
+        ordinal = ordinal_of(word)
         if word in ("former", "latter"):
-            found.append(POINTERS[word])
-        elif rank is not None and _is_place_in_list(words, place):
-            found.append(rank - 1)
-    return tuple(found)
+            ranks.append(POINTERS[word])
+        elif ordinal is not None and _is_rank_in_list(words, index):
+            ranks.append(ordinal - 1)
+    return tuple(ranks)
 
 
-def _is_place_in_list(words: Sentence, place: int) -> bool:
-    """Return whether an ordinal counts things that were named before: *the second one*.
+def _is_rank_in_list(words: Sentence, index: int) -> bool:
+    """Return whether the ordinal at an index counts things that were named: *the second one*.
 
-    `place` is the index of the ordinal. *The second visit* does not count, as it names a value.
+    That of *the second visit* does not, as it is a value by itself.
     """
-    following = words[place + 1 : place + 2]
-    return _word_before(words, place) == "the" and not _RANKED.isdisjoint(following)
+    following = words[index + 1 : index + 2]
+    return _word_before(words, index) == "the" and not _RANKED.isdisjoint(following)
 
 
-def _word_before(words: Sentence, place: int) -> str:
-    """Return the word before a place; empty at the beginning."""
-    return words[place - 1] if place > 0 else ""
+def _word_before(words: Sentence, index: int) -> str:
+    """Return the word before an index; empty at the beginning."""
+    return words[index - 1] if index > 0 else ""
 
 
 class _Mention(NamedTuple):
-    """The position of a word that names a value, and the value."""
+    """A word that names a value: its index in the sentence, and the value."""
 
-    place: int
+    word_index: int
     value: Value
 
 
 def _mentions(words: Sentence, slot: str, vocabulary: SlotVocabulary) -> Iterator[_Mention]:
-    """Yield where a sentence names values of a goal slot, in order.
+    """Yield the words of a sentence that name values of a goal slot, in order.
 
-    All values of a slot have one type, so the first loop finds numbers, the second other words.
+    *take the red one , not the blue one* -> 2 (red) and 6 (blue) for the slot ``color``.
     """
+    # All values of a slot have one type.
     if all(isinstance(value, int) for value in vocabulary.values):
         yield from _number_mentions(words, slot)
         return
-    for place, word in enumerate(words):
+    for index, word in enumerate(words):
         value = color_of(word) or word
-        around = words[max(0, place - 1) : place + 2]
+        neighbors = words[max(0, index - 1) : index + 2]
         # "Before or after" leaves open which of the two it is.
-        if value in vocabulary.values and "or" not in around:
-            yield _Mention(place, value)
+        if value in vocabulary.values and "or" not in neighbors:
+            yield _Mention(index, value)
 
 
 def _number_mentions(words: Sentence, slot: str) -> Iterator[_Mention]:
-    """Yield where a sentence names a number that could be the value of a goal slot.
+    """Yield the words of a sentence that name a number that could be the value of a goal slot.
 
     *Three times* -> 3, *twice* -> 2; *two more times* -> none, as it is a difference. In slots for
     visits and placements ordinals count, too: *the second visit* -> 2, *the second one* -> none.
     """
     has_ordinals = SLOT_TYPE_NAMES.get(slot) in ORDINAL_TYPES
-    for place, word in enumerate(words):
-        following = words[place + 1 : place + 2]
+    for index, word in enumerate(words):
+        following = words[index + 1 : index + 2]
         number: int | None = None
         if word in ADVERBS:
             if not _is_factor(following):
                 number = ADVERBS[word]
         elif number_of(word) is not None:
-            if _counts_things(words, place, slot):
+            if _counts_things(words, index, slot):
                 number = number_of(word)
         elif has_ordinals and _AFTER_RANK.isdisjoint(following):
             number = ordinal_of(word)
         if number is not None:
-            yield _Mention(place, number)
+            yield _Mention(index, number)
 
 
 def _is_factor(following: Sequence[str]) -> bool:
@@ -245,14 +260,19 @@ def _is_factor(following: Sequence[str]) -> bool:
     return any(word in ("as", "that", "the") or number_of(word) is not None for word in following)
 
 
-def _counts_things(words: Sentence, place: int, slot: str) -> bool:
-    """Return whether the cardinal at an index says how many: *three cubes*, *these three times*.
+def _counts_things(words: Sentence, index: int, slot: str) -> bool:
+    """Return whether the cardinal number at an index says how many.
 
-    Pronouns, *the one there* and *those two*, and differences, *one time fewer*, do not. In the
-    slot ``counts`` *one of them* is one cube; elsewhere it points at a thing.
+    | words | result |
+    | --- | --- |
+    | *three cubes*, *these three times* | yes |
+    | *those two*, *the one there* | no: a pronoun |
+    | *one time fewer*; for ordinals *two visits before* | no: a difference |
+    | *the second three* | no: what it counts is a rank |
+    | *one of them* | only in the slot ``counts``, where it is one cube |
     """
-    before = _word_before(words, place)
-    following = words[place + 1 : place + 3]
+    before = _word_before(words, index)
+    following = words[index + 1 : index + 3]
     is_of_times = following[:1] == ("times",)  # "we tried this three times"
     if ordinal_of(before) is not None or (before in POINTING and not is_of_times):
         return False
@@ -269,7 +289,7 @@ def _is_stated_plainly(words: Sentence, mention: _Mention) -> bool:
 
     *Not the red one* excludes red; *two more than three* counts from three.
     """
-    before = words[: mention.place]
+    before = words[: mention.word_index]
     if isinstance(mention.value, str):
         return EXCLUSIONS.isdisjoint(before[-_REACH:])
     if "each" in before:  # "half as many of each as two red and four blue"

@@ -1,7 +1,7 @@
-"""What a viewer of the first picture and of the video can know of a scene, as features.
+"""Features of a scene, for models that see the scene but not the words.
 
-Nothing of the goal, and nothing that cannot be seen: no names, no order in which objects were
-placed, and no movement that begins later than the policy's turn but for its kind.
+They hold what a viewer of the first picture and of the video can know: nothing of the goal, no
+names, no order in which objects were placed, and of later movements only the kind.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Shuttle, Swap
 
 SceneFacts = Mapping[str, float]
-"""Numbers by name, and 1 for each fact that holds."""
+"""Features by name: a number, or 1 for a fact that holds. Facts that do not hold are left out."""
 
 
 def scene_facts(scene: Scene) -> SceneFacts:
     """Return what can be seen in a scene and its video, as features for a model.
 
-    For example ``{"red cube × 1": 1.0, "x of red cube": 0.12, "acts × 2": 1.0}``; positions are
-    in meters in the world frame.
+    For example ``{"red cube × 1": 1.0, "x of red cube": 0.12, "acts × 2": 1.0}``: there is one red
+    cube, its x is 0.12 (meters, world frame), and the video shows two acts of the robot.
     """
     return {
         **dict(_object_features(scene)),
@@ -51,7 +51,7 @@ def _object_features(scene: Scene) -> Iterator[tuple[str, float]]:
 
 
 def _nearest(item: SceneObject, others: Iterable[SceneObject]) -> SceneObject | None:
-    """Return the other object with a color that is nearest on the table; None if there is none."""
+    """Return the nearest other object that has a color, by distance on the table; None if none."""
     colored = [other for other in others if other.color and other is not item]
 
     def distance(other: SceneObject) -> float:
@@ -61,9 +61,11 @@ def _nearest(item: SceneObject, others: Iterable[SceneObject]) -> SceneObject | 
 
 
 def _motion_features(scene: Scene) -> Iterator[tuple[str, float]]:
-    """Yield features of what moves by itself: ``("Swap × 2", 1.0)``, ``("interval 30", 1.0)``, ….
+    """Yield features of what moves by itself.
 
-    Intervals between the ends of a way are in control steps.
+    Two swaps give ``("Swap × 2", 1.0)`` and ``("swapped: container over red", 1.0)`` for each
+    object that takes part; a cube that moves back and forth gives ``("interval 30", 1.0)``, the
+    control steps from one end to the other.
     """
     kinds = Counter(type(motion).__name__ for motion in scene.motions)
     for kind, count in kinds.items():
@@ -92,14 +94,15 @@ def _video_features(scene: Scene) -> Iterator[tuple[str, float]]:
 
 
 def _act_name(scene: Scene, fact: Fact) -> str:
-    """Return an act as it can be seen: ``placed red cube target``."""
+    """Return an act of the robot as it can be seen: ``placed red cube target``."""
     return f"{fact.kind} {_appearance_of(scene, fact.subject)} {_appearance_of(scene, fact.place)}"
 
 
 def _appearance_of(scene: Scene, name: str | None) -> str:
-    """Return how the object of this name looks, with the color of the cube that it covers.
+    """Return how the object with a name looks, with the color of a cube that it covers.
 
-    For example ``red cube`` or ``container over red``; empty if there is no such object.
+    ``"cube_1"`` -> ``red cube``, ``"container_1"`` -> ``container over red``. Empty if the scene
+    has no object with that name, or if the name is None.
     """
     if name is None or all(item.name != name for item in scene.objects):
         return ""

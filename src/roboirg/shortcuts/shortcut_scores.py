@@ -1,4 +1,8 @@
-"""Score shortcuts on the instructions of a split: shares of hidden slots and of goals."""
+"""Score shortcuts on instructions: how often a slot, and the whole goal, is guessed right.
+
+Only the slots that the command (the last utterance) leaves out are scored, as the others need no
+understanding of the context.
+"""
 
 from __future__ import annotations
 
@@ -18,14 +22,16 @@ from roboirg.shortcuts.surface_rules import SURFACE_RULES
 from roboirg.shortcuts.text_guess import TextGuess, goal_share, guess_goal, slot_share
 
 CHANCE = "chance"
+"""Name of the blind guess, among those of the rules."""
 
 
 class ShortcutScore(NamedTuple):
     """The score of one shortcut on one instruction.
 
     Attributes:
-        slots: for each slot that counts the expected share of its values that are right, 0 to 1.
-        goal: the probability that the whole goal is right.
+        slots: for each slot that is scored, the expected share of its values that are right, 0 to
+            1.
+        goal: the probability that the whole goal is right, 0 to 1.
     """
 
     slots: Mapping[str, Fraction]
@@ -33,16 +39,20 @@ class ShortcutScore(NamedTuple):
 
 
 def hidden_slots(instructed: InstructedEpisode) -> tuple[str, ...]:
-    """Return the goal slots whose values the command does not name, in the order of the goal."""
+    """Return the goal slots whose values the command does not name, in the order of the goal.
+
+    *The red one is Bob's. Lift it twice.* -> ``("color",)``.
+    """
     episode, instruction = instructed
     hidden = hidden_in(instruction, episode.goal)
     return _in_order(hidden, episode.goal)
 
 
 def counted_slots(instructed: InstructedEpisode) -> tuple[str, ...]:
-    """Return the goal slots by which an instruction is scored.
+    """Return the goal slots by which an instruction is scored, in the order of the goal.
 
-    They are those that its metadata list as ``touched``, or else all that its command leaves out.
+    They are those whose values have to be seen in the scene, which the metadata of the instruction
+    list as ``touched``; without any, all that the command leaves out.
     """
     episode, instruction = instructed
     touched = cast("list[str]", instruction.metadata.get("touched", []))
@@ -50,12 +60,12 @@ def counted_slots(instructed: InstructedEpisode) -> tuple[str, ...]:
 
 
 def _in_order(slots: Collection[str], goal: Goal) -> tuple[str, ...]:
-    """Return some slots in the order of a goal."""
+    """Return some slots in the order in which a goal has them."""
     return tuple(slot for slot, _ in goal.slots if slot in slots)
 
 
-def counted_places(instructed: InstructedEpisode) -> Mapping[str, Sequence[int]]:
-    """Return which values of each goal slot are scored, by their index in the slot.
+def counted_positions(instructed: InstructedEpisode) -> Mapping[str, Sequence[int]]:
+    """Return which values of each scored slot are scored, by their index in the slot.
 
     All are, unless the text names some of them: of *the container next to the button, and the one
     over the red cube* only the first color has to be found in the scene -> ``{"colors": [0]}``.
@@ -64,21 +74,22 @@ def counted_places(instructed: InstructedEpisode) -> Mapping[str, Sequence[int]]
     goal = episode.goal.as_mapping()
     counted: dict[str, Sequence[int]] = {}
     for slot in counted_slots(instructed):
-        places = range(len(values_in(goal[slot])))
-        counted[slot] = places
+        positions = range(len(values_in(goal[slot])))
+        counted[slot] = positions
         # Amounts may be said in another order than the goal has, so their indices do not match.
-        if len(places) > 1 and "counts" not in goal:
+        if len(positions) > 1 and "counts" not in goal:
             meaning = instruction.meaning
-            described = [place for place in places if _is_described(meaning, f"{slot}.{place}")]
-            counted[slot] = described or places
+            described = [index for index in positions if _is_described(meaning, f"{slot}.{index}")]
+            counted[slot] = described or positions
     return counted
 
 
 def _is_described(meaning: Meaning | None, field: str) -> bool:
     """Return whether the words describe a thing by its place or history instead of its value.
 
-    `field` names the value in the meaning: ``"colors.1"`` is the second color. None, an instruction
-    without a known meaning, describes nothing.
+    *the container next to the button* is described, *the red one* is not. `field` names the value
+    in the meaning: ``"colors.1"`` is the second color. An instruction without a known meaning
+    (None) describes nothing.
     """
     term = meaning.terms.get(field) if meaning else None
     return term is not None and isinstance(picked_operand(term), Described)
@@ -88,7 +99,7 @@ def score_chance(instructed: InstructedEpisode) -> ShortcutScore:
     """Return the expected score of a blind guess among the goals that command and scene allow.
 
     With three colors and nothing known, it gets a third of the slot right, and a third of the
-    goals. Values that are not scored are known to the guesser; see `counted_places`.
+    goals. Values that are not scored are known to the guesser; see `counted_positions`.
     """
     episode, instruction = instructed
     goals = blind_goals(instruction, episode)
@@ -96,41 +107,41 @@ def score_chance(instructed: InstructedEpisode) -> ShortcutScore:
     if share is None:
         raise InvalidValueError(f"{episode.key}: no meaning is known of {instruction.text!r}.")
     slots: dict[str, Fraction] = {}
-    for slot, places in counted_places(instructed).items():
+    for slot, positions in counted_positions(instructed).items():
         meant = values_in(episode.goal[slot])
-        slots[slot] = _slot_chance([values_in(goal[slot]) for goal in goals], meant, places)
+        slots[slot] = _slot_chance([values_in(goal[slot]) for goal in goals], meant, positions)
     return ShortcutScore(slots, share)
 
 
 def _slot_chance(
-    guesses: Sequence[Sequence[Value]], meant: Sequence[Value], places: Sequence[int]
+    guesses: Sequence[Sequence[Value]], meant: Sequence[Value], positions: Sequence[int]
 ) -> Fraction:
     """Return the expected share of right values if one of some guesses of a slot is drawn.
 
-    Guesses red-blue, red-green and blue-red where red-blue is meant and place 1 is scored: place 0
-    is known, so only the first two are possible, and one of them is right -> 1/2.
+    Guesses red-blue, red-green and blue-red where red-blue is meant and position 1 is scored:
+    position 0 is known, so only the first two are possible, and one of them is right -> 1/2.
 
     Args:
-        guesses: values of the slot, all equally likely.
+        guesses: values of the slot, all equally likely; the right one is among them.
         meant: the right values.
-        places: indices of the values that are scored; the guesser knows all others.
+        positions: indices of the values that are scored; the guesser knows all others.
     """
-    known_places = set(range(len(meant))).difference(places)
-    numbers_right: list[int] = []
+    known = set(range(len(meant))).difference(positions)
+    numbers_right: list[int] = []  # of scored values, for each possible guess
     for guess in guesses:
         pairs = zip(guess, meant, strict=False)
-        right_places = {place for place, (value, wanted) in enumerate(pairs) if value == wanted}
-        if known_places <= right_places:
-            numbers_right.append(len(right_places) - len(known_places))
-    return Fraction(sum(numbers_right), len(numbers_right) * len(places))
+        right = {index for index, (value, wanted) in enumerate(pairs) if value == wanted}
+        if known <= right:
+            numbers_right.append(len(right) - len(known))
+    return Fraction(sum(numbers_right), len(numbers_right) * len(positions))
 
 
 def score_guess(guess: TextGuess, instructed: InstructedEpisode) -> ShortcutScore:
     """Return the shares of a guess that are right: of each slot that is scored, and of the goal."""
     episode, _ = instructed
     slots: dict[str, Fraction] = {}
-    for slot, places in counted_places(instructed).items():
-        slots[slot] = slot_share(guess, slot, episode.goal[slot], places)
+    for slot, positions in counted_positions(instructed).items():
+        slots[slot] = slot_share(guess, slot, episode.goal[slot], positions)
     return ShortcutScore(slots, goal_share(guess, episode))
 
 

@@ -1,4 +1,8 @@
-"""The table of ``roboirg language shortcuts``: how much of each setting shortcuts solve."""
+"""The table of ``roboirg language shortcuts``: how much of each setting shortcuts solve.
+
+A shortcut guesses goals without understanding: by chance, by a surface rule, or as a learned floor
+(`goal_learner`). The table has a column for each.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +37,9 @@ from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 TRAINING_SPLIT: Split = "train"
+"""The models of the learned floors are fitted on it."""
 JUDGING_SPLIT: Split = "val"
+"""The best models are chosen on it."""
 LEARNING_SCENES = 500
 """Random scenes of a task to learn from, beyond the train split."""
 FIRST_LEARNED = 500_000
@@ -41,7 +47,7 @@ FIRST_LEARNED = 500_000
 FIRST_JUDGED = 700_000
 """The same for those on which the best learner is chosen."""
 _MADE_UP_TEXTS = 2
-"""Texts, one right and one wrong, with which a standard error stays above 0."""
+"""Texts that are added, one right and one wrong, so that no standard error is 0."""
 MARGIN = 0.05
 """By how much a floor may exceed chance before its setting counts as solved by it."""
 
@@ -50,17 +56,17 @@ GROUPINGS: tuple[Grouping, ...] = get_args(Grouping)
 Group = tuple[str, ...]
 """A setting, and within it a reasoning pattern, task or slot if the table has a row for each."""
 Scored = tuple[InstructedEpisode, Mapping[str, ShortcutScore]]
-"""An instruction, and its score by shortcut."""
+"""An instruction with its episode, and its score by shortcut, such as ``chance``."""
 GroupsOf = Callable[[InstructedEpisode], Iterable[tuple[Group, Sequence[str]]]]
-"""Returns the rows in which an instruction counts, and those of its slots that count there."""
+"""Returns the rows in which an instruction counts, and for each its goal slots that count there."""
 
 
 class ShortcutShares(NamedTuple):
-    """Mean scores over instructions.
+    """How often a shortcut is right, as means over instructions, 0 to 1.
 
     Attributes:
-        slots: over all slots that count; None if there is none.
-        goals: over all instructions.
+        slots: the share of scored slots that it guesses right; None if none is scored.
+        goals: the share of instructions whose whole goal it guesses right.
     """
 
     slots: float | None
@@ -68,7 +74,7 @@ class ShortcutShares(NamedTuple):
 
 
 class Excess(NamedTuple):
-    """By how much the learner of the words exceeds the larger of chance and the majority.
+    """By how much the floor ``text-only`` exceeds the larger of chance and ``majority``.
 
     Attributes:
         value: difference of the shares of slots, -1 to 1.
@@ -92,10 +98,10 @@ class ShortcutRow:
     """One row of the table.
 
     Attributes:
-        group: what the row is about.
+        group: what the row is about, ``("direct", "PickXtimes")``.
         count: number of instructions.
         shares: by shortcut, in the order of the columns.
-        excess: None without learned floors, or slots that count.
+        excess: of the learner of the words; None without learned floors, or scored slots.
     """
 
     group: Group
@@ -106,59 +112,68 @@ class ShortcutRow:
 
 @dataclass(slots=True)
 class _Tally:
-    """Scores of the instructions of a row: by shortcut the sums over slots, and of goals."""
+    """Scores of the instructions of a row, which become their means.
 
-    sizes: list[int] = field(default_factory=list)
-    slots: dict[str, list[float]] = field(default_factory=dict)
-    goals: dict[str, list[float]] = field(default_factory=dict)
+    All lists have an entry for each instruction, in the same order.
+
+    Attributes:
+        slot_counts: how many slots of the instruction count in the row.
+        slots_right: by shortcut, how many of these it guesses right.
+        goals_right: by shortcut, the probability that the whole goal is right.
+    """
+
+    slot_counts: list[int] = field(default_factory=list)
+    slots_right: dict[str, list[float]] = field(default_factory=dict)
+    goals_right: dict[str, list[float]] = field(default_factory=dict)
 
     def add(self, scores: Mapping[str, ShortcutScore], slots: Sequence[str]) -> None:
         """Add the scores of one instruction.
 
         Args:
-            scores: by shortcut.
+            scores: by shortcut, the same ones for every instruction.
             slots: the goal slots of the instruction that count in this row.
         """
-        self.sizes.append(len(slots))
+        self.slot_counts.append(len(slots))
         for name, score in scores.items():
             right = sum(score.slots[slot] for slot in slots)
-            self.slots.setdefault(name, []).append(float(right))
-            self.goals.setdefault(name, []).append(float(score.goal))
+            self.slots_right.setdefault(name, []).append(float(right))
+            self.goals_right.setdefault(name, []).append(float(score.goal))
 
     def row(self, group: Group) -> ShortcutRow:
         """Return a row of the table with the mean scores of all instructions that were added."""
-        slot_count = sum(self.sizes)
-        text_count = len(self.sizes)
+        slot_count = sum(self.slot_counts)
+        text_count = len(self.slot_counts)
         shares: dict[str, ShortcutShares] = {}
-        for name, right in self.slots.items():
+        for name, right in self.slots_right.items():
             slots = _share(right, slot_count) if slot_count else None
-            goals = _share(self.goals[name], text_count)
+            goals = _share(self.goals_right[name], text_count)
             shares[name] = ShortcutShares(slots, goals)
         return ShortcutRow(group, text_count, shares, self._excess())
 
     def _excess(self) -> Excess | None:
         """Return by how much a learner of the words exceeds the better of chance and majority.
 
-        None if no slot counts or there are no learners. The value is a ratio of sums over
-        instructions, slots more right by slots, so its standard error is that of a ratio estimator:
-        from the residual of each instruction.
+        None if no slot counts or there are no learners. The value is a ratio of two sums over
+        instructions: of the slots that the learner has more right, and of all slots. Its standard
+        error is that of a ratio estimator: the root of the sum of squared residuals, by the number
+        of slots.
         """
-        slot_count = sum(self.sizes)
-        if not slot_count or "text-only" not in self.slots:
+        slot_count = sum(self.slot_counts)
+        if not slot_count or "text-only" not in self.slots_right:
             return None
-        chance = self.slots[CHANCE]
-        majority = self.slots["majority"]
+        chance = self.slots_right[CHANCE]
+        majority = self.slots_right["majority"]
         baseline = chance if sum(chance) >= sum(majority) else majority
-        more_right = np.subtract(self.slots["text-only"], baseline)
+        more_right = np.subtract(self.slots_right["text-only"], baseline)
         value = float(more_right.sum()) / slot_count
-        residuals = more_right - value * np.array(self.sizes)
+        residuals = more_right - value * np.array(self.slot_counts)
         # Made-up texts keep the error above 0 where all instructions agree.
         squares = (residuals**2).sum() + _MADE_UP_TEXTS
         return Excess(value, float(np.sqrt(squares)) / (slot_count + _MADE_UP_TEXTS))
 
 
 def _share(right: Sequence[float], count: int) -> float:
-    """Return the share of `count` things that is right.
+    """Return the share of `count` slots or goals that is right: of (1, 0.5) and 2, it is 0.75.
 
     It is rounded to 12 digits, as the error of a sum of floats could change a later rounding.
     """
@@ -175,17 +190,15 @@ def shortcut_rows(
     by: Grouping | None = None,
     learning: int | None = None,
 ) -> list[ShortcutRow]:
-    """Return the table's rows: the mean scores of all shortcuts by setting.
-
-    A shortcut is a rule or a learner that guesses goals without understanding.
+    """Return the table's rows, sorted by setting: the mean scores of all shortcuts.
 
     Args:
-        tasks: names.
-        splits: names.
-        settings: names.
-        options: all others, and the form.
+        tasks: names of the tasks.
+        splits: names of the splits with the episodes.
+        settings: names of the settings; those that a task does not have are left out.
+        options: of the instructions, but for the setting.
         seeds: number of random scenes for each task, beyond the splits.
-        by: what to break each setting down by.
+        by: what to break each setting down by, with a row for each; None for a row a setting.
         learning: number of random scenes of each task from which, and from the train split, the
             learned floors learn; None for no learned floors.
     """
@@ -197,7 +210,10 @@ def shortcut_rows(
 def tabulate(scored: Iterable[Scored], groups_of: GroupsOf) -> list[ShortcutRow]:
     """Return a row of mean scores for each group of instructions, in order of first occurrence.
 
-    `groups_of` returns the rows in which an instruction counts, each with its slots to count there.
+    Args:
+        scored: the instructions with their scores.
+        groups_of: returns the rows in which an instruction counts, and for each the slots of its
+            goal that count there: ``[(("direct",), ["color"])]``.
     """
     tallies: dict[Group, _Tally] = {}
     for instructed, scores in scored:
@@ -209,10 +225,11 @@ def tabulate(scored: Iterable[Scored], groups_of: GroupsOf) -> list[ShortcutRow]
 def _groups_of(
     instructed: InstructedEpisode, by: Grouping | None
 ) -> Iterator[tuple[Group, Sequence[str]]]:
-    """Yield the rows in which an instruction counts, and those of its slots that count there.
+    """Yield the rows in which an instruction counts, and for each its slots that count there.
 
-    One row, by its setting: ``("direct",)``; with ``task`` ``("direct", "PickXtimes")``. By
-    ``slot`` there is a row for each slot that counts.
+    Without `by` it is one row, that of its setting: ``(("direct",), ("color", "repeats"))``. By
+    ``task`` it is the row ``("direct", "PickXtimes")``. By ``slot`` there is a row for each slot
+    that counts.
     """
     episode, instruction = instructed
     setting = instruction.setting
@@ -237,9 +254,10 @@ def score_texts(
     seeds: int = 0,
     learning: int | None = None,
 ) -> Iterator[Scored]:
-    """Yield every instruction with its score by shortcut, task by task.
+    """Yield every instruction with its score by shortcut, task by task and setting by setting.
 
     Settings that a task does not have are left out. The arguments are those of `shortcut_rows`.
+    With `learning`, floors are learned anew for each task and setting, which takes minutes.
     """
     check_whole("seeds", seeds, least=0)
     for task in tasks:
@@ -256,7 +274,7 @@ def score_texts(
 
 
 def _episodes(task: str, splits: Sequence[Split], random_scenes: range) -> list[Episode]:
-    """Return the episodes of a task in some splits, then some of its random ones."""
+    """Return the episodes of a task in some splits, then its random ones of these numbers."""
     episodes = list(split_episodes((task,), splits))
     episodes += [get_episode(task, "random", number) for number in random_scenes]
     return episodes
@@ -270,10 +288,10 @@ def _instructed(
 
 
 def learn_goals(task: str, options: InstructionOptions, scenes: int) -> GoalLearner:
-    """Return baselines of a task that have learned to guess goals, in the setting of `options`.
+    """Return the learned floors of a task, in the setting of `options`.
 
-    They are fitted on the train split and random scenes, in the words of train. The best models are
-    chosen on the val split and a quarter as many random scenes, in the words of test.
+    Their models are fitted on the train split and random scenes, in the words of train. The best
+    models are chosen on the val split and a quarter as many random scenes, in the words of test.
 
     Args:
         task: name of the task.
@@ -298,11 +316,11 @@ def _add_learned(
     options: InstructionOptions,
     scenes: int,
 ) -> None:
-    """Add to each instruction's scores those of the learned baselines.
+    """Learn the floors of a task and setting, and add their scores to those of each instruction.
 
     Args:
         scores: by shortcut, for each instruction; changed in place.
-        texts: the instructions, all of one task and setting.
+        texts: the instructions in the same order, all of one task and setting.
         options: of the instructions.
         scenes: number of random scenes to learn from.
     """

@@ -1,7 +1,8 @@
 """Surface rules: pick the values of a goal by the words of an instruction, without understanding.
 
-A rule sees the text and the vocabulary of the task: no scene, no goal, no metadata. Every rule
-takes what the command states plainly, and decides about the slots that the command leaves open.
+A rule sees the text and the vocabulary of the task: no scene, no goal, no metadata. It decides
+about the slots of the goal that the command (the last sentence) leaves open; `text_guess` reads the
+others from the command.
 """
 
 from __future__ import annotations
@@ -15,22 +16,27 @@ from roboirg.shortcuts.goal_vocabulary import SlotVocabulary, Value
 from roboirg.shortcuts.named_values import EXCLUSIONS, ORDINAL_TYPES
 
 Candidates = tuple[Value, ...]
-"""Values for one place of a slot, among which a rule chooses with equal probability."""
+"""Equally likely values for one position of a slot. ``("red",)`` is certain."""
 
 MORE = frozenset({"more", "later", "after", "following"})
+"""Words that say that a number is larger than one named before: *one time more*."""
 FEWER = frozenset({"fewer", "less", "earlier", "before", "preceding"})
+"""Words that say that it is smaller."""
 ONLY_ORDINAL = frozenset({"before", "after", "following", "preceding"})
-"""Next to other numbers these words are about time."""
+"""Of these, the ones that do so in slots for ordinals only; elsewhere they are about time."""
 REST = frozenset({"other", "others", "left", "remaining"})
 """Words for what remains when one of two is taken."""
 PAIR = 2
 _NUMBER_REACH = 2
-"""A difference may have a number among so many words before it: *two visits before*."""
+"""The size of a difference is looked for in so many words before it: *two visits before*."""
 
 
 @dataclass(frozen=True)
 class SlotWords:
-    """What a rule sees of one slot that the command leaves open.
+    """What a rule sees of one goal slot that the command leaves open.
+
+    For *Red and blue. I mean the latter. Take it.*, the slot ``color`` has the named values red and
+    blue, and the pointed index 1.
 
     Attributes:
         slot: its name.
@@ -40,7 +46,7 @@ class SlotWords:
         value_count: the number of values to find.
         pointed_index: at which of two named values the words before the command point, 0 or 1;
             None if at neither.
-        ranks: indices of named values at which the command points: 0 for *the former*.
+        ranks: indices of named values at which the command itself points: 0 for *the former*.
     """
 
     slot: str
@@ -68,40 +74,42 @@ class SlotWords:
 
     @property
     def is_ordinal(self) -> bool:
-        """Whether the slot holds an ordinal."""
+        """Whether the slot holds an ordinal, such as the number of a visit."""
         return SLOT_TYPE_NAMES.get(self.slot) in ORDINAL_TYPES
 
 
 def certain(values: Iterable[Value]) -> list[Candidates]:
-    """Return candidates for places whose values are certain: each value is alone at its place."""
+    """Return candidates of certain values, one for each position: red, blue -> (red,), (blue,)."""
     return [(value,) for value in values]
 
 
 SurfaceRule = Callable[[SlotWords], list[Candidates]]
-"""Returns candidates for the places of a slot, the first ones first.
+"""Returns candidates for each position of a slot, in order; a slot with one value has one position.
 
-Where they are none, or missing, every value of the vocabulary is as likely.
+Where they are empty, or fewer than there are positions, every value of the vocabulary is as likely.
 """
 
 
 def take_first(words: SlotWords) -> list[Candidates]:
-    """Take the values that are named first."""
+    """Take the values that are named first: *Red, blue and green.* -> red."""
     return certain(words.named[: words.value_count])
 
 
 def take_last(words: SlotWords) -> list[Candidates]:
-    """Take the values that are named last."""
+    """Take the values that are named last: *Red, blue and green.* -> green."""
     return certain(words.named[-words.value_count :])
 
 
 def take_unnamed(words: SlotWords) -> list[Candidates]:
-    """Take a value that is not named; each is as likely."""
+    """Take a value that is not named; each is as likely: *Not red.* -> blue or green."""
     unnamed = tuple(value for value in words.vocabulary.values if value not in words.named)
     return [unnamed] * max(1, min(words.value_count, len(unnamed)))
 
 
 def take_by_cues(words: SlotWords) -> list[Candidates]:
-    """Return the values that key words of the text suggest; the first row that fits decides.
+    """Return the values that key words of the text suggest.
+
+    Of this table, the first row that fits decides:
 
     | the words | the values |
     | --- | --- |
@@ -113,6 +121,7 @@ def take_by_cues(words: SlotWords) -> list[Candidates]:
     | *other*, *different*, *not* | one that is not named, then one named but not last |
     | otherwise | the first one |
     """
+    # Rows 1 to 3 are `_pointed_values`, 4 and 5 `_changed_number`.
     pointed = _pointed_values(words)
     if pointed:
         return pointed[: words.value_count]
@@ -152,7 +161,8 @@ def _pointed_values(words: SlotWords) -> list[Candidates]:
 def _changed_number(words: SlotWords) -> list[Candidates]:
     """Return the numbers that are named first, changed as the command says.
 
-    *Bob pressed it three times. Press it twice as often.* -> 6.
+    *Bob pressed it three times. Press it twice as often.* -> 6. A command that changes nothing
+    leaves them as they are.
     """
     change = _change(words)
     if change is None:
@@ -163,7 +173,8 @@ def _changed_number(words: SlotWords) -> list[Candidates]:
 def _change(words: SlotWords) -> Callable[[int], int] | None:
     """Return a function from the number that was named to the one that the command asks for.
 
-    *Twice as often* doubles it; *two times fewer* subtracts 2. None if the command changes nothing.
+    *Twice as often* doubles it, *half as often* halves it, and *two times fewer* subtracts 2. None
+    if the command changes nothing.
     """
     if "half" in words.command:
         return lambda number: number // 2
@@ -176,14 +187,15 @@ def _change(words: SlotWords) -> Callable[[int], int] | None:
 def _difference(words: SlotWords) -> int | None:
     """Return by how much a command changes a number; None if it names no difference.
 
-    *Two times more* -> 2, *one time fewer* -> -1, *the visit right before* -> -1.
+    *Two times more* -> 2, *one time fewer* -> -1, *the visit right before* -> -1. The first word of
+    `MORE` or `FEWER` decides.
     """
-    for place, word in enumerate(words.command):
+    for index, word in enumerate(words.command):
         if word not in MORE | FEWER:
             continue
         if word in ONLY_ORDINAL and not words.is_ordinal:
             continue
-        words_before = words.command[max(0, place - _NUMBER_REACH) : place]
+        words_before = words.command[max(0, index - _NUMBER_REACH) : index]
         numbers = [number for number in map(number_of, words_before) if number is not None]
         size = numbers[-1] if numbers else 1  # "the visit before" is one before
         size = max(size, 1)  # "zero times fewer" is once fewer
@@ -197,4 +209,4 @@ SURFACE_RULES: Mapping[str, SurfaceRule] = {
     "elimination": take_unnamed,
     "surface": take_by_cues,
 }
-"""By name, also that of the policy with the rule."""
+"""The rules by name. A built-in policy of the same name plays by the rule."""

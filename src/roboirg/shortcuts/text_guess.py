@@ -1,6 +1,7 @@
-"""Guess a whole goal from the words of an instruction.
+"""Guess a whole goal from the words of an instruction, by a surface rule.
 
-A slot of a goal has one place or several: the colors of two containers are two places of a slot.
+A slot of a goal has one position for each of its values: the colors of two containers are two
+positions of the slot ``colors``.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from roboirg.shortcuts.goal_vocabulary import (
     SlotVocabulary,
     Value,
     goal_vocabulary,
-    orders,
+    wordings_of,
 )
 from roboirg.shortcuts.named_values import (
     command_ranks,
@@ -32,20 +33,23 @@ from roboirg.shortcuts.surface_rules import SURFACE_RULES, Candidates, SlotWords
 from roboirg.tasks import get_task, goals_of
 
 TextGuess = Mapping[str, tuple[Candidates, ...]]
-"""Candidates for each place of each slot; within a place they are equally likely."""
+"""A guess of a goal: by slot, the candidates for each position, of which each is as likely.
+
+``{"color": (("red", "blue"),), "repeats": ((2,),)}`` is red or blue, twice.
+"""
 
 
 @functools.lru_cache(maxsize=1024)
 def guess_goal(rule: str, text: str, task: str) -> TextGuess:
-    """Return the goal that a rule guesses from a prompt, by goal slot, without the scene.
+    """Return the goal that a surface rule guesses from an instruction, without the scene.
 
-    Each slot has one or several places, and each place its candidates, equally likely. The rule
-    ``first-mention`` for *Red and blue are fine. Pick one of them twice.* -> ``{"color":
-    (("red",),), "repeats": ((2,),)}``.
+    The rule ``first-mention`` for *Red and blue are fine. Pick one of them twice.* ->
+    ``{"color": (("red",),), "repeats": ((2,),)}``: one position in each slot, each with one
+    candidate. Where a position has several candidates, they are equally likely.
 
     Args:
         rule: name of one of `SURFACE_RULES`.
-        text: the whole prompt.
+        text: the whole instruction.
         task: name of the task.
     """
     check_names("rule", [rule], SURFACE_RULES)
@@ -53,7 +57,7 @@ def guess_goal(rule: str, text: str, task: str) -> TextGuess:
     thing_total = thing_count(text, get_task(task).things.handled, vocabulary)
     guess: dict[str, tuple[Candidates, ...]] = {}
     for slot, slot_vocabulary in vocabulary.items():
-        value_count = thing_total if slot_vocabulary.several else 1
+        value_count = thing_total if slot_vocabulary.is_sequence else 1
         candidates = _candidates(rule, text, slot, slot_vocabulary, value_count)
         # Where a rule has nothing to go by, every value is as likely.
         candidates += [slot_vocabulary.values] * value_count
@@ -64,13 +68,13 @@ def guess_goal(rule: str, text: str, task: str) -> TextGuess:
 def _candidates(
     rule: str, text: str, slot: str, vocabulary: SlotVocabulary, value_count: int
 ) -> list[Candidates]:
-    """Return the possible values for each place of a goal slot.
+    """Return the candidates for the positions of a goal slot, as many as are found.
 
-    Values that the command states are certain; else the rule decides.
+    Values that the command states are certain; without any, the rule decides.
 
     Args:
         rule: its name.
-        text: the whole prompt.
+        text: the whole instruction.
         slot: name of the goal slot.
         vocabulary: of the slot.
         value_count: number of values to find.
@@ -92,34 +96,38 @@ def _candidates(
     return [candidates or vocabulary.values for candidates in found]
 
 
-def slot_share(guess: TextGuess, slot: str, content: SlotValue, places: Sequence[int]) -> Fraction:
-    """Return the expected share of a slot's values that a guess gets right.
+def slot_share(
+    guess: TextGuess, slot: str, content: SlotValue, positions: Sequence[int]
+) -> Fraction:
+    """Return the expected share of a slot's values that a guess gets right, 0 to 1.
+
+    Where the candidates are red or blue, and red is right, it is 1/2.
 
     Args:
         guess: of the whole goal.
         slot: name of the slot.
         content: the right value or values of the slot.
-        places: indices of the values that are scored.
+        positions: indices of the values that are scored.
     """
     values = values_in(content)
     guessed = guess[slot]
     total = Fraction(0)
-    for place in places:
-        if place < len(guessed):
-            total += _share(guessed[place], values[place])
-    return total / len(places)
+    for position in positions:
+        if position < len(guessed):
+            total += _probability_of_value(guessed[position], values[position])
+    return total / len(positions)
 
 
 def goal_share(guess: TextGuess, episode: Episode) -> Fraction:
-    """Return the probability that a goal drawn from a guess is right.
+    """Return the probability that a goal drawn from a guess is right, 0 to 1.
 
     Several goals of the scene may be right, as they have the same stages. Their probabilities add,
-    and so do those of the orders in which a goal can be said.
+    and so do those of the orders of values in which a goal can be said.
     """
     total = Fraction(0)
     for goal in goals_of(episode):
         probability = Fraction(0)
-        for slots in orders(goal):
+        for slots in wordings_of(goal):
             probability += _probability(guess, slots)
         if probability and is_right(goal, episode):
             total += probability
@@ -129,14 +137,15 @@ def goal_share(guess: TextGuess, episode: Episode) -> Fraction:
 def draw_goal(guess: TextGuess, episode: Episode, rng: np.random.Generator) -> Goal | None:
     """Return a goal of the scene that is drawn at random from a guess.
 
-    None if no goal of the scene has the values that were drawn.
+    There is one draw for each position, in the order of the guess. None if no goal of the scene has
+    the values that were drawn.
     """
     drawn: dict[str, tuple[Value, ...]] = {}
-    for slot, places in guess.items():
-        values = [candidates[int(rng.integers(len(candidates)))] for candidates in places]
+    for slot, positions in guess.items():
+        values = [candidates[int(rng.integers(len(candidates)))] for candidates in positions]
         drawn[slot] = tuple(values)
     for goal in goals_of(episode):
-        for slots in orders(goal):
+        for slots in wordings_of(goal):
             goal_values = {slot: values_in(content) for slot, content in slots.items()}
             if goal_values == drawn:
                 return goal
@@ -146,20 +155,18 @@ def draw_goal(guess: TextGuess, episode: Episode, rng: np.random.Generator) -> G
 def _probability(guess: TextGuess, slots: Mapping[str, SlotValue]) -> Fraction:
     """Return the probability that a draw from a guess gives exactly these values.
 
-    One of two colors and a certain number -> 1/2.
+    Red or blue, and certainly twice: ``{"color": "red", "repeats": 2}`` -> 1/2.
     """
     probability = Fraction(1)
-    for slot, places in guess.items():
+    for slot, positions in guess.items():
         values = values_in(slots[slot])
-        if len(values) != len(places):
+        if len(values) != len(positions):
             return Fraction(0)
-        for candidates, value in zip(places, values, strict=True):
-            if value not in candidates:
-                return Fraction(0)
-            probability *= _share(candidates, value)
+        for candidates, value in zip(positions, values, strict=True):
+            probability *= _probability_of_value(candidates, value)
     return probability
 
 
-def _share(candidates: Candidates, value: Value) -> Fraction:
-    """Return the probability of a value if one of the candidates is drawn."""
+def _probability_of_value(candidates: Candidates, value: Value) -> Fraction:
+    """Return the probability of a value if one of the candidates is drawn; 0 if it is none."""
     return Fraction(candidates.count(value), len(candidates))
