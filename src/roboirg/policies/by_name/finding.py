@@ -1,10 +1,15 @@
 """Find a policy by its name, or make one known that Python code hands over.
 
-The name is a *spec*, such as ``oracle`` or ``planner:gemini?hands=scripted``
-(`roboirg.policies.by_name.policy_kinds`). *Hands* are what follows the subgoals of a planner: a
-policy, or the scripted expert, which needs the simulator. A policy is *foreign* if its code is
-neither ours nor behind a protocol; it gets a process of its own. Its *makeup* is what distinguishes
-it from others of its name, with its options: `roboirg.core.versions`.
+- A *spec* is the name on the command line, ``oracle`` or ``planner:gemini?hands=scripted``
+  (`roboirg.policies.by_name.policy_kinds`).
+- A *reference* (`PolicyRef`) is what is known of the policy before it is made: where it runs, what
+  it needs.
+- *Hands* are what follows the subgoals of a planner: a policy, or the scripted expert, which needs
+  the simulator.
+- A policy is *foreign* if its code is neither ours nor behind a protocol; it gets a process of its
+  own.
+- Its *makeup* is what tells it from others of its name: its code and its options, as pairs of text
+  (`roboirg.core.versions`).
 """
 
 from __future__ import annotations
@@ -61,7 +66,10 @@ class Privileged:
 
 
 def read_policy(spec: str, name: str | None = None) -> PolicyRef:
-    """Return the policy of a spec. Code of ours is asked what it needs; no other is imported.
+    """Return a reference to the policy of a spec.
+
+    Code of ours is imported and asked what it needs; that of users is not. ``oracle`` gives a
+    reference of the kind `BUILT_IN` that runs in the simulator's process and is privileged.
 
     Args:
         spec: a name in `BUILTIN`, such as ``oracle``; ``package.module:Class``; a URL; or one of
@@ -92,27 +100,26 @@ def read_policy(spec: str, name: str | None = None) -> PolicyRef:
 
 
 def _with_code(ref: PolicyRef, system: System | None) -> PolicyRef:
-    """Return a policy with what its spec says of its code.
+    """Return a reference with what the spec says of the policy's code, without importing it.
 
-    Set are `asks` (which kind of model it asks), `is_foreign` (whether its code is a user's) and
-    `place` (where it plays): ``split`` for a foreign planner with scripted hands, which need the
-    simulator and so stay in the world's process, else ``own``.
+    Set are ``is_foreign`` (whether the code, or a part of it, is a user's), ``asks`` (which part of
+    it asks a model, if any) and ``place`` (where it plays, which holds for foreign code only).
 
     Args:
         ref: of the policy.
-        system: that its spec means; then planner and hands decide. None if it means none.
+        system: the planner and hands that its spec means; None if it means no such pair.
     """
     place: Place = "own"
     asks: Asker | None = None
     if system is None:
-        is_class = ref.kind == CLASS and ":" in ref.body
+        is_class = ref.kind == CLASS and ":" in ref.body  # package.module:Class
         is_foreign = is_class or not known_kinds().get(ref.kind, True)
         if ref.kind == LISTENER:
             asks = "listener"
     else:
         is_foreign = ":" in system.planner_kind  # package.module:Class
         if is_foreign and system.policy == SCRIPTED:
-            place = "split"
+            place = "split"  # scripted hands need the simulator, foreign code must not be near it
         if system.policy not in (SCRIPTED, ELSEWHERE):
             is_foreign = is_foreign or read_policy(system.policy).is_foreign
         if system.planner_kind in OF_MODELS:
@@ -121,7 +128,11 @@ def _with_code(ref: PolicyRef, system: System | None) -> PolicyRef:
 
 
 def _place_of_ours(ref: PolicyRef) -> Place:
-    """Return where a policy with code of ours runs; `look_up` has found out if it is privileged."""
+    """Return where a policy with code of ours runs: in the simulator's process, or elsewhere.
+
+    Trained networks get a process of their own (``own``), and URLs mean a ``server``. The reference
+    comes from `look_up`, which finds out whether the policy is privileged.
+    """
     if find_kind(ref.kind).has_weights:
         # What acts on the world by its state is next to it, even if it is trained.
         return "world" if ref.is_privileged else "own"
@@ -129,11 +140,11 @@ def _place_of_ours(ref: PolicyRef) -> Place:
 
 
 def _makeup(ref: PolicyRef, system: System | None) -> Makeup:
-    """Return the makeup of a policy: pairs of its maker, of each option, and of its hands.
+    """Return the makeup of a policy: what makes it, and its options, as pairs of names and values.
 
-    Of ``planner:gemini?model=m1`` the maker is ``planner:gemini``, and ``model`` is an option.
-    Options that have their default values are left out, as they make no difference; of foreign
-    code, whose defaults are not known, every option that is typed is kept.
+    ``planner:gemini?model=m1`` -> ``(("policy", "planner:gemini"), ("model", "m1"))``. Options that
+    have their default values are left out, as they make no difference; of foreign code, whose
+    defaults are not known, every option that is typed is kept.
 
     Args:
         ref: of the policy, with place and version.
@@ -156,7 +167,7 @@ def _makeup(ref: PolicyRef, system: System | None) -> Makeup:
 
 
 def _makeup_of_system(system: System) -> Makeup:
-    """Return the makeup of a planner with its hands; without a planner that of the policy."""
+    """Return the makeup of a planner with its hands; without a planner that of the policy alone."""
     if system.planner is None:
         return read_policy(system.policy).makeup
     kind = system.planner_kind
@@ -170,7 +181,8 @@ def _makeup_of_system(system: System) -> Makeup:
 def _changed_options(made: Any, typed: dict[str, Any]) -> dict[str, Any]:  # noqa: ANN401
     """Return the options of a policy or planner that differ from their defaults.
 
-    Options of its model stand next to its own, as they are typed.
+    Options of its model stand next to its own, as they are typed: ``{"asked": "when-done",
+    "temperature": 1.0}``.
 
     Args:
         made: the policy or planner.
@@ -184,11 +196,11 @@ def _changed_options(made: Any, typed: dict[str, Any]) -> dict[str, Any]:  # noq
 
 
 def _joined(maker: str, options: dict[str, Any], hands: str) -> Makeup:
-    """Return the makeup of a policy: its maker, then its options by name, with the hands as one.
+    """Return a makeup: the maker, then the options sorted by name, with the hands as one of them.
 
-    ``planner:gemini`` with the option ``model`` gives
-    ``(("policy", "planner:gemini"), ("model", "m1"))``. Hands are named only if they are not the
-    scripted ones; an option that names a file counts with a hash of its content.
+    ``planner:gemini`` with the option ``model`` gives ``(("policy", "planner:gemini"), ("model",
+    "m1"))``. Hands are named only if they are neither the scripted ones nor elsewhere. Of an option
+    that names a file, the value is a hash of the file's content.
     """
     if hands not in (SCRIPTED, ELSEWHERE):
         options = {**options, HANDS: makeup_text(read_policy(hands).makeup)}
@@ -197,12 +209,12 @@ def _joined(maker: str, options: dict[str, Any], hands: str) -> Makeup:
 
 
 def policy_of(policy: str | type[Any] | object, name: str | None = None) -> PolicyRef:
-    """Return the policy that Python code hands over.
+    """Return a reference to the policy that Python code hands over.
 
     Args:
         policy: a spec; a class; an object; or any of them as `Privileged`. An object, and a class
-            that cannot be imported elsewhere, plays in this process only; nothing but an object's
-            own ``reset`` clears what it remembers.
+            that cannot be imported elsewhere, plays in this process only, and is kept in `live`
+            under its name; nothing but an object's own ``reset`` clears what it remembers.
         name: in records; the spec, or the name of the class, by default.
     """
     declaration = ""
@@ -233,11 +245,11 @@ def policy_of(policy: str | type[Any] | object, name: str | None = None) -> Poli
 
 
 def make_policy(policy: str | PolicyRef, seed: int) -> Policy:
-    """Make a policy.
+    """Make a policy that can play; it is not yet attached to an environment.
 
     Args:
-        policy: or its spec, as in `read_policy`. A class is called with ``seed=`` if it takes it,
-            else without arguments.
+        policy: its reference, or its spec as in `read_policy`. A class is called with ``seed=`` if
+            it takes it, else without arguments.
         seed: of the policy's own random choices.
 
     Raises:
@@ -253,7 +265,7 @@ def make_policy(policy: str | PolicyRef, seed: int) -> Policy:
 
 
 def find_policy(spec: str) -> PolicyRef:
-    """Return a policy with what its class declares; its module is imported.
+    """Return a reference to the policy of a spec with what its class declares; imports its module.
 
     Raises:
         UnknownNameError, InvalidValueError, MissingDependencyError: as `make_policy`.
@@ -262,9 +274,10 @@ def find_policy(spec: str) -> PolicyRef:
 
 
 def look_up(ref: PolicyRef) -> PolicyRef:
-    """Return a policy with what its code declares, without opening it; raises like `find_policy`.
+    """Return a reference with what the policy's code declares; raises like `find_policy`.
 
-    A class is asked itself; where the spec names no class, a policy is made and asked.
+    A class is asked itself; where the spec names no class, a policy is made and asked, but not
+    opened, so nothing is connected.
     """
     if ref.kind in (CLASS, BUILT_IN):
         declaring: object = find_class(ref.body)
@@ -276,7 +289,10 @@ def look_up(ref: PolicyRef) -> PolicyRef:
 
 
 def declared_by(ref: PolicyRef, declaring: object) -> PolicyRef:
-    """Return a policy with the needs, version and privilege that its code declares.
+    """Return a reference with the needs, version and privilege that the policy's code declares.
+
+    Code of ours that has ``attach`` reads the simulator's state, so it is privileged; a user's has
+    to be declared privileged in the spec, or `InvalidValueError` is raised.
 
     Args:
         ref: of the policy.
@@ -300,7 +316,9 @@ def declared_by(ref: PolicyRef, declaring: object) -> PolicyRef:
 
 
 def _refuse_undeclared(ref: PolicyRef, made: object) -> None:
-    """Raise if foreign code has ``attach``, so reads the simulator, and its spec does not say so.
+    """Raise if foreign code can read the simulator's state, and its spec does not declare that.
+
+    It can if it has ``attach``. The declaration is `PRIVILEGED` before the spec.
 
     Args:
         ref: of the policy.
@@ -320,7 +338,7 @@ def _refuse_undeclared(ref: PolicyRef, made: object) -> None:
 
 
 def _can_be_imported(policy_class: type[Any]) -> bool:
-    """Return whether a process of its own finds the class under its name."""
+    """Return whether another process can import the class; not one of a script or a function."""
     if policy_class.__module__ == "__main__":
         return False
     module = sys.modules.get(policy_class.__module__)

@@ -36,7 +36,7 @@ KINDS_GROUP = "roboirg.policy_kinds"
 
 
 def url_classes() -> Mapping[str, type[Any]]:
-    """Return the classes of policies that URLs name, by the scheme."""
+    """Return the classes of policies that URLs name, by scheme: ``openpi`` and others."""
     clients = {scheme: protocol.client for scheme, protocol in protocols_by_scheme().items()}
     return {**clients, **CHECKPOINTS}
 
@@ -47,10 +47,10 @@ def url_forms() -> list[str]:
 
 
 def find_class(spec: str, methods: tuple[str, ...] = ("reset", "act")) -> type[Any]:
-    """Return the class of a built-in name, ``package.module:Class``, or a URL.
+    """Return the class of policies that a spec names, checked; its module is imported.
 
     Args:
-        spec: any of them.
+        spec: a built-in name such as ``oracle``, ``package.module:Class``, or a URL.
         methods: that the class must have.
 
     Raises:
@@ -65,8 +65,7 @@ def find_class(spec: str, methods: tuple[str, ...] = ("reset", "act")) -> type[A
         check_names("policy scheme", [scheme], classes)
         url_class = classes[scheme]
         # One is made for the check, which also checks the URL's options; nothing connects yet.
-        made = url_class(spec)
-        check_policy(spec, made, methods)
+        check_policy(spec, url_class(spec), methods)
         return url_class
 
     if spec not in BUILTIN and ":" not in spec:
@@ -78,19 +77,17 @@ def find_class(spec: str, methods: tuple[str, ...] = ("reset", "act")) -> type[A
 
 
 def _known_specs() -> list[str]:
-    """Return the specs that exist, such as ``oracle`` and ``openpi://…``, for an error message."""
-    specs = [*BUILTIN, "package.module:Class"]
-    specs += url_forms()
-    specs += ["system:NAME", "planner:KIND", "vlm-listener:PROVIDER"]
-    specs += [f"{kind}:…" for kind in entry_names(KINDS_GROUP)]
-    return specs
+    """Return the forms of specs, such as ``oracle`` and ``openpi://…``, for an error message."""
+    kinds = ["system:NAME", "planner:KIND", "vlm-listener:PROVIDER"]
+    kinds += [f"{kind}:…" for kind in entry_names(KINDS_GROUP)]
+    return [*BUILTIN, "package.module:Class", *url_forms(), *kinds]
 
 
 def make_from_class(spec: str, policy_class: type[Any], seed: int) -> Policy:
-    """Make a policy of the class that `find_class` returned.
+    """Make a policy of the class that `find_class` returned for a spec.
 
     Args:
-        spec: passed to the constructor if it is a URL.
+        spec: passed to the constructor if it is a URL, as it holds the address and options.
         policy_class: called with ``seed=`` if it takes it, else without arguments.
         seed: of the policy's own random choices. A policy that takes batches is made once, with
             seed 0, and gets the seed of each episode in ``begin``.
@@ -112,9 +109,9 @@ def _construct(spec: str, policy_class: type[Any], seed: int) -> Any:  # noqa: A
 
 
 def _import_class(spec: str) -> type[Any]:
-    """Import the class of a built-in name or of ``package.module:Class``.
+    """Return the class of a built-in name or of ``package.module:Class``; imports its module.
 
-    If the module has no such class, the error lists those that it has.
+    If the module has no such class, the `InvalidValueError` lists those that it has.
     """
     module_name, _, class_name = BUILTIN.get(spec, spec).partition(":")
     module = _import_module(spec, module_name)
@@ -129,7 +126,15 @@ def _import_class(spec: str) -> type[Any]:
 
 
 def _import_module(spec: str, name: str) -> ModuleType:
-    """Import a module; if there is none of its name, the error lists those in this folder."""
+    """Import a module by its name, and return it.
+
+    What the import raises becomes an `InvalidValueError`, which lists the modules of the working
+    folder if there is none of that name. Only `MissingDependencyError` passes as it is.
+
+    Args:
+        spec: of the policy, for the error.
+        name: of the module.
+    """
     try:
         return importlib.import_module(name)
     except MissingDependencyError:
@@ -137,7 +142,7 @@ def _import_module(spec: str, name: str) -> ModuleType:
     except (Exception, SystemExit) as error:
         hint = ""
         top_package = name.partition(".")[0]
-        # Not if it is found, and one that it imports is missing.
+        # Not where the module exists, and another one that it imports is missing.
         if isinstance(error, ModuleNotFoundError) and error.name == top_package:
             modules_here = sorted(path.stem for path in Path.cwd().glob("*.py"))
             listed = ", ".join(modules_here) or "none"

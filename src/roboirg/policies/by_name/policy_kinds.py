@@ -46,13 +46,14 @@ from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 from roboirg.util.discovery import entry_names, find_entry
 
 CLASS, LIVE, LISTENER, PLANNER, SYSTEM = "class", "live", "vlm-listener", "planner", "system"
+"""Names of kinds; ``live`` is what Python code has handed over, in `live`."""
 PolicyMaker = Callable[[int], Policy]
-"""Makes a policy from a seed, without network or the libraries of providers."""
+"""Makes a policy from a seed; it uses neither the network nor the libraries of model providers."""
 
 SCRIPTED_HANDS_CLASS = "roboirg.policies.hands.scripted_hands:ScriptedHands"
 
 live: dict[str, Any] = {}
-"""The classes and objects that this process alone has, by the names of the policies."""
+"""Classes and objects that Python code of this process hands over, by the names of the policies."""
 
 
 class PolicyKind(NamedTuple):
@@ -60,8 +61,8 @@ class PolicyKind(NamedTuple):
 
     Attributes:
         name: what stands before the colon.
-        read: returns what makes the policies of a spec. It is called with the whole spec, with what
-            stands between the colon and the question mark, and with the options behind that.
+        read: returns what makes the policies of a spec. For ``planner:gemini?model=m1`` it is
+            called with the whole spec, with ``"gemini"``, and with ``{"model": "m1"}``.
         has_weights: whether its policies are trained networks, which get a process of their own.
     """
 
@@ -71,11 +72,16 @@ class PolicyKind(NamedTuple):
 
 
 def split_spec(name: str, spec: str) -> PolicyRef:
-    """Return the reference of a policy with kind, target and options of its spec.
+    """Parse a spec; return a reference to its policy with kind, target and options, and no more.
 
-    ``planner:gemini?model=m1`` has the kind ``planner``, the target ``gemini`` and an option;
-    ``oracle`` is of the kind of built-in policies, ``lab.walk:Walk`` of the kind of classes.
-    Nothing is imported.
+    | spec | kind | target | options |
+    | --- | --- | --- | --- |
+    | ``planner:gemini?model=m1`` | ``planner`` | ``gemini`` | ``(("model", "m1"),)`` |
+    | ``openpi://host:8000`` | ``openpi`` | ``host:8000`` | |
+    | ``oracle`` | `BUILT_IN` | ``oracle`` | |
+    | ``lab.walk:Walk`` | `CLASS` | ``lab.walk:Walk`` | |
+
+    Nothing is imported. A spec of no known kind counts as a class, which need not exist.
 
     Args:
         name: in records.
@@ -98,7 +104,10 @@ def split_spec(name: str, spec: str) -> PolicyRef:
 
 @functools.cache
 def known_kinds() -> Mapping[str, bool]:
-    """Return the names of all kinds, and for each whether its code is ours; imports none."""
+    """Return for the name of each kind whether its code is ours; imports none of them.
+
+    ``{"planner": True, "their-kind": False, ...}``
+    """
     are_ours = dict.fromkeys(entry_names(KINDS_GROUP), False)
     for name in (*OURS, *entry_names(KINDS_GROUP, OUR_PACKAGES)):
         are_ours[name] = True
@@ -107,16 +116,17 @@ def known_kinds() -> Mapping[str, bool]:
 
 @functools.cache
 def find_kind(name: str) -> PolicyKind:
-    """Return the kind of a name, such as ``planner``; of packages, only the named one is imported.
+    """Return the kind of policies with a name, such as ``planner``.
 
-    The scheme of a URL, such as ``openpi``, is a kind too: the class of its clients makes them.
+    Kinds of other packages are found through entry points, and only the named one is imported. Any
+    other name is a kind whose policies a class makes: the scheme of a URL, or ``class`` itself.
     """
     found = OURS.get(name) or find_entry(name, "KIND", PolicyKind, KINDS_GROUP)
     return found or PolicyKind(name, _of_class, has_weights=name in CHECKPOINTS)
 
 
 def maker_of(ref: PolicyRef) -> PolicyMaker:
-    """Return what makes a policy; its module is imported.
+    """Return the function that makes a policy from a seed; the policy's module is imported.
 
     Raises:
         UnknownNameError: there is no such policy, scheme or option.
@@ -130,9 +140,13 @@ def maker_of(ref: PolicyRef) -> PolicyMaker:
 def system_of(kind: str, target: str, options: Mapping[str, str]) -> System | None:
     """Return the planner and the hands that a spec combines; None if it names no planner.
 
-    ``system:NAME`` names both in a file. Of ``planner:KIND?hands=SPEC`` the option ``hands`` names
-    the hands, by default the scripted ones, and all others are the planner's. A planner that is a
-    class of the user's, ``planner:package.module:Class``, has no options.
+    ``system:NAME`` is read from a file, which has both. In ``planner:KIND?hands=SPEC`` the option
+    ``hands`` names the hands, by default the scripted ones, and all others are the planner's.
+
+    Args:
+        kind: of the policy, as in `split_spec`.
+        target: name or file of the system, or kind of the planner.
+        options: of the spec. A planner that is a class of the user's has none but ``hands``.
     """
     if kind == SYSTEM:
         return find_system(target, options)
@@ -149,17 +163,22 @@ def system_of(kind: str, target: str, options: Mapping[str, str]) -> System | No
 
 
 def make_follower(spec: str, seed: int) -> Policy:
-    """Make what follows a planner: any policy, or the scripted hands; nothing is connected."""
+    """Make the policy that follows a planner's subgoals; nothing is connected yet.
+
+    Args:
+        spec: of any policy, or `SCRIPTED` for the scripted hands.
+        seed: of its own random choices.
+    """
     import_path = SCRIPTED_HANDS_CLASS if spec == SCRIPTED else spec
     make = maker_of(split_spec(spec, import_path))
     return make(seed)
 
 
 def _build(system: System, seed: int) -> Policy:
-    """Make the policy of a system.
+    """Make the policy of a system: a planner with what follows it, as one policy.
 
-    It is the policy alone if the system has no planner, the planner alone if the hands are in
-    another process (`ELSEWHERE`), else both in one.
+    It is the low-level policy alone if the system has no planner, and the planner alone if the
+    hands are in another process (`ELSEWHERE`).
     """
     if system.planner is None:
         return make_follower(system.policy, seed)
@@ -176,25 +195,34 @@ def _build(system: System, seed: int) -> Policy:
 
 
 def _of_class(spec: str, _target: str, _options: Mapping[str, str]) -> PolicyMaker:
-    """Return what makes the policies of a class, which the whole spec names."""
+    """Return what makes policies of the class that a spec names: ``lab.walk:Walk``, or a URL."""
     return functools.partial(make_from_class, spec, find_class(spec))
 
 
 def _of_system(kind: str, _spec: str, target: str, options: Mapping[str, str]) -> PolicyMaker:
-    """Return what makes the policies of a system, or of a planner and its hands."""
+    """Return what makes the policies of ``system:NAME`` or ``planner:KIND``.
+
+    Args:
+        kind: which of the two.
+        target: what stands after the colon.
+        options: of the spec.
+    """
     system = cast("System", system_of(kind, target, options))
     return functools.partial(_build, system)
 
 
 def _of_listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
-    """Return what makes VLM listeners; its options and its model's stand side by side."""
+    """Return what makes VLM listeners with a provider; raises for an unknown option.
+
+    In the spec, options of the listener and of its model stand side by side.
+    """
     values = with_options({}, {**options, "provider": name})
     checked = check_options(ListenerOptions, values, f"policy {LISTENER}:{name}")
     return functools.partial(VLMListener, checked)
 
 
 def _of_process(spec: str, name: str, _options: Mapping[str, str]) -> PolicyMaker:
-    """Return the maker of policies for a `live` object or class, as Python code has handed it over.
+    """Return what makes policies of an object or class that Python code has handed over.
 
     An object plays every episode itself; of a class, each episode gets a policy of its own.
     """
