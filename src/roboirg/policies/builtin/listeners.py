@@ -1,4 +1,8 @@
-"""Listeners: the declared meaning, or a surface rule, in front of the scripted expert."""
+"""Listeners: they understand an instruction by a rule, and the scripted expert does what it says.
+
+The rule is the declared meaning of the words (`roboirg.language.meaning`), or a surface rule, which
+guesses by position and key words (`roboirg.shortcuts`).
+"""
 
 from __future__ import annotations
 
@@ -24,8 +28,8 @@ if TYPE_CHECKING:
 def choice_generator(seed: int, episode: Episode, instruction: str) -> np.random.Generator:
     """Return the generator of a listener's random choices in an episode.
 
-    Seeded by instruction and episode, so that a choice does not depend on what this process played
-    before.
+    It depends on the policy's seed, the episode and the instruction, and not on what this process
+    played before.
     """
     return np.random.default_rng([seed, episode.seed, zlib.crc32(instruction.encode())])
 
@@ -45,12 +49,12 @@ class ListenerPolicy(ScriptedPolicy):
         self._has_guessed = False
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode."""
+        """Begin an episode, in which it has not guessed yet; decide on a goal once all is heard."""
         self._has_guessed = False
         super().reset(instruction, demonstration)
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
-        """Return a goal that fits the instruction."""
+        """Return a goal of the scene that fits the whole instruction, at random if several do."""
         return self._chosen(understood_goals(env.instruction, env.episode), env, instruction)
 
     def _chosen(self, goals: Sequence[Goal], env: RoboIRGEnv, words: str) -> Goal:
@@ -62,7 +66,7 @@ class ListenerPolicy(ScriptedPolicy):
         return draw(rng, goals)
 
     def usage(self) -> dict[str, float]:
-        """Return whether it has guessed because the words mean nothing."""
+        """Return ``{"guessed": 1.0}`` if it has guessed as the words mean nothing, else empty."""
         return {GUESSED: 1.0} if self._has_guessed else {}
 
 
@@ -75,15 +79,16 @@ class ForgetfulPolicy(ListenerPolicy):
     metadata: ClassVar[Mapping[str, str]] = {**READING, "reads_text": "only the last utterance"}
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
-        """Return a goal that fits the final command alone."""
+        """Return a goal of the scene that fits the last utterance, at random if several do."""
         command = env.instruction.command
         return self._chosen(goals_of_command(env.instruction, env.episode), env, command)
 
 
 class ShortcutPolicy(ScriptedPolicy):
-    """Chooses a goal by a surface rule, from the instruction and the task's vocabulary alone.
+    """Guesses a goal by a surface rule, from the words and the goals that the task can have.
 
-    If the scene does not have that goal, for want of a color, it holds still.
+    The rule does not see the scene. If the scene does not have that goal, as it lacks a color, the
+    policy holds still.
     """
 
     rule: ClassVar[str]
@@ -91,31 +96,34 @@ class ShortcutPolicy(ScriptedPolicy):
     metadata: ClassVar[Mapping[str, str]] = READING
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
-        """Return the goal of the rule; what the rule leaves open is drawn at random."""
+        """Return the goal of the rule, at random where that leaves values open.
+
+        None if the scene does not have it.
+        """
         episode = env.episode
         guess = guess_goal(self.rule, instruction, episode.task)
         return draw_goal(guess, episode, choice_generator(self.seed, episode, instruction))
 
 
 class FirstMentionPolicy(ShortcutPolicy):
-    """Takes the values that are named first."""
+    """Takes the values that are named first: of *red, blue and green*, red."""
 
     rule = "first-mention"
 
 
 class LastMentionPolicy(ShortcutPolicy):
-    """Takes the values that are named last."""
+    """Takes the values that are named last: of *red, blue and green*, green."""
 
     rule = "last-mention"
 
 
 class EliminationPolicy(ShortcutPolicy):
-    """Takes values that are not named."""
+    """Takes values that are not named, at random."""
 
     rule = "elimination"
 
 
 class SurfacePolicy(ShortcutPolicy):
-    """Chooses among the first value, the unnamed one and arithmetic by key words of the command."""
+    """Goes by key words: *latter* is the second value, *other* an unnamed one, *twice* doubles."""
 
     rule = "surface"

@@ -1,4 +1,8 @@
-"""Policies that know a goal without words: the oracles, and those that control arms find out."""
+"""Policies that take a goal from the episodes, whatever the instruction says.
+
+`OraclePolicy` is the upper bound. The other two cheat in a way that control arms find out: an *arm*
+plays an episode again with other words, or with another goal.
+"""
 
 from __future__ import annotations
 
@@ -21,18 +25,18 @@ class OraclePolicy(ScriptedPolicy):
     metadata: ClassVar[Mapping[str, str]] = WORDLESS
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:  # noqa: ARG002
-        """Return the episode's goal; the instruction is ignored."""
+        """Return the goal of the episode that is played; the instruction is ignored."""
         return env.episode.goal
 
 
 class HabitPolicy(OraclePolicy):
     """Executes the scene's own goal whatever is said, as a policy that knows its scenes by heart.
 
-    It succeeds in every arm but ``other-goal``.
+    It succeeds in every arm but ``other-goal``, which replaces that goal by another one.
     """
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
-        """Return the scene's own goal."""
+        """Return the goal that the scene has in the split, also where an arm has replaced it."""
         return (env.original or env.episode).goal
 
 

@@ -31,18 +31,20 @@ class RandomPolicy:
         self.seed = seed
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
-        """Begin a walk that depends on the seed and the instruction alone."""
+        """Begin a random walk that depends on the seed and the instruction alone."""
         self._rng = np.random.default_rng([self.seed, zlib.crc32(instruction.encode())])
 
     def act(self, observation: Observation) -> Actions:
-        """Return `CHUNK` actions (n, 8) toward random joint angles, with a random gripper value.
+        """Return actions (`CHUNK`, 8) toward random joint angles, with a random gripper value.
 
-        Each step is at most `MAX_STEP` a joint, so a far target is not reached.
+        All of them make the same step, of at most `MAX_STEP` a joint, so a far target is not
+        reached.
         """
         joints = np.asarray(observation["joint_positions"], dtype=np.float64)
-        target = self._rng.uniform(JOINT_LOW, JOINT_HIGH)
+        target = self._rng.uniform(JOINT_LOW, JOINT_HIGH)  # rad, (7,)
         step = np.clip((target - joints) / CHUNK, -MAX_STEP, MAX_STEP)
-        path = joints + step * np.arange(1, CHUNK + 1)[:, None]
+        steps_made = np.arange(1, CHUNK + 1)[:, None]
+        path = joints + step * steps_made
         gripper = self._rng.uniform(-1.0, 1.0)
         actions = np.column_stack([path, np.full(CHUNK, gripper)])
         actions[:, :ARM_JOINTS] = np.clip(actions[:, :ARM_JOINTS], JOINT_LOW, JOINT_HIGH)

@@ -1,4 +1,4 @@
-"""Policies that choose a goal and execute it with the scripted expert."""
+"""The base class of policies that decide on a goal and execute it with the scripted expert."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from roboirg.simulation.expert.primitives import MotionPrimitives
 
 _StagedChunk = tuple[Stage | None, NDArray[np.float64]]
-"""A chunk of actions and the stage that it belongs to; None while the command is awaited."""
+"""A stage of the goal and a chunk of its actions (n, 8); no stage while the command is awaited."""
 
 _OPEN_FINGERS = 0.039
-"""Meters that each finger is from the middle when the gripper is open, at least."""
+"""Meters from the middle beyond which both fingers are where the gripper is open."""
 _STILL_STEPS = 20
 """Control steps of a chunk that holds still: one second."""
 
@@ -47,19 +47,20 @@ READING: Mapping[str, str] = {
     "reads_text": "yes",
     "text_normalization": "lower case, split into words and punctuation",
 }
-"""Metadata of those that go by the words."""
+"""Metadata of policies without networks that go by the words."""
 
 
 class ScriptedPolicy(AttachedPolicy, ABC):
     """Decides on a goal once it has heard the command, and executes it with the scripted expert.
 
     Privileged: the expert reads the poses of all objects. It remembers everything that is said, and
-    rests until the command; where every goal begins above the same object, it goes there meanwhile.
+    rests until the command, the last utterance; where every goal of the scene begins above the same
+    object, it goes there meanwhile. A subclass says how to decide (`decide`).
 
     Attributes:
         listens: whether it waits for the command.
         stages: of the goal that it has decided on; empty before, and if there is none.
-        stage: the stage that the last chunk belongs to; None before the first one.
+        stage: the stage that the last actions belong to; None before the first ones.
     """
 
     cameras: tuple[str, ...] = ()
@@ -72,17 +73,22 @@ class ScriptedPolicy(AttachedPolicy, ABC):
         self.stage: Stage | None = None
 
     def make_primitives(self, env: RoboIRGEnv) -> MotionPrimitives:
-        """Return the expert that executes the stages."""
+        """Return what plans the motions of the stages, on the world of an environment."""
         from roboirg.simulation.expert.primitives import MotionPrimitives
 
         return MotionPrimitives(env.session.world)
 
     @abstractmethod
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
-        """Return the goal to execute, one of the scene's; None to hold still."""
+        """Return the goal to execute, one of the scene's; None to hold still.
+
+        Args:
+            env: whose simulator the policy may read.
+            instruction: everything that was said, joined by spaces.
+        """
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
-        """Decide on a goal, or listen for the rest of the instruction."""
+        """Begin an episode: decide on a goal, or wait for the rest of the instruction."""
         self._heard = [instruction]
         self.stages: tuple[Stage, ...] = ()
         if self.listens and self.env.unheard:
@@ -91,7 +97,7 @@ class ScriptedPolicy(AttachedPolicy, ABC):
             self.begin(self.env)
 
     def hear(self, text: str, step: int) -> None:  # noqa: ARG002
-        """Remember an utterance, and decide on a goal after the last one."""
+        """Remember an utterance, and decide on a goal if it was the last one."""
         self._heard.append(text)
         if self.listens and len(self._heard) == len(self.env.instruction.utterances):
             self.begin(self.env)
@@ -103,7 +109,7 @@ class ScriptedPolicy(AttachedPolicy, ABC):
         self._chunks = _execute(env, self.stages, self.make_primitives(env))
 
     def act(self, observation: Observation) -> Actions:  # noqa: ARG002
-        """Return the next chunk of the motion; without one, actions that hold still."""
+        """Return the next actions (n, 8) of the motion; after its end, one second at rest."""
         staged = next(self._chunks, None)
         if staged is None:
             return _hold_still(self.env)
@@ -114,10 +120,10 @@ class ScriptedPolicy(AttachedPolicy, ABC):
 def _execute(
     env: RoboIRGEnv, stages: tuple[Stage, ...], primitives: MotionPrimitives
 ) -> Iterator[_StagedChunk]:
-    """Yield action chunks, stage by stage; a stage that is not completed is retried.
+    """Yield chunks of actions (n, 8), stage by stage; a stage that is not completed is retried.
 
     A stage that handles what is held, such as placing it, is retried from the stage before, which
-    picks it up. After `MAX_RETRIES` in all, the chunks end.
+    picks it up. If a stage fails after `MAX_RETRIES` retries in all, the chunks end.
 
     Args:
         env: in which the caller executes each chunk before it takes the next one.
@@ -142,10 +148,10 @@ def _execute(
 
 
 def _get_ready(env: RoboIRGEnv) -> Iterator[_StagedChunk]:
-    """Yield what can be done before the goal is known, then short rests for ever.
+    """Yield chunks of actions for the time before the goal is known; it never ends.
 
-    If every goal of the scene begins with the same hover, that can be done. Rests are short, so
-    that the next words are heard soon.
+    If all goals of the scene begin with a hover over the same object, that comes first. Then there
+    are rests of `LISTENING_STEPS`, short so that the next words are heard soon.
     """
     from roboirg.simulation.expert.primitives import MotionPrimitives
 
@@ -162,12 +168,12 @@ def _get_ready(env: RoboIRGEnv) -> Iterator[_StagedChunk]:
 
 
 def completed_stages(env: RoboIRGEnv, stages: tuple[Stage, ...], since: int) -> int:
-    """Return how many stages of a plan are completed now, in their order.
+    """Return how many stages of a goal are completed now, in their order.
 
     Args:
         env: with the events of the episode.
-        stages: of the plan.
-        since: control step from which on facts count.
+        stages: of the goal, which need not be that of the episode.
+        since: control step of the world from which on facts count.
     """
     judge = Judge(stages)
     now = env.session.world.elapsed
@@ -178,7 +184,7 @@ def completed_stages(env: RoboIRGEnv, stages: tuple[Stage, ...], since: int) -> 
 
 
 def _hold_still(env: RoboIRGEnv) -> NDArray[np.float64]:
-    """Return one second of actions that keep the arm and the gripper as they are."""
+    """Return one second of actions (20, 8) that keep the arm and the gripper as they are."""
     robot = env.session.world.robot
     is_open = robot.finger_positions.min() > _OPEN_FINGERS
     gripper = 1.0 if is_open else -1.0

@@ -1,4 +1,9 @@
-"""The scripted expert in waypoints, disturbed on the way: what a policy learns to act from."""
+"""The scripted expert in waypoints, disturbed on the way, for demonstrations that show recovery.
+
+A *waypoint* is an action (7,): tool position x, y, z (meters, world frame), Euler angles x, y, z
+(radians) and the gripper value. A *label* is what the undisturbed expert would have done instead of
+the action that was executed; a policy learns the labels.
+"""
 
 from __future__ import annotations
 
@@ -29,36 +34,37 @@ if TYPE_CHECKING:
     from roboirg.simulation.panda import JointTrajectory
 
 LEAVE = 0.0
-"""Gripper value of a waypoint that neither opens nor closes it."""
+"""Gripper value of a waypoint to which only the tool moves; the gripper stays as it is."""
 STILL = 1e-4
 """Radians; a trajectory whose joints stay within this of their start moves only the gripper."""
 WAIT_STEPS = GRIPPER_STEPS + 1
 """Control steps of a waypoint at which the gripper stays as it is, but is opened or closed."""
 ON_THING = 0.012
-"""Meters in the plane within which a waypoint is at an object; some stay short of it."""
+"""Meters in the plane within which a waypoint counts as at an object; some end short of it."""
 FREE_HEIGHT = 0.09
 """Tool height above which a disturbed waypoint touches nothing, m."""
 UP = 0.05
-"""Meters by which a move rises to be one straight up."""
+"""Meters that a move straight up rises, at least."""
 ASIDE = 0.06
-"""Meters aside within which it still is."""
+"""Meters that it goes aside, at most."""
 _TURNS = {"pick_cube": "align", "pick_container": "align", "press": "home", "hover": "home"}
 """How the tool turns when it moves to the object of a motion; else it keeps its angle."""
 _YAW = 5
-"""Place of the angle about the vertical in a waypoint."""
+"""Index of the angle about the vertical in a waypoint."""
 
 
 class Disturbance(NamedTuple):
-    """How far executed waypoints lie from the expert's; labels stay the expert's own.
+    """How often and how far executed waypoints lie from the expert's, at random.
 
     Attributes:
         free: probability that a waypoint in free space is moved.
-        plane: standard deviation of that in x and y, m.
-        height: of that in z, m.
-        turn: of that about the vertical, rad.
+        plane: standard deviation of that displacement in x and y, m.
+        height: its standard deviation in z, m.
+        turn: its standard deviation about the vertical, rad.
         low: probability that a grasp or placement is moved, far enough to miss at times.
-        miss: standard deviation of that in x and y, m.
-        stall: probability that a move is not made, but the tool stays where it is once.
+        miss: standard deviation of that displacement in x and y, m.
+        stall: probability that a move is not made: the tool stays where it is, and the same move
+            comes next.
     """
 
     free: float = 0.5
@@ -75,8 +81,10 @@ class ExpertWaypoint(NamedTuple):
 
     Attributes:
         action: (7,) the waypoint, undisturbed.
-        anchor: name of the object at whose place it is; None for the place of the tool.
-        turn: how the tool turns: ``keep``, ``align`` with the anchor, or ``home``.
+        anchor: name of the object that the waypoint is at; None for one in free space, or where
+            the tool is already.
+        turn: how the tool turns on the way: ``keep`` its angle, ``align`` with the anchor, or
+            ``home``, to the angle at the start of the episode.
     """
 
     action: CheckedActions
@@ -91,9 +99,9 @@ class WaypointExpert(OraclePolicy):
     show how to recover; what has failed is tried again.
 
     Attributes:
-        last: the decision that `act` has just made.
-        labels: (1, 7) what the expert would have done instead of the action that `act` has just
-            returned: the same, unless it or the move before the gripper's action is disturbed.
+        last: the decision behind the action that `act` has returned last.
+        labels: (1, 7) what the undisturbed expert would have done instead of that action: the same,
+            unless it is disturbed, or the gripper opens or closes after a disturbed move.
     """
 
     actions: ClassVar[str] = WAYPOINT.name
@@ -105,24 +113,26 @@ class WaypointExpert(OraclePolicy):
         self._disturbance = disturbance
 
     def make_primitives(self, env: RoboIRGEnv) -> MotionPrimitives:
-        """Return the expert that executes the stages, without the retry in a narrow grip."""
+        """Return what plans the stages' motions: the scripted expert's without narrow grips."""
         self._primitives = _WaypointPrimitives(env.session.world)
         return self._primitives
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
-        """Return the episode's goal; the instruction is ignored."""
-        self._gripper = OPEN
-        self._waits = 0
-        self._stalled: ExpertWaypoint | None = None
+        """Return the episode's goal, and begin anew; the instruction is ignored."""
+        self._gripper = OPEN  # its value after the last decision
+        self._waits = 0  # decisions left that only let time pass
+        self._stalled: ExpertWaypoint | None = None  # a move that is still to be made
+        # The undisturbed waypoint (7,) of the last move, if that was disturbed.
         self._missed: NDArray[np.float64] | None = None
         self._rng = np.random.default_rng((env.episode.seed, self.seed))
         return super().decide(env, instruction)
 
     def act(self, observation: Observation) -> Actions:  # noqa: ARG002
-        """Return the next waypoint (1, 7), perhaps disturbed; `last` is the undisturbed one.
+        """Return the next waypoint (1, 7), perhaps disturbed, and set `last` and `labels`.
 
         A disturbance either lets the tool stay once where it is (a stall, after which the same
-        decision is tried again), or moves the waypoint.
+        decision is tried again), or moves the waypoint. Only moves are disturbed, not waypoints at
+        which the gripper opens or closes.
         """
         decided = self._stalled or self._next()
         self._stalled = None
@@ -148,8 +158,8 @@ class WaypointExpert(OraclePolicy):
     def _next(self) -> ExpertWaypoint:
         """Return the next decision; after the last one the tool stays where it is.
 
-        Trajectories that move neither tool nor gripper give no decision; in a stage that takes a
-        time, they become waits.
+        The trajectories of the expert are taken one by one. One that moves neither tool nor gripper
+        gives no decision; in a stage that takes a time, it becomes decisions to wait.
         """
         if self._waits:
             self._waits -= 1
@@ -160,7 +170,7 @@ class WaypointExpert(OraclePolicy):
             if decided is not None:
                 return decided
             if stage is not None and stage.primitive.steps:
-                # Where something is held until a step, at least one wait lets the time pass.
+                # Where the stage waits for a step, at least one wait lets the time pass.
                 least = 1 if stage.primitive.kind == "hold_until" else 0
                 self._waits = max(round(len(chunk) / WAIT_STEPS), least)
             if self._waits:
@@ -168,15 +178,14 @@ class WaypointExpert(OraclePolicy):
         return ExpertWaypoint(self._here(LEAVE))
 
     def _waypoint(self, chunk: JointTrajectory) -> ExpertWaypoint | None:
-        """Return the waypoint that replaces a trajectory of the expert.
+        """Return the decision that replaces a trajectory of the expert, (n, 8) joint targets.
 
         If the arm moves, that is the pose at its end; if the gripper opens or closes, the present
-        pose with its new value. A trajectory that does neither has none (None).
+        pose with the gripper's new value. None for a trajectory that does neither.
         """
         arm = chunk[:, :ARM_JOINTS]
         gripper = float(chunk[-1, ARM_JOINTS])
-        is_arm_still = np.abs(arm - arm[0]).max() < STILL
-        if not is_arm_still:
+        if np.abs(arm - arm[0]).max() >= STILL:
             return self._move_to(self._pose_at(arm[-1], LEAVE))
         if gripper not in (OPEN, CLOSED) or gripper == self._gripper:
             return None
@@ -184,10 +193,10 @@ class WaypointExpert(OraclePolicy):
         return ExpertWaypoint(self._here(gripper))
 
     def _move_to(self, action: CheckedActions) -> ExpertWaypoint:
-        """Return the decision to move to a pose, with the object that the pose is at.
+        """Return the decision to move to a waypoint (7,), with the object that the waypoint is at.
 
-        That object is its `anchor`, the one that the motion picks up or places something on. A move
-        straight up, and one that ends away from the object, has none.
+        That object, its `anchor`, is the one that the present stage picks up, presses or places
+        something on. A move straight up, and one that ends away from the object, has none.
         """
         world = self.env.session.world
         tool = np.asarray(world.robot.tool_pose.p)
@@ -205,19 +214,20 @@ class WaypointExpert(OraclePolicy):
         return ExpertWaypoint(action, anchor, _TURNS.get(primitive.kind, "keep"))
 
     def _here(self, gripper: float) -> CheckedActions:
-        robot = self.env.session.world.robot
-        return self._pose_at(robot.arm_positions, gripper)
+        """Return the waypoint (7,) at which the tool is, with a gripper value."""
+        return self._pose_at(self.env.session.world.robot.arm_positions, gripper)
 
     def _pose_at(self, arm: NDArray[np.floating[Any]], gripper: float) -> CheckedActions:
-        """Return the waypoint at joint positions (7)."""
+        """Return the waypoint (7,) at joint positions (7,), with a gripper value."""
         position, rotation = self._primitives.tool_at(np.asarray(arm, np.float64))
         return np.concatenate([position, rotation.as_euler("xyz"), [gripper]])
 
     def _disturb(self, action: CheckedActions) -> CheckedActions:
-        """Return a waypoint, moved at random with the probability of `Disturbance`.
+        """Return a waypoint (7,), perhaps moved at random; see `Disturbance`.
 
-        In free space it may be moved far and turned; near the objects only a little and in the
-        plane. Waypoints at which the gripper opens or closes stay where they are.
+        In free space it may be moved in all directions and turned; near the objects in x and y
+        only. Waypoints at which the gripper opens or closes stay where they are. Random numbers are
+        drawn in a fixed order, on which stored demonstrations depend.
         """
         disturbance = self._disturbance
         rng = self._rng
@@ -235,52 +245,56 @@ class WaypointExpert(OraclePolicy):
 
 
 def _distance_in_plane(point: NDArray[np.floating[Any]], other: Any) -> float:  # noqa: ANN401
-    """Return how far apart two points are on the table, m; what follows x and y does not count."""
+    """Return the distance of two points in x and y, m; what else they hold does not count."""
     x, y = point[:2] - other[:2]
     return float(np.hypot(x, y))
 
 
 class JointWaypointExpert(WaypointExpert):
-    """The same expert in joint angles, which go where those of its waypoints go.
+    """The `WaypointExpert` in joint angles: actions are the joint targets on the way to waypoints.
 
-    `labels` are (n, 8): the targets of the undisturbed way after as many control steps, planned
-    from where the disturbed one begins; after its end, that end. As both begin together, they lead
-    from where the robot has been moved back to the expert's way.
+    `labels` are (n, 8), one for each executed row: the joint targets on the way to the undisturbed
+    waypoint. Both ways begin where the robot is, so that labels lead back to the expert's way from
+    where a disturbance has moved the robot.
     """
 
     actions: ClassVar[str] = JOINT_ANGLE.name
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
-        """Return the episode's goal; the instruction is ignored."""
+        """Return the episode's goal, and begin anew; the instruction is ignored."""
         self._controller = WaypointController(env.session.world.robot)
-        self._moves: Iterator[JointTrajectory] = iter(())
-        self._way: JointTrajectory | None = None
+        # What is left of the way to the waypoint, as trajectories.
+        self._trajectories: Iterator[JointTrajectory] = iter(())
+        # What is left of the way to the undisturbed waypoint (n, 8); None if nothing is disturbed.
+        self._wanted_path: JointTrajectory | None = None
         return super().decide(env, instruction)
 
     def act(self, observation: Observation) -> Actions:
-        """Return the joint targets (n, 8) of the next waypoint, perhaps disturbed.
+        """Return joint targets (n, 8) on the way to the next waypoint, and set `labels` (n, 8).
 
-        `labels` (n, 8) are the targets on the way to where the expert wanted to go: the returned
-        ones, unless the waypoint was disturbed.
+        One call returns the move to the waypoint, and the next one the gripper's action there, if
+        there is one.
         """
-        executed = next(self._moves, None)
+        executed = next(self._trajectories, None)
         if executed is None:
             (action,) = super().act(observation)
             (wanted,) = self.labels
-            self._way = None if np.array_equal(action, wanted) else self._way_of(wanted)
-            self._moves = self._controller.trajectories(action)
-            executed = next(self._moves)
-        if self._way is None:
+            self._wanted_path = None
+            if not np.array_equal(action, wanted):
+                self._wanted_path = self._path_to(wanted)
+            self._trajectories = self._controller.trajectories(action)
+            executed = next(self._trajectories)
+        if self._wanted_path is None:
             self.labels = executed
         else:
-            last = len(self._way) - 1
-            # If the undisturbed way is shorter, its last target is repeated.
-            self.labels = self._way[np.minimum(np.arange(len(executed)), last)]
-            self._way = self._way[min(len(executed), last) :]
+            # As many rows of this path as are executed; if it is shorter, its end is repeated.
+            last = len(self._wanted_path) - 1
+            self.labels = self._wanted_path[np.minimum(np.arange(len(executed)), last)]
+            self._wanted_path = self._wanted_path[min(len(executed), last) :]
         return executed
 
-    def _way_of(self, waypoint: CheckedActions) -> JointTrajectory:
-        """Return the joint targets (n, 8) on the way to a waypoint, and of the gripper there."""
+    def _path_to(self, waypoint: CheckedActions) -> JointTrajectory:
+        """Return joint targets (n, 8): the move to a waypoint (7,), then its gripper action."""
         move = next(self._controller.trajectories(waypoint))
         if waypoint[-1] == LEAVE:
             return move
@@ -289,13 +303,17 @@ class JointWaypointExpert(WaypointExpert):
 
 
 class _WaypointPrimitives(MotionPrimitives):
-    """The expert's primitives; a failed grasp is repeated as a whole, with open fingers."""
+    """The expert's motions for waypoints, whose gripper is either open or closed.
+
+    A failed grasp is repeated as a whole, with open fingers, and not with narrower ones.
+    """
 
     def _grasp_and_lift(self, cube: str, opening: float) -> Iterator[JointTrajectory]:
+        """Yield the trajectories of a grasp; none for an attempt with narrower fingers."""
         if opening == OPEN:
             yield from super()._grasp_and_lift(cube, opening)
 
     def tool_at(self, arm: NDArray[np.float64]) -> tuple[NDArray[np.float64], Rotation]:
-        """Return position (m) and rotation of the tool at joint positions (7)."""
+        """Return position (3,), m, and rotation of the tool at joint positions (7,)."""
         pose = self._planner.forward_kinematics(arm)
         return pose.position, pose.rotation
