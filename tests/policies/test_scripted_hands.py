@@ -127,7 +127,7 @@ def test_a_subgoal_with_a_point_means_the_object_at_the_point_despite_its_words(
     row, column = origin_pixel(other)
     # What has missed is done again, also where the same is meant in other words.
     hands.follow(f"pick up the cube at <{row}, {column}>")
-    hands._underway.chunks = iter(())
+    hands._underway.moves = iter(())
     end = follow_to_the_end(env, hands, f"pick up the red cube at <{row}, {column}>")
     assert (end.how, end.thing) == ("done", other.item.name)
     assert end.thing != red.item.name
