@@ -41,7 +41,7 @@ def letter_in(text):
 
 def subgoal_in(text):
     options = StatelessOptions(model=ModelOptions(model="m"))
-    return StatelessPlanner(options, "stateless").take(text)
+    return StatelessPlanner(options, "stateless").read_reply(text)
 
 
 READERS = {"goal": goal_in, "letter": letter_in, "subgoal": subgoal_in}

@@ -1,4 +1,4 @@
-"""Planners, made from a kind and options."""
+"""Planners, which name the next subgoal for a policy; made from a kind and options."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ PLANNERS: Mapping[str, str] = {
     **dict.fromkeys(_OF_GOALS, f"{_HERE}.goal_planner:GoalPlanner"),
     **OF_MODELS,
 }
-"""Import paths of the classes; ``options_type`` is the type of a class's options."""
+"""Import path of the class for each kind. A class says in ``options_type`` which options it has."""
 
 
 def make_planner(kind: str, options: Mapping[str, Any], origin: str, seed: int = 0) -> Planner:
-    """Make a planner.
+    """Return a new planner; its model, if it has one, is not connected yet.
 
     Args:
         kind: one of `PLANNERS`.
-        options: of that kind.
+        options: of that kind, by name; values may be text, ``{"video_frames": "4"}``.
         origin: of the options, for error messages.
         seed: of its own random choices.
 

@@ -1,4 +1,4 @@
-"""The planner that knows the task's own order of subgoals, and understands the words by a rule."""
+"""The planner that understands the words by a rule, and names the stages of the goal in order."""
 
 from __future__ import annotations
 
@@ -20,11 +20,16 @@ if TYPE_CHECKING:
 class GoalPlanner(OraclePlanner):
     """Names the stages of the goal that a built-in policy decides on. Privileged.
 
-    The next one follows when the last is done; one that came to nothing is repeated. Of hands that
-    do not report how subgoals end, it sees in the world what is completed.
+    The next one follows when the last is done; one without effect is repeated. If the policy that
+    follows does not report how subgoals end, it sees in the simulator what is completed.
 
-    Words are its only skill: it knows the task and the scene, but not the goal. Where the rule
-    gives no goal of the scene, and before everything has been said, it names nothing.
+    It knows the task and the scene, but not the goal. Where the rule gives no goal of the scene,
+    and before everything has been said, it names nothing.
+
+    Args:
+        options: whether subgoals have pixels.
+        kind: name of the built-in policy, such as ``listener``, that decides on the goal.
+        seed: of its random choices.
     """
 
     def __init__(
@@ -41,19 +46,19 @@ class GoalPlanner(OraclePlanner):
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode; decide on a goal if everything has been said."""
-        self._index = 0
+        self._index = 0  # of the stage to name
         self._retries = 0
-        self._since: int | None = None
+        self._since: int | None = None  # control step of the world from which on facts count
         self._decider.reset(instruction, demonstration)
 
     def hear(self, text: str, step: int) -> None:
-        """Remember an utterance, and decide on a goal after the last one."""
+        """Remember an utterance, and decide on a goal if it was the last one."""
         self._decider.hear(text, step)
 
     def learn(self, end: SubgoalEnd) -> None:
-        """Go on to the next stage, or repeat one that came to nothing.
+        """Go on to the next stage if the last one was done, or repeat it if it had no effect.
 
-        A stage that was refused, or failed too often, ends the planning: no stage comes after it.
+        A stage that was refused, or failed after `MAX_RETRIES` retries in all, ends the planning.
         """
         stages = self._decider.stages
         if end.how == "done":
@@ -67,9 +72,9 @@ class GoalPlanner(OraclePlanner):
             self._index = len(stages)
 
     def plan(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
-        """Return the next stage in words, as things are now; None after the last.
+        """Return the stage to do in words, as things are now; None after the last or for no goal.
 
-        If the hands do not report how subgoals end, the world shows how many stages are completed.
+        If nobody reports how subgoals end, the simulator shows how many stages are completed.
         """
         stages = self._decider.stages
         if stages and not self.reports:

@@ -1,4 +1,4 @@
-"""A planner and a low-level policy as one policy."""
+"""A planner, which names subgoals, and a low-level policy, which follows them, as one policy."""
 
 from __future__ import annotations
 
@@ -40,10 +40,12 @@ MOST_REFUSALS = 5
 
 
 class PlannerParts:
-    """What a planner, alone or with a policy, does as a policy.
+    """Base class of policies that consist of a planner, and mostly of a policy that follows it.
+
+    What all parts have, such as costs, is joined here.
 
     Args:
-        parts: the planner, and the policy that follows it, if there is one here.
+        parts: the planner, then the policy, if there is one in this process.
     """
 
     def __init__(self, *parts: object) -> None:
@@ -51,16 +53,16 @@ class PlannerParts:
 
     @property
     def version(self) -> str:
-        """The versions of all, which they may set until their `reset` ends."""
+        """The versions of all parts as one text; they may set them until their `reset` ends."""
         return joint_version(*self._all)
 
     def hear(self, text: str, step: int) -> None:
-        """Pass an utterance on to all that remember language."""
+        """Pass an utterance on to all parts that remember language."""
         for part in self._all:
             tell_policy(part, [{"text": text, "step": step}])
 
     def usage(self) -> dict[str, float]:
-        """Return the costs of planner and policy, added up by name."""
+        """Return the costs of all parts, added up by name: ``{"calls": 3.0, ...}``."""
         total: Counter[str] = Counter()
         for part in self._all:
             if hasattr(part, "usage"):
@@ -68,17 +70,20 @@ class PlannerParts:
         return dict(total)
 
     def close(self) -> None:
-        """Close all, the others even if closing one fails."""
+        """Close all parts, the others even if closing one fails."""
         with contextlib.ExitStack() as stack:
             for part in reversed(self._all):
                 stack.callback(close_policy, part)
 
 
 class HierarchicalPolicy(PlannerParts):
-    """Gets a subgoal from the planner before each chunk and passes it to the policy.
+    """Gets a subgoal from the planner before each chunk of actions, and passes it to the policy.
 
     The needs of both are merged: the environment shows what either needs, and each receives its
     own part. Costs are added. Together they are privileged if either is.
+
+    If the policy reports how subgoals end, a planner that learns from it gets each end before the
+    next subgoal is asked for.
 
     Args:
         planner: names subgoals.
@@ -86,8 +91,8 @@ class HierarchicalPolicy(PlannerParts):
         name: of the system, for the records.
 
     Attributes:
-        needs: of both.
-        subgoal: the planner's newest, for the records.
+        needs: of both, merged.
+        subgoal: the planner's newest, for the records; None before the first.
         reports: whether the policy reports how subgoals end.
         endings: how subgoals ended, if the policy reports it.
 
@@ -146,12 +151,13 @@ class HierarchicalPolicy(PlannerParts):
         self._step = 0
         """Control steps of the policy so far."""
         self._observed = 0
-        """Observations in the histories so far."""
+        """Observations in all histories so far."""
         self._rows = 0
-        """Actions of the last chunk."""
+        """Number of actions of the last chunk."""
         self._reported = 0
-        """Ends of subgoals that the planner has got."""
+        """How many of `endings` the planner has got."""
         self._gave_up = False
+        """Whether the planner is asked no more."""
         subset = functools.partial(
             DemonstrationSubset, demonstration, self.needs.demonstration_frames
         )
@@ -161,28 +167,29 @@ class HierarchicalPolicy(PlannerParts):
     def act(self, observation: Observation) -> Actions:
         """Pass the planner's subgoal to the policy, and return the policy's actions.
 
-        Each of the two sees its own part of the history.
+        Each of the two sees the part of the history that it needs.
         """
-        every = self.needs.observe_every
-        # Control steps since the last call: as many as rows were returned, unless an action takes
-        # several; then the history, with an observation every so many steps, shows them.
+        period = self.needs.observe_every  # control steps between observations of the history
         history = observation.get("history", ())
         if self._many_steps:
-            self._step += len(history) * (1 if every is None else every)
+            # An action takes several control steps; only the history shows how many.
+            steps_between = period or 1
+            self._step += len(history) * steps_between
         else:
             self._step += self._rows
-        select = functools.partial(select_history, observation, self._observed, every)
+        select = functools.partial(select_history, observation, self._observed, period)
         self._observed += len(history)
         if not self._gave_up:
-            self._lead(select(self._planner_needs.observe_every))
+            self._pass_subgoal_on(select(self._planner_needs.observe_every))
         rows = self.policy.act(select(self._policy_needs.observe_every))
         self._rows = len(np.atleast_2d(rows))
         return rows
 
-    def _lead(self, view: Observation) -> None:
-        """Pass the planner's subgoal to the policy; ask the planner again if it is refused.
+    def _pass_subgoal_on(self, view: Observation) -> None:
+        """Ask the planner for a subgoal and pass it to the policy, again as long as it is refused.
 
-        After `MOST_REFUSALS` in a row, the planner is not asked any more in this episode.
+        After `MOST_REFUSALS` in a row, the planner is not asked any more in this episode. `view` is
+        the observation with the planner's part of the history.
         """
         if isinstance(self.policy, ReportingFollower):
             self.policy.settle()
@@ -196,13 +203,13 @@ class HierarchicalPolicy(PlannerParts):
             new_ends = self.endings[self._reported :]
             if not any(end.how == "refused" for end in new_ends):
                 return
-            # The planner has the history already.
+            # The next call is at the same step, and the planner has seen the history.
             view = cast("Observation", {**view, "history": ()})
         self._report_endings()
         self._gave_up = True
 
     def _report_endings(self) -> None:
-        """Report how subgoals ended since the last call to a planner that learns from it."""
+        """Tell a planner that learns from it how subgoals have ended since the last call."""
         new_ends = self.endings[self._reported :]
         self._reported += len(new_ends)
         if hasattr(self.planner, "learn"):
@@ -223,6 +230,9 @@ def _attach(parts: tuple[object, ...], env: RoboIRGEnv) -> None:
 
 
 def joint_version(*parts: object) -> str:
-    """Return the versions of a planner and its policy as one; of a part's file if it has none."""
+    """Return the versions of a planner and its policy as one text, in their order.
+
+    A part without a version counts with the fingerprint of its file.
+    """
     versions = [read_version(part) or file_fingerprint(part) or UNKNOWN_VERSION for part in parts]
     return BETWEEN_VERSIONS.join(versions)

@@ -1,4 +1,7 @@
-"""The four planners that query a model: what each keeps of an episode, and what it asks."""
+"""The four planners that query a model: what each remembers of an episode, and what it asks.
+
+See `VLMPlanner` for when their methods are called.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ from roboirg.util.reply_reading import UnparsableReplyError, json_object, text_o
 TEXT: Mapping[str, Any] = {"type": "string"}
 """Schema of a field with words."""
 MIN_CLIP_FRAMES = 4
-"""With fewer frames a conversation gets only the last, as a picture."""
+"""With fewer frames a turn of a conversation gets only the last one, as a picture."""
 MAX_GAP = 8
 """Largest gap between neighbors of a group, control steps (MME-VLA; a comment there says 10)."""
 
@@ -41,7 +44,12 @@ class QwenOptions(PlannerOptions):
 
 
 class QwenPlanner(VLMPlanner[QwenOptions]):
-    """Remembers the subgoals that it named: QwenVL-style. Points come in box tokens."""
+    """Remembers the subgoals that it named: QwenVL-style. Points come in box tokens.
+
+    The subgoals in `holds` are kept up to a control step, as the model tends to consider them
+    reached too early. They are MME-VLA's rules for ButtonUnmask and ButtonUnmaskSwap, by the text
+    of the subgoal, as a policy does not know its task. Only these tasks have such subgoals.
+    """
 
     options_type = QwenOptions
     holds: ClassVar[Mapping[str, int]] = {
@@ -49,15 +57,12 @@ class QwenPlanner(VLMPlanner[QwenOptions]):
         "press the first button": 100,
         "press the second button": 250,
     }
-    """The model tends to consider these reached too early: MME-VLA's rules for ButtonUnmask and
-    ButtonUnmaskSwap, by the text of the subgoal, as a policy does not know its task. Only these
-    tasks have such subgoals."""
 
     def forget(self) -> None:
-        """Forget the subgoals."""
+        """Forget the subgoals, which are kept as the model has written them."""
         self._history: list[str] = []
 
-    def query(self, observation: Observation) -> ModelQuery:
+    def make_query(self, observation: Observation) -> ModelQuery:
         """Return a query with demonstration, task, past subgoals and the newest picture."""
         said = self.fill("first")
         if self._history:
@@ -66,18 +71,18 @@ class QwenPlanner(VLMPlanner[QwenOptions]):
             said = self.fill("history", history="; ".join(past))
         parts = [
             *self.video_parts(self.options.video_frames),
-            self.goal(),
+            self.instruction_prompt(),
             said,
             self.fill("now"),
             Picture(front_picture(observation)),
-            self.fill("question", **self.forms()),
+            self.fill("question", **self.subgoal_prompts()),
         ]
-        return self.single(parts)
+        return self.single_turn_query(parts)
 
-    def take(self, text: str) -> str:
+    def read_reply(self, text: str) -> str:
         """Return the subgoal in a reply; add it to the history unless it repeats the last one.
 
-        Points do not count: the same words with another point are the same subgoal.
+        The same words with another point are the same subgoal.
         """
         subgoal = parse_points(text)
         words, _ = split_point(subgoal)
@@ -92,8 +97,8 @@ class QwenPlanner(VLMPlanner[QwenOptions]):
 class GeminiOptions(PlannerOptions):
     """Options of the planner in Gemini's style.
 
-    MME-VLA has the pause for the tasks with a long first action (eight of ours, all but StopCube,
-    VideoUnmask and VideoUnmaskSwap); a policy does not know its task, so it holds for all.
+    MME-VLA has the first pause for the tasks with a long first action (eight of ours, all but
+    StopCube, VideoUnmask and VideoUnmaskSwap); a policy does not know its task, so all have it.
 
     Attributes:
         observe_every: control steps between the frames of clips.
@@ -118,19 +123,19 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
 
     def forget(self) -> None:
         """Begin a new conversation, without frames of the last episode."""
-        self._frames: list[Pixels] = []
-        self._turns: list[ChatTurn] = []
-        self._quoted = ""
+        self._frames: list[Pixels] = []  # since the last turn
+        self._turns: list[ChatTurn] = []  # with usable replies, each followed by its reply
+        self._quoted = ""  # the instruction as far as the conversation has quoted it
 
     def watch(self, observation: Observation, step: int) -> None:
-        """Keep the frames since the last call."""
+        """Keep the front camera's frames since the last call."""
         frames = [front_picture(earlier) for earlier in observation.get("history", ())]
         # The last picture is in the history only if the chunk ends at a multiple of the period.
         if not frames or step % self.options.observe_every:
             frames.append(front_picture(observation))
         self._frames += frames
 
-    def query(self, observation: Observation) -> ModelQuery:
+    def make_query(self, observation: Observation) -> ModelQuery:
         """Return a query with one more turn, which has the frames since the last turn.
 
         Only in the first turn the model has to list all subgoals (``subgoal_sequence``).
@@ -142,13 +147,16 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
         else:
             fields = {"subgoal_sequence": _list_of(TEXT), "subgoal": TEXT}
         self._turn = ChatTurn("user", tuple(self._parts()))
-        system = self.fill("system", **self.forms())
+        system = self.fill("system", **self.subgoal_prompts())
         return ModelQuery(system, (*self._turns, self._turn), object_schema(fields))
 
-    def take(self, text: str) -> str:
-        """Return the subgoal, the last one if all is done; keep the turn and its reply."""
+    def read_reply(self, text: str) -> str:
+        """Return the subgoal in a reply; keep the turn and the reply in the conversation.
+
+        If the model says that all is done, it is the last subgoal again.
+        """
         subgoal = parse_points(text_of(json_object(text), "subgoal"))
-        if self.finishes(subgoal):
+        if self.says_complete(subgoal):
             subgoal = str(self.subgoal)
         self._turns += [self._turn, ChatTurn("model", (text,))]
         self._quoted = self.instruction
@@ -156,7 +164,7 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
         return subgoal
 
     def _parts(self) -> Iterator[Part]:
-        """Yield the parts of a turn: what is said if that is new, the frames, and the question.
+        """Yield the parts of a turn: the instruction if that is new, the frames, and the question.
 
         The first turn shows the demonstration as a clip, with the first frame at its end. A later
         turn shows a clip if there are enough frames, else only the newest frame as a picture.
@@ -173,7 +181,7 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
             if self.video is not None:
                 frames = [*self.video, *frames]
         if self._quoted != self.instruction:  # the first turn, or more has been said since
-            yield self.goal()
+            yield self.instruction_prompt()
         if has_clip:
             yield self.fill(clip_prompt)
             yield Clip(np.stack(frames), Fraction(VIDEO_RATE, self.options.observe_every))
@@ -188,10 +196,11 @@ class MemerOptions(PlannerOptions):
 
     Attributes:
         video_frames: maximum of demonstration frames.
-        recent: recent frames that are sent along with key frames, the newest included.
-        observe_every: control steps between them.
-        near: largest gap between the key frames of one event, control steps.
-        most: maximum of key frames, the newest; None keeps all, like MME-VLA.
+        recent: number of recent frames that are sent along with key frames, the newest included.
+        observe_every: control steps between recent frames.
+        near: largest gap between neighboring key frames of one event, control steps; of these, one
+            is kept.
+        most: maximum of key frames, of which the newest are kept; None keeps all, like MME-VLA.
     """
 
     video_frames: int = Field(default=10, ge=1)
@@ -205,48 +214,50 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
     """Remembers the frames that the model chooses among the recent ones: MemER-style.
 
     Attributes:
-        frames: the key frames by control step.
+        frames: the chosen ones, called key frames, by control step.
     """
 
     options_type = MemerOptions
 
     def forget(self) -> None:
-        """Clear the memory."""
+        """Forget key frames and recent frames."""
         self.frames: dict[int, Pixels] = {}
         self._recent: dict[int, Pixels] = {}
         self._last_step = 0
 
     def watch(self, observation: Observation, step: int) -> None:
-        """Keep the frames to send: the newest, and the one of each period before it.
+        """Keep the recent frames: the newest, and the one of each period before it.
 
         With a period of 16 steps and three frames, at step 50 these are of the steps 50, 34 and 18,
         or where there is no frame of a step, the last one before it.
         """
-        every = self.options.observe_every
+        period = self.options.observe_every
         for earlier in observation.get("history", ()):
-            self._last_step += every
+            self._last_step += period
             self._recent[self._last_step] = front_picture(earlier)
         self._recent[step] = front_picture(observation)
 
-        kept: set[int] = set()
-        for periods in range(self.options.recent):
-            latest = step - periods * every
-            steps_until = [kept_step for kept_step in self._recent if kept_step <= latest]
+        kept_steps: set[int] = set()
+        for number in range(self.options.recent):
+            wanted = step - number * period
+            steps_until = [seen for seen in self._recent if seen <= wanted]
             if steps_until:
-                kept.add(max(steps_until))
-        self._recent = {kept_step: self._recent[kept_step] for kept_step in sorted(kept)}
+                kept_steps.add(max(steps_until))
+        # Ascending, so that positions in a reply count from the oldest.
+        self._recent = {kept: self._recent[kept] for kept in sorted(kept_steps)}
 
-    def query(self, observation: Observation) -> ModelQuery:  # noqa: ARG002
-        """Show the demonstration, the task, the key frames and the recent frames."""
+    def make_query(self, observation: Observation) -> ModelQuery:  # noqa: ARG002
+        """Return a query with the demonstration, the task, the key frames and the recent frames."""
         position = {"type": "integer", "enum": list(range(1, len(self._recent) + 1))}
         fields = {"current_subtask": TEXT, "keyframe_positions": _list_of(position)}
-        return self.single(self._parts(), object_schema(fields))
+        return self.single_turn_query(self._parts(), object_schema(fields))
 
-    def take(self, text: str) -> str:
-        """Return the subgoal in a reply; remember the frames that it chooses.
+    def read_reply(self, text: str) -> str:
+        """Return the subgoal in a reply; remember the frames that the reply chooses as key frames.
 
-        It names positions in the recent frames, from 1 on. Of frames near each other one is kept,
-        and of all at most the newest `most`.
+        ``{"current_subtask": "press the button", "keyframe_positions": [1, 8]}`` chooses the oldest
+        and the newest of eight recent frames. Of key frames near each other one is kept
+        (`merge_keyframes`), and of all at most the newest ones.
         """
         reply = json_object(text)
         subgoal = parse_points(text_of(reply, "current_subtask"))
@@ -274,13 +285,13 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
     def _parts(self) -> Iterator[Part]:
         """Yield the parts of a query: video, what was said, key frames, recent frames, question."""
         yield from self.video_parts(self.options.video_frames)
-        yield self.goal()
+        yield self.instruction_prompt()
         for name, frames in (("remembered", self.frames), ("recent", self._recent)):
             yield self.fill(f"{name}_begin")
             for frame in frames.values():
                 yield Picture(frame)
             yield self.fill(f"{name}_end")
-        yield self.fill("question", count=str(len(self._recent)), **self.forms())
+        yield self.fill("question", count=str(len(self._recent)), **self.subgoal_prompts())
 
 
 class StatelessOptions(PlannerOptions):
@@ -289,7 +300,7 @@ class StatelessOptions(PlannerOptions):
     Attributes:
         video_frames: maximum of demonstration frames.
         observe_every: control steps between the remembered pictures.
-        past: maximum of remembered pictures, evenly spread.
+        past: maximum of remembered pictures in a query, evenly spread over all.
     """
 
     asked: Asked = WHEN_DONE
@@ -307,33 +318,36 @@ class StatelessPlanner(VLMPlanner[StatelessOptions]):
     options_type = StatelessOptions
 
     def forget(self) -> None:
-        """Forget the pictures."""
+        """Forget the pictures of the past."""
         self._past: list[Pixels] = []
 
     def watch(self, observation: Observation, step: int) -> None:  # noqa: ARG002
-        """Keep the pictures of the history."""
+        """Keep the front camera's pictures of the history."""
         self._past += [front_picture(earlier) for earlier in observation.get("history", ())]
 
-    def query(self, observation: Observation) -> ModelQuery:
-        """Show task, video, done subgoals, pictures of the past and the newest picture."""
-        return self.single(self._parts(observation))
+    def make_query(self, observation: Observation) -> ModelQuery:
+        """Return a query with task, video, ended subgoals, past pictures and the newest one."""
+        return self.single_turn_query(self._parts(observation))
 
-    def take(self, text: str) -> str:
-        """Return the subgoal in the last line with words of a reply; `FINISHED` at the end."""
+    def read_reply(self, text: str) -> str:
+        """Return the subgoal in the last line of a reply that has words.
+
+        `FINISHED` if it says that the task is complete.
+        """
         last_line = ""
         for line in text.splitlines():
             if normalize_subgoal(line):
                 last_line = line
         subgoal = parse_points(last_line)
-        return FINISHED if self.finishes(subgoal) else subgoal
+        return FINISHED if self.says_complete(subgoal) else subgoal
 
     def _parts(self, observation: Observation) -> Iterator[Part]:
-        """Yield the parts of a query: video, what was said, how subgoals ended, past, now."""
+        """Yield the parts of a query: video, instruction, ended subgoals, past pictures, now."""
         options = self.options
         if self.video is not None:
             yield self.fill("video")
             yield from _sheets(self.video, options.video_frames, 1)
-        yield self.goal()
+        yield self.instruction_prompt()
         if self.ends:
             lines = [f"{number}. {_in_words(end)}" for number, end in enumerate(self.ends, 1)]
             yield self.fill("history", history="\n".join(lines))
@@ -344,7 +358,7 @@ class StatelessPlanner(VLMPlanner[StatelessOptions]):
             yield from _sheets(np.stack(self._past), options.past, options.observe_every)
         yield self.fill("now")
         yield Picture(front_picture(observation))
-        yield self.fill("question", **self.forms())
+        yield self.fill("question", **self.subgoal_prompts())
 
 
 def _in_words(end: SubgoalEnd) -> str:
@@ -356,20 +370,21 @@ def _in_words(end: SubgoalEnd) -> str:
 
 
 def _sheets(frames: Pixels, most: int, every: int) -> Iterator[Picture]:
-    """Yield sheets of at most `most` evenly spread frames, each with its control step.
+    """Yield sheets, pictures of many small frames in rows, each frame with its control step.
 
     Args:
         frames: uint8 (T, height, width, 3).
-        most: maximum of frames on all sheets.
+        most: maximum of frames on all sheets, evenly spread over all frames.
         every: control steps between two frames, and before the first.
     """
-    kept = evenly_spaced(len(frames), most)
-    steps = [str((place + 1) * every) for place in kept]
+    kept = evenly_spaced(len(frames), most)  # indices
+    steps = [str((index + 1) * every) for index in kept]
     for sheet in contact_sheets(frames[kept], steps):
         yield Picture(sheet)
 
 
 def _list_of(item: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the JSON schema of a list of items with a schema."""
     return {"type": "array", "items": item}
 
 

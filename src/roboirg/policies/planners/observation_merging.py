@@ -1,7 +1,7 @@
-"""Select what a planner or its policy needs of an environment that serves both.
+"""Select what a planner, or its policy, needs of the observations of an environment for both.
 
-The environment shows what either needs: with every second observation for the planner and every
-third for the policy, that is every one.
+The environment shows what either needs: if the planner needs an observation every 2 control steps
+and the policy one every 3, it keeps one at every step, of which each gets its own.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ PICTURE_FIELDS = tuple(f"{camera}_{kind}" for camera in CAMERAS for kind in ("rg
 
 
 class DemonstrationSubset(Mapping[str, NDArray[Any]]):
-    """The frames of a demonstration that one of the two wants; rendered only when read.
+    """The fields of a demonstration with the frames that one of the two wants, rendered when read.
 
     Args:
         demonstration: of the environment.
-        available: its frames.
-        wanted: the frames to select.
+        available: which frames it has: ``"all"``, every n-th, or ``"none"``.
+        wanted: which frames to select, all or a multiple of those.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class DemonstrationSubset(Mapping[str, NDArray[Any]]):
         self._stride = max(_frames_between(wanted) // _frames_between(available), 1)
 
     def __getitem__(self, field: str) -> NDArray[Any]:
-        """Return the selected entries of a field."""
+        """Return the entries of a field: of pictures the selected ones, of other fields all."""
         if field in PICTURE_FIELDS:
             return self._all[field][:: self._stride]
         return self._all[field][:]
@@ -51,7 +51,7 @@ class DemonstrationSubset(Mapping[str, NDArray[Any]]):
 
 
 def _frames_between(frames: DemonstrationFrames) -> int:
-    """Return how far apart the frames of a video are; those of none count as all."""
+    """Return how far apart frames are: 1 for ``"all"``, 5 for every fifth; 1 for ``"none"``."""
     return 1 if frames in ("all", "none") else int(frames)
 
 
@@ -63,9 +63,9 @@ def select_history(
     A history with an observation every 2 steps, of which one every 4 is wanted, keeps every second.
 
     Args:
-        observation: of the environment.
-        earlier: observations in the earlier histories of this episode.
-        every: control steps between observations of the history.
+        observation: of the environment; its history is what was observed since the last one.
+        earlier: number of observations in the earlier histories of this episode.
+        every: control steps between observations of the history; None without a history.
         wanted: control steps between the wanted ones, a multiple of `every`; None for no history.
     """
     if every is None or wanted == every:
@@ -75,7 +75,7 @@ def select_history(
     if wanted is not None:
         stride = wanted // every
         chosen: list[Any] = []
-        # Observations are taken at multiples of the period, counted from the start of the turn.
+        # The n-th observation of the episode is at step n * every.
         for number, past in enumerate(history, start=earlier + 1):
             if number % stride == 0:
                 chosen.append(past)

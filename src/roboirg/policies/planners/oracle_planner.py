@@ -1,4 +1,4 @@
-"""The oracle planner: the environment's own subgoals."""
+"""The oracle planner: names the subgoals of the environment, which knows the goal."""
 
 from __future__ import annotations
 
@@ -18,14 +18,17 @@ if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 PRESS_STEPS = 28
-"""Control steps of a press from above the button until the button is down; it varies by two."""
+"""Control steps from the beginning of a press until the button is down, within two."""
 
 
 class OraclePlanner(AttachedPolicy):
-    """Returns the judge's current stage as a subgoal. Privileged.
+    """Names the stage of the true goal that is due, in words. Privileged.
 
-    To hands that report, it says how many steps to wait, and names the pick again where what it
-    carried was lost.
+    To a policy that reports how subgoals end (the scripted hands), it also says how many steps to
+    wait, and names a pick again where what was picked is lost.
+
+    Attributes:
+        reports: whether the policy reports so; set by the `HierarchicalPolicy` of both.
     """
 
     options_type: type[BaseModel] = SubgoalOptions
@@ -60,7 +63,7 @@ class OraclePlanner(AttachedPolicy):
         super().attach(env)
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
-        """Begin an episode."""
+        """Begin an episode, in which no subgoal has ended yet."""
         self._last: SubgoalEnd | None = None
 
     def learn(self, end: SubgoalEnd) -> None:
@@ -68,11 +71,10 @@ class OraclePlanner(AttachedPolicy):
         self._last = end
 
     def plan(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
-        """Return the stage that is due in words; None when there is none.
+        """Return the stage that is due in words; None when all are completed.
 
-        Hands that report how subgoals end get the stage before the due one again if that is what
-        has to be repeated: if the hand has lost what the stage handles, or if the stage before is
-        still the published one.
+        A policy that reports how subgoals end gets the stage before the due one if the hand has
+        lost what the due one handles, or if the environment still publishes the stage before.
         """
         judge = self.env.session.judge
         stage = judge.published
@@ -92,7 +94,9 @@ class OraclePlanner(AttachedPolicy):
 
 
 def stage_subgoal(env: RoboIRGEnv, stages: Sequence[Stage], index: int, *, grounded: bool) -> str:
-    """Return a stage as a subgoal for hands: with its object's origin, and with how long to wait.
+    """Return a stage as a subgoal in words, with the pixel of its object, and how long to wait.
+
+    For example ``pick up the red cube at <120, 87>``, or ``remain static for 40 steps``.
 
     Args:
         env: in the state to describe.
@@ -105,7 +109,7 @@ def stage_subgoal(env: RoboIRGEnv, stages: Sequence[Stage], index: int, *, groun
     stage = stages[index]
     world = env.session.world
     if stage.primitive.kind == "hold_until":
-        # A press that follows has its own step, at which it has to end: it begins earlier.
+        # A press that follows has to end at a step of its own, so it begins `PRESS_STEPS` earlier.
         until = stage.primitive.steps
         following = stages[index + 1].primitive
         if following.kind == "press_below":

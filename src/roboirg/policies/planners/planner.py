@@ -9,14 +9,16 @@ from pydantic import BaseModel, ConfigDict
 from roboirg.core.observations import Demonstration, Observation
 
 EACH_CHUNK, WHEN_DONE = "each-chunk", "when-done"
-"""When a planner is asked; ``every N steps`` is the third."""
+"""When a planner is asked: before each chunk of actions, or when a subgoal has ended or something
+was said. The third is ``every N steps``."""
 
 
 class SubgoalOptions(BaseModel):
     """Options of every planner of ours.
 
     Attributes:
-        subgoals: ``grounded``, with pixels of the objects, or ``simple``.
+        subgoals: ``grounded``, with the pixel of the object, ``pick up the cube at <120, 87>``, or
+            ``simple``, ``pick up the cube``.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -42,7 +44,7 @@ class Planner(Protocol):
         """Begin an episode."""
 
     def plan(self, observation: Observation, step: int) -> str | None:
-        """Return the subgoal from now on; None for none.
+        """Return the subgoal from now on, such as ``pick up the red cube``; None for none.
 
         Args:
             observation: now; its ``history`` follows the planner's own ``observe_every``.

@@ -1,4 +1,4 @@
-"""A planner as a policy, whose hands are in another process."""
+"""A planner alone as a policy: what follows its subgoals (its hands) is in another process."""
 
 from __future__ import annotations
 
@@ -18,13 +18,16 @@ _ACTION_SIZE = 8
 
 
 class PlannerAlone(PlannerParts):
-    """Names subgoals and does nothing; its process holds no world.
+    """Names subgoals and does nothing; its process holds no simulator.
+
+    The process of the hands sends observations with two more entries, ``step`` and ``ends``, and
+    reads `subgoal` after each call of `act`.
 
     Args:
-        planner: gets how subgoals ended (``ends``) and the ``step`` from observations.
+        planner: names the subgoals.
 
     Attributes:
-        subgoal: the newest.
+        subgoal: the planner's newest; None before the first, or for none.
     """
 
     def __init__(self, planner: Planner) -> None:
@@ -45,11 +48,11 @@ class PlannerAlone(PlannerParts):
         self.planner.reset(instruction, demonstration)
 
     def act(self, observation: Observation) -> NDArray[np.float64]:
-        """Let the planner name a subgoal; the returned action means nothing, as the hands act.
+        """Let the planner name a subgoal; the returned action (1, 8) means nothing.
 
         The process of the hands adds two entries to the observation, which are taken out before
-        the planner sees it: the ``step``, and how subgoals have ended since the last call
-        (``ends``), which a planner with the method ``learn`` gets.
+        the planner sees it: ``step``, the control steps so far, and ``ends``, how subgoals have
+        ended since the last call, which a planner with the method ``learn`` gets.
         """
         seen: dict[str, Any] = dict(observation)
         ends = seen.pop("ends")

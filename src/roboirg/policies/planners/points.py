@@ -12,7 +12,6 @@ from roboirg.core.observations import PICTURE_SIZE
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.util.reply_reading import UnparsableReplyError, answer_of
 
-"""Rows and columns of the front picture."""
 SCALE = 1000
 """The whole height or width in a model's coordinates."""
 
@@ -21,14 +20,14 @@ _POINT = re.compile(
     r"(?:<\|box_start\|>)?\(\s*(\d+)\s*,\s*(\d+)\s*\)(?:<\|box_end\|>)?|<\s*(\d+)\s*,\s*(\d+)\s*>"
 )
 _NO_WORDS = re.compile(r"[<>|{}\ud800-\udfff]")
-"""Signs of points and of JSON, and halves of surrogate pairs, which are no text."""
+"""Signs of points and of JSON, and halves of surrogate pairs: no subgoal in words has them."""
 _FINISHED = re.compile(r"\b(?:complete|completed|finished|done)\b")
 
 
 def to_pixel(value: int) -> int:
-    """Return a model's coordinate as a row or column, 0 to 255.
+    """Return a model's coordinate, 0 to `SCALE`, as a row or column of the picture, 0 to 255.
 
-    1000 is the far edge; MME-VLA converts it to 256, which is outside the picture.
+    500 becomes 128; 1000 is the far edge; MME-VLA converts it to 256, which is outside the picture.
     """
     return min(PICTURE_SIZE * value // SCALE, PICTURE_SIZE - 1)
 
@@ -36,8 +35,9 @@ def to_pixel(value: int) -> int:
 def parse_points(text: str) -> str:
     """Return the subgoal in a model's text, with its points in pixels, ``<row, column>``.
 
-    A model writes points as ``<y, x>``, or as box tokens ``<|box_start|>(y,x)<|box_end|>``, from
-    which servers may strip the tokens. All are replaced at once, so that none is replaced twice.
+    ``"Pick up the cube at <500, 250>."`` becomes ``pick up the cube at <128, 64>``. A model writes
+    points as ``<y, x>``, or as box tokens ``<|box_start|>(y,x)<|box_end|>``, from which servers may
+    strip the tokens. All are replaced at once, so that none is replaced twice.
 
     Raises:
         UnparsableReplyError: there is no subgoal, or its points are malformed.
@@ -56,13 +56,17 @@ def parse_points(text: str) -> str:
 def normalize_subgoal(text: str) -> str:
     """Return a model's subgoal in one line, without thoughts, quotes, full stop and end token.
 
-    It is in lower case, like all text that the policies were trained on.
+    ``'"Press the button."'`` becomes ``press the button``: in lower case, like all text that the
+    policies were trained on.
     """
     return " ".join(answer_of(text).split()).lower().strip("\"'`. ")
 
 
 def says_finished(subgoal: str) -> bool:
-    """Return whether a subgoal says that the task is complete, which policies do not know."""
+    """Return whether a subgoal says that the task is complete: *done*, *task completed*.
+
+    Policies that follow subgoals do not know such words.
+    """
     return _FINISHED.search(subgoal) is not None
 
 

@@ -1,4 +1,4 @@
-"""When a planner queries its model: before each chunk, every N steps, or after news.
+"""When a planner queries its model: before each chunk of actions, every N steps, or after news.
 
 *News* is that something was said, or that a subgoal ended.
 """
@@ -17,15 +17,15 @@ from roboirg.policies.planners.planner import EACH_CHUNK, WHEN_DONE
 Asked = Annotated[str, Field(pattern=rf"^({EACH_CHUNK}|{WHEN_DONE}|every [1-9]\d* steps)$")]
 """When a planner is asked, such as ``every 48 steps``."""
 MOST_USELESS = 5
-"""Unusable replies in a row after which a planner that is asked when done asks no more."""
+"""Unusable replies in a row after which a planner that is asked ``when-done`` asks no more."""
 
 
 class QuerySchedule:
     """Decides for each chunk of an episode whether a planner queries its model.
 
     Args:
-        asked: when it is queried.
-        first_pause: control steps before which there is no second query.
+        asked: when it is queried: ``each-chunk``, ``when-done`` or ``every N steps``.
+        first_pause: control steps of the episode before which there is no second query.
         holds: subgoals without points that are kept, and the last control steps at which they are.
 
     Attributes:
@@ -44,10 +44,15 @@ class QuerySchedule:
         self.useless = 0
 
     def is_due(self, subgoal: str | None, step: int) -> bool:
-        """Return whether to query the model now; called once for each chunk.
+        """Return whether to query the model now; to be called once for each chunk of actions.
 
-        A planner that is asked every N steps is due at the first chunk of each period; one that is
-        asked when a subgoal is done, after news. Without any subgoal yet, both are due.
+        With ``every N steps`` it is due at the first chunk of each period of N steps, with
+        ``when-done`` after news. Without any subgoal yet it is always due, but for a planner that
+        has given up.
+
+        Args:
+            subgoal: the present one; None for none.
+            step: control steps of the episode so far; it never decreases.
         """
         period = step // self._period
         begins_period = period > self._last_period
@@ -63,6 +68,6 @@ class QuerySchedule:
         return begins_period and not is_held
 
     def note_reply(self, *, is_useful: bool) -> None:
-        """Note a reply; one that was of no use leaves the news without an answer."""
+        """Note a reply; one that was of no use has not answered the news, which stay."""
         self.has_news = not is_useful
         self.useless = 0 if is_useful else self.useless + 1

@@ -1,4 +1,4 @@
-"""Systems: configurations of a policy and an optional planner, such as the paper's six."""
+"""Systems: a policy and mostly a planner, configured in TOML files, such as the paper's six."""
 
 from __future__ import annotations
 
@@ -22,15 +22,18 @@ PACKAGE, FOLDER = "roboirg.policies.planners", "system_files"
 SUFFIX = ".toml"
 
 SERVER, VLM, POLICY = "server", "vlm", "policy."
+"""Options of a system: the policy's address, the URL of the planner's model, and what stands before
+the policy's own options: ``policy.execute``."""
 
 
 class System(BaseModel):
-    """A system to evaluate.
+    """A low-level policy, and the planner that gives it subgoals.
 
     Attributes:
         name: as on the command line.
-        policy: spec of the low-level policy.
-        planner: ``kind`` and options of its planner, or None.
+        policy: spec of the low-level policy, ``openpi://localhost:8000``.
+        planner: ``kind`` and options of its planner, ``{"kind": "qwen", "video_frames": 4}``; None
+            without a planner.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -62,7 +65,10 @@ def all_systems() -> tuple[str, ...]:
 
 
 def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
-    """Load the configuration of a system.
+    """Return the system that a file configures, with some options replaced.
+
+    ``"GroundSG-QwenVL", {"server": "localhost:8001", "video_frames": "4"}`` replaces the address of
+    the policy, and an option of the planner.
 
     Args:
         name_or_file: a name such as ``GroundSG-QwenVL``, or a TOML file with the same entries.
@@ -77,7 +83,7 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
     origin = f"system {name_or_file}"
     system = check_options(System, _read_entries(name_or_file), origin)
 
-    # Each override is one of the policy's URL, or else one of the planner.
+    # Each override changes the URL of the policy, or else the planner.
     policy = system.policy
     planner_overrides: dict[str, str] = {}
     for option, value in overrides.items():
@@ -101,7 +107,10 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
 
 
 def _read_entries(name_or_file: str) -> dict[str, Any]:
-    """Return the entries of a system's TOML file, given as a path or by a name in this package."""
+    """Return the entries of a system's TOML file, which is a path or a name in this package.
+
+    ``{"name": "GroundSG-QwenVL", "policy": "mme-vla://...", "planner": {...}}``; not yet checked.
+    """
     file: Path | Traversable = Path(name_or_file)
     if name_or_file in all_systems():
         file = resources.files(PACKAGE).joinpath(FOLDER, f"{name_or_file}{SUFFIX}")

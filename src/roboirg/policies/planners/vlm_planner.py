@@ -1,4 +1,4 @@
-"""The planner that queries a vision-language model: when it asks, and what it does with answers."""
+"""Base class of planners that query a vision-language model (VLM) for the next subgoal."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from roboirg.util.media import Clip
 from roboirg.util.reply_reading import UnparsableReplyError
 
 FINISHED = ""
-"""Stands for the answer that the task is complete."""
+"""Subgoal that stands for the answer that the task is complete."""
 
 
 class PlannerOptions(SubgoalOptions):
@@ -33,7 +33,7 @@ class PlannerOptions(SubgoalOptions):
         model: the model and its options.
         asked: when it is queried: ``each-chunk``; ``when-done``, once its policy has reported the
             end of a subgoal, or something has been said; or ``every N steps``.
-        first_pause: control steps before which there is no second query.
+        first_pause: control steps of the episode before which there is no second query.
         prompts: a file with other prompts, or None for our own.
     """
 
@@ -49,18 +49,21 @@ Options = TypeVar("Options", bound=PlannerOptions)
 class VLMPlanner(ABC, Generic[Options]):
     """Queries a model for subgoals, with pictures of the front camera only.
 
-    If the model gives no usable subgoal even at the second try, the last one stays.
+    For each chunk of actions, `plan` lets it `watch` the observation; if a query is due
+    (`QuerySchedule`), it sends that of `make_query`, and `read_reply` finds the subgoal in the
+    reply. If the model gives no usable subgoal even at the second try, the last one stays. A
+    subclass says what it remembers, what it asks, and how it reads a reply.
 
     Args:
         options: when it asks, what it remembers, and its model.
         kind: name of its prompts, also for the records.
-        seed: unused.
+        seed: unused, as models have their own.
 
     Attributes:
         subgoal: the last one; None before the first, and when the task is complete.
-        instruction: everything that was said.
-        ends: how subgoals ended, each once.
-        video: the demonstration's frames; None without one.
+        instruction: everything that was said, joined by spaces.
+        ends: how subgoals ended, in order, without repetitions in a row.
+        video: the demonstration's frames, uint8 (T, height, width, 3); None without one.
 
     Raises:
         InvalidValueError: the prompts cannot be read.
@@ -86,7 +89,7 @@ class VLMPlanner(ABC, Generic[Options]):
 
     @property
     def version(self) -> str:
-        """The model, and a fingerprint of the options and prompts that may change its answers."""
+        """The model, with a fingerprint of the options and prompts that may change its answers."""
         return config_version(self.options.model, self.metadata)
 
     @property
@@ -115,7 +118,7 @@ class VLMPlanner(ABC, Generic[Options]):
         self.forget()
 
     def forget(self) -> None:
-        """Forget what was remembered of the last episode."""
+        """Forget what a subclass has remembered of the last episode; called by `reset`."""
 
     def hear(self, text: str, step: int) -> None:  # noqa: ARG002
         """Remember an utterance; the next query quotes everything that was said."""
@@ -123,7 +126,7 @@ class VLMPlanner(ABC, Generic[Options]):
         self._schedule.has_news = True
 
     def learn(self, end: SubgoalEnd) -> None:
-        """Remember how a subgoal ended; the same end several times in a row counts once."""
+        """Remember how a subgoal ended, which is news to ask about; repetitions are left out."""
         self._schedule.has_news = True
         self._was_refused = end.how == "refused"
         if self.ends:
@@ -134,16 +137,17 @@ class VLMPlanner(ABC, Generic[Options]):
         self.ends.append(end)
 
     def plan(self, observation: Observation, step: int) -> str | None:
-        """Return the subgoal from now on: a new one if a query is due, else the last.
+        """Return the subgoal from now on: a new one if a query is due, else the last; None if done.
 
-        After a refused subgoal a query is always due. Without a usable reply the last one stays.
+        After a refused subgoal a query is always due, and the observation has been watched already.
+        Without a usable reply the last subgoal stays.
         """
         if not self._was_refused:
             self.watch(observation, step)
             if self._is_finished or not self._schedule.is_due(self.subgoal, step):
                 return self.subgoal
         self._was_refused = False
-        subgoal = self.vlm.ask(self.query(observation), self.take)
+        subgoal = self.vlm.ask(self.make_query(observation), self.read_reply)
         self._schedule.note_reply(is_useful=subgoal is not None)
         if subgoal is not None:
             self._is_finished = subgoal == FINISHED
@@ -151,10 +155,10 @@ class VLMPlanner(ABC, Generic[Options]):
         return self.subgoal
 
     def usage(self) -> dict[str, float]:
-        """Return the cost of the episode, and how the planning ended, if the model ended it.
+        """Return the cost of the episode: ``{"calls": 3, "input_tokens": 2100, ...}``.
 
-        ``finished``: it said that the task is complete; ``unreadable``: its last replies were of no
-        use.
+        ``finished`` is added if the model said that the task is complete, and ``unreadable`` if its
+        last reply was of no use.
         """
         usage = self.vlm.usage()
         if self._is_finished:
@@ -164,33 +168,47 @@ class VLMPlanner(ABC, Generic[Options]):
         return usage
 
     def watch(self, observation: Observation, step: int) -> None:
-        """Record an observation; called at every chunk, with or without a query."""
+        """Remember what a later query needs of an observation; called for every chunk.
+
+        Args:
+            observation: now, with the history since the last call.
+            step: control steps of the episode so far.
+        """
 
     @abstractmethod
-    def query(self, observation: Observation) -> ModelQuery:
-        """Return the next query."""
+    def make_query(self, observation: Observation) -> ModelQuery:
+        """Return the next query to the model, with the observation as it is now."""
 
     @abstractmethod
-    def take(self, text: str) -> str:
-        """Return the subgoal of the reply to the last query, with pixels, and remember it.
+    def read_reply(self, text: str) -> str:
+        """Return the subgoal in the text of a reply to the last query, with points in pixels.
+
+        What later queries need of the reply is remembered. `FINISHED` if the task is complete.
 
         Raises:
             UnparsableReplyError: the reply holds no subgoal; nothing is remembered of it.
         """
 
-    def forms(self) -> dict[str, str]:
-        """Return the forms of subgoals, one per line, and the prompt about points."""
+    def subgoal_prompts(self) -> dict[str, str]:
+        """Return texts for prompts: ``forms`` of subgoals, and how to write points (``places``).
+
+        The forms are one per line, ``- pick up the cube [at]``, without ``[at]`` where subgoals are
+        simple.
+        """
         text = "\n".join(f"- {form}" for form in self.shared.lines("forms"))
         if self.options.subgoals == "simple":
             text = text.replace(" [at]", "")
         return {"forms": text, "places": self.fill(self.options.subgoals)}
 
-    def goal(self) -> str:
+    def instruction_prompt(self) -> str:
         """Return the prompt with everything that was said."""
         return self.fill("goal", instruction=self.instruction)
 
     def video_parts(self, most: int) -> Iterator[Part]:
-        """Yield the demonstration as a clip of at most `most` frames, encoded once."""
+        """Yield a prompt and the demonstration as a clip of at most `most` frames, encoded once.
+
+        Nothing without a demonstration.
+        """
         if self.video is None:
             return
         if self._summary is None:
@@ -198,13 +216,24 @@ class VLMPlanner(ABC, Generic[Options]):
         yield self.fill("video")
         yield self._summary
 
-    def single(self, parts: Iterable[Part], schema: dict[str, Any] | None = None) -> ModelQuery:
-        """Return a query of one turn."""
+    def single_turn_query(
+        self, parts: Iterable[Part], schema: dict[str, Any] | None = None
+    ) -> ModelQuery:
+        """Return a query of one turn, without earlier ones.
+
+        Args:
+            parts: texts, pictures and clips of the turn, in order.
+            schema: JSON schema of the reply; None for a reply in free text.
+        """
         turn = ChatTurn("user", tuple(parts))
         return ModelQuery(self.fill("system"), (turn,), schema)
 
-    def finishes(self, subgoal: str) -> bool:
-        """Return whether a subgoal says that the task is complete; not before anything was done."""
+    def says_complete(self, subgoal: str) -> bool:
+        """Return whether a subgoal says that the task is complete: *task completed*.
+
+        Raises:
+            UnparsableReplyError: it does, but no subgoal was named before.
+        """
         is_end = says_finished(subgoal)
         if is_end and self.subgoal is None:
             raise UnparsableReplyError("Nothing has been done yet.")

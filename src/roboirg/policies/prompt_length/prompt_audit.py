@@ -1,9 +1,11 @@
 """What of an instruction reaches a language model that reads a limited number of tokens.
 
-An instruction is one message or several, each with its utterances. A prompt is cut at its end.
-Before it is counted, it is stripped, and underscores and line breaks become spaces, as openpi and
-LeRobot do. A tokenizer says where its tokens end; without one there are two bounds, between which
-every tokenizer of the compared systems lies.
+An instruction is sent in one message or several, each with one or several utterances. A message
+that is too long is cut at its end. Before it is counted, it is stripped, and underscores and line
+breaks become spaces, as openpi and LeRobot do.
+
+The model's tokenizer says where tokens end. If it is not known, a lower and an upper bound are
+counted, between which every tokenizer of the compared systems lies.
 """
 
 from __future__ import annotations
@@ -16,19 +18,19 @@ from roboirg.core.delivery import PromptVerdict
 from roboirg.language.token_counts import ADDED_TOKENS, count_tokens
 
 LINE_BREAK_TOKENS = 1
-"""The line break that follows the words in a prompt."""
+"""Tokens of the line break that follows the words in a prompt."""
 _WORD_OR_MARK = re.compile(r"[^\s.,:;?!]+|[.,:;?!]")
 _WORD = re.compile(r"\S+")
-_BLANK = str.maketrans("_\n", "  ")
+_SPACES_FOR = str.maketrans("_\n", "  ")
 
 
 class Tokens(NamedTuple):
-    """A prompt in tokens.
+    """A prompt in tokens: *lift it* may be ``Tokens(1, (4, 7), 1)``.
 
     Attributes:
-        before: tokens before the words.
-        ends: for each token of the words, the character at which it ends; ascending.
-        after: tokens after the words.
+        before: number of tokens before the words, such as that of the beginning of a text.
+        ends: for each token of the words, the number of characters up to its end; ascending.
+        after: number of tokens after the words, such as that of a line break.
     """
 
     before: int
@@ -42,17 +44,17 @@ class Tokens(NamedTuple):
 
 
 Tokenize = Callable[[str], Tokens]
-"""Splits a cleaned prompt into tokens."""
+"""Splits a prompt that `clean_prompt` has cleaned into tokens."""
 
 
 class PromptLimit(NamedTuple):
-    """What a policy declares about its prompt.
+    """What a policy declares about how much of a prompt its model reads.
 
     Attributes:
-        tokens: that its model reads of a prompt; the rest is cut off at the end.
-        added: most tokens after the words that share this budget, of a state or a subgoal.
-        tokenize: of the model; None if it is not known.
-        tokenizer: name of the tokenizer's file; None without one.
+        tokens: how many tokens the model reads of a prompt; the rest is cut off at the end.
+        added: how many of these a state or a subgoal after the words may take, at most.
+        tokenize: the model's tokenizer; None if it is not known.
+        tokenizer: name of the tokenizer's file, for records; None without one.
         lowers: whether the prompt is sent in lower case.
     """
 
@@ -68,9 +70,10 @@ class InstructionAudit(NamedTuple):
 
     Attributes:
         least: tokens that the longest message needs at least.
-        most: tokens that it needs at most.
-        reached: for each utterance, the characters from its beginning that can arrive.
-        verdict: ``heard`` if every message is, ``cut`` if one is, else ``unknown``.
+        most: tokens that it needs at most; `least` if the tokenizer is known.
+        reached: for each utterance, how many characters from its beginning can reach the model.
+        verdict: ``heard`` if every message certainly reaches the model whole, ``cut`` if one
+            certainly does not, else ``unknown``.
     """
 
     least: int
@@ -79,12 +82,13 @@ class InstructionAudit(NamedTuple):
     verdict: PromptVerdict
 
     def lost(self, spans: Iterable[tuple[int, int]]) -> tuple[int, ...]:
-        """Return the indices of the spans that certainly do not reach the model whole.
+        """Return the indices of the spans of text that certainly do not reach the model whole.
 
-        A span in an utterance that was not said yet is not lost.
+        Of two utterances of which 20 and 5 characters are reached, the spans ``(0, 12)`` and ``(1,
+        9)`` give ``(1,)``. A span in an utterance that was not said yet is not lost.
 
         Args:
-            spans: of each the utterance and the character after its end.
+            spans: for each, the index of its utterance and the character after its end.
         """
         lost: list[int] = []
         for index, (utterance, end) in enumerate(spans):
@@ -95,21 +99,27 @@ class InstructionAudit(NamedTuple):
 
 
 def clean_prompt(text: str, *, lowers: bool = False) -> str:
-    """Return a prompt as it is counted; all characters but outer blanks keep their places."""
-    text = text.translate(_BLANK)
+    """Return a prompt as it is counted: ``" Lift_it "`` becomes ``"Lift it"``.
+
+    All characters but outer blanks keep their places.
+    """
+    text = text.translate(_SPACES_FOR)
     if lowers:
         text = "".join(map(_lowered, text))
     return text.strip()
 
 
 def _lowered(letter: str) -> str:
-    """Return a letter in lower case; a few of other alphabets would become two, and stay."""
+    """Return a letter in lower case; a few, such as *İ*, would become two letters, and stay."""
     low = letter.lower()
     return low if len(low) == 1 else letter
 
 
 def fewest_tokens(text: str) -> Tokens:
-    """Return the tokens of a vocabulary that has every word: no tokenizer joins words."""
+    """Return a lower bound of a text's tokens: one for each word and punctuation mark.
+
+    No tokenizer joins words. *lift it.* has the ends 4, 7 and 8.
+    """
     ends = tuple(word.end() for word in _WORD_OR_MARK.finditer(text))
     return Tokens(0, ends, 0)
 
@@ -117,9 +127,9 @@ def fewest_tokens(text: str) -> Tokens:
 def most_tokens(text: str) -> Tokens:
     """Return an upper bound of a text's tokens: those of a vocabulary of 32,000 pieces.
 
-    It is not known where in a word its pieces end. All but the last are placed at the word's begin,
-    so that the word is not reached before all its tokens are: ``table`` in three pieces that begins
-    at 4 has the ends 4, 4 and 9.
+    It is not known where in a word its pieces end. All but the last are counted as ending where the
+    word begins, so that the word is reached with its last token only: ``table`` in three pieces,
+    which begins at character 4, has the ends 4, 4 and 9.
     """
     ends: list[int] = []
     for found in _WORD.finditer(text):
@@ -134,6 +144,9 @@ def most_tokens(text: str) -> Tokens:
 
 def audit_instruction(messages: Sequence[Sequence[str]], limit: PromptLimit) -> InstructionAudit:
     """Return what of an instruction reaches the model.
+
+    With a limit of 3 tokens, *lift the red cube* is ``cut``, and *lift the red* is reached, 12
+    characters.
 
     Args:
         messages: each with its utterances, which are sent together, joined by spaces.
@@ -160,7 +173,7 @@ def audit_instruction(messages: Sequence[Sequence[str]], limit: PromptLimit) -> 
 
 
 class _MessageAudit(NamedTuple):
-    """The fewest and the most tokens of a message, and how many of its characters arrive."""
+    """The fewest and the most tokens of a message, and how many characters can reach the model."""
 
     least: int
     most: int
@@ -168,9 +181,10 @@ class _MessageAudit(NamedTuple):
 
 
 def _audit_message(text: str, limit: PromptLimit) -> _MessageAudit:
-    """Return least and most tokens of a message, and how many of its characters surely arrive.
+    """Return what of one message reaches the model.
 
-    Without a tokenizer, an upper and a lower bound are counted; with one, both are equal.
+    Without a tokenizer, a lower and an upper bound of its tokens are counted, and `reached` goes by
+    the lower one, so that no character is called lost that may arrive. With one, both are equal.
     """
     if limit.tokenize is None:
         # Lower case needs no more tokens than what is counted without a tokenizer.
@@ -180,10 +194,10 @@ def _audit_message(text: str, limit: PromptLimit) -> _MessageAudit:
     else:
         least = limit.tokenize(clean_prompt(text, lowers=limit.lowers))
         most = least
-    room = limit.tokens - least.before  # for tokens of words
+    room = limit.tokens - least.before  # how many tokens of words are read
     reached = len(text)
     if room < len(least.ends):
-        # Blanks at the begin are stripped before tokens are counted, so the ends lack them.
+        # The ends do not count blanks at the beginning, which were stripped.
         reached = len(text) - len(text.lstrip())
         if room > 0:
             reached += least.ends[room - 1]

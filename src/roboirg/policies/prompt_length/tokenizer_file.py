@@ -20,14 +20,17 @@ from roboirg.policies.prompt_length.prompt_audit import (
 from roboirg.util.regular_file import read_regular
 
 JSON = ".json"
-"""Ends the names of files of the library `tokenizers`."""
+"""Suffix of files of the library `tokenizers`."""
 _MAX_BYTES = 256 * 2**20
-"""Of a tokenizer's file."""
+"""Largest size of a tokenizer's file."""
 
 
 @functools.cache
 def read_tokenizer(path: str) -> Tokenize:
-    """Return the tokenizer of a file, read once per process.
+    """Return the tokenizer of a file, which is read once per process.
+
+    The tokenizer raises `InvalidValueError` for a text that it cannot split, and so does this
+    function for a file that it cannot read.
 
     Args:
         path: ``.json`` for the library `tokenizers`, anything else for SentencePiece.
@@ -46,7 +49,10 @@ def read_tokenizer(path: str) -> Tokenize:
 
 @contextlib.contextmanager
 def _attributed_to(path: str) -> Iterator[None]:
-    """Raise `InvalidValueError` for what a library raises: `tokenizers` panics on some texts."""
+    """Turn what a library raises into an `InvalidValueError` about the tokenizer of a path.
+
+    The library `tokenizers` panics on some texts, which is no `Exception`.
+    """
     try:
         yield
     except (RoboIRGError, KeyboardInterrupt):
@@ -59,36 +65,46 @@ def _attributed_to(path: str) -> Iterator[None]:
 
 
 def _read_sentencepiece(path: str, content: bytes) -> Tokenize:
-    """Return the tokenizer of a SentencePiece model, given as the content of its file."""
+    """Return the tokenizer of a SentencePiece model.
+
+    Args:
+        path: of its file, for errors.
+        content: of the file.
+    """
     with extra_needed(f"The tokenizer {path!r} needs sentencepiece", "tokens"):
         import sentencepiece
     model: Any = sentencepiece.SentencePieceProcessor()
     model.LoadFromSerializedProto(content)
 
-    # The name depends on the version; so does whether places count characters or bytes.
+    # Versions of the library differ: in this name, and in whether ends count characters or bytes.
     encode = getattr(model, "encode_as_immutable_proto", None) or model.encode_as_proto
 
     def tokenize(text: str) -> Tokens:
         ends = tuple(piece.end for piece in encode(text).pieces)
         in_bytes = text.encode()
-        # In a text beyond ASCII, the last end shows whether the ends count bytes.
+        # Where the text has more bytes than characters, the last end shows what the ends count.
         counts_bytes = len(in_bytes) != len(text) and ends[-1:] == (len(in_bytes),)
         if counts_bytes:
             ends = tuple(len(in_bytes[:end].decode(errors="ignore")) for end in ends)
-        # The beginning of the text is a token too.
+        # The token before the words stands for the beginning of the text.
         return Tokens(1, ends, LINE_BREAK_TOKENS)
 
     return tokenize
 
 
 def _read_json(path: str, content: bytes) -> Tokenize:
-    """Return the tokenizer of the library `tokenizers`, given as the content of its file."""
+    """Return a tokenizer of the library `tokenizers`.
+
+    Args:
+        path: of its file, for errors.
+        content: of the file, JSON.
+    """
     with extra_needed(f"The tokenizer {path!r} needs tokenizers", "tokens"):
         import tokenizers
     model: Any = tokenizers.Tokenizer.from_buffer(content)
     model.no_truncation()
     model.no_padding()
-    # The library keeps these when it cuts a text.
+    # Special tokens, which the library keeps when it cuts a text.
     kept = int(model.num_special_tokens_to_add(is_pair=False))
 
     def tokenize(text: str) -> Tokens:
@@ -100,7 +116,7 @@ def _read_json(path: str, content: bytes) -> Tokenize:
 
 
 def prompt_limit(needs: PolicyNeeds) -> PromptLimit | None:
-    """Return the limit that a policy declares; None if it declares none."""
+    """Return the limit of prompts that a policy declares, with its tokenizer; None for no limit."""
     if needs.prompt_tokens is None:
         return None
     limit = PromptLimit(needs.prompt_tokens, needs.prompt_added, lowers=needs.lowers_prompt)
