@@ -1,4 +1,4 @@
-"""Shortcuts: how far rules and models come that do not understand the words of an instruction.
+"""Shortcuts: how far rules and models come that see the words only, and understand none of them.
 
 A rule guesses a goal from the words alone, by their position or key words (`surface_rules`,
 `text_guess`); models learn from the words or from the scene alone (`goal_learner`).

@@ -294,7 +294,7 @@ class ScriptedHands(AttachedPolicy):
             RefusedError: they fit no object or several.
         """
         fits = [thing.item for thing in things if request.color in (None, thing.item.color)]
-        if request.side is not None and fits:
+        if request.side is not None:
             bodies = self._world.bodies
             # y is positive to the robot's left, so this is the order from right to left.
             fits.sort(key=lambda item: bodies[item.name].position.y)
@@ -335,7 +335,7 @@ class ScriptedHands(AttachedPolicy):
 def _words_of(request: Request) -> str:
     """Return the object of a request in words, for a refusal: ``left-side red cube``."""
     words = [request.color, request.thing]
-    if request.side is not None:
+    if request.side:
         words.insert(0, f"{request.side}-side")
     return " ".join(word for word in words if word)
 

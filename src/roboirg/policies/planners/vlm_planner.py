@@ -163,7 +163,7 @@ class VLMPlanner(ABC, Generic[Options]):
         usage = self.vlm.usage()
         if self._is_finished:
             usage["finished"] = 1.0
-        if self._schedule.useless > 0:
+        if self._schedule.useless:
             usage["unreadable"] = 1.0
         return usage
 
