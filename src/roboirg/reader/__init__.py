@@ -84,7 +84,13 @@ def _ask_for_something(clauses: Iterable[Clause]) -> bool:
 
 
 def _complaints_about(fitting: Sequence[Goal]) -> tuple[str, ...]:
-    """Return why a command does not mean a single goal, in words; empty if one goal fits it."""
+    """Return why a command does not mean a single goal, in words; empty if it does.
+
+    Two goals that differ in color give ``("leaves color open: it can be red or blue",)``.
+
+    Args:
+        fitting: the goals that fit the command.
+    """
     if not fitting:
         return ("no goal of the task fits everything that the text says",)
     if len(fitting) > 1:

@@ -363,7 +363,10 @@ class _ClauseBuilder:
         self._follows_conjunction = word in _CONJUNCTIONS
 
     def add_phrase(self, kind: PhraseKind, phrase: Token) -> None:
-        """Add a phrase, such as *the red cube*, as an argument of the clause that it belongs to."""
+        """Add a phrase, such as *the red cube*, as an argument of the clause that it belongs to.
+
+        If it does not fit that clause, its words count as unread.
+        """
         clause = self._clause_for(kind)
         argument = self._argument_of(clause, kind, phrase.value)
         if argument is None:

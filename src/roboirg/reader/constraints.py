@@ -168,6 +168,7 @@ class _Command:
         self._clauses = clauses
         self._scene = scene
         self._referents = Referents(scene)
+        # Found once, as this refuses a command that points back at what comes before it.
         self._named = tuple(self._named_things())
 
     def check(self, slots: Mapping[str, SlotValue]) -> None:
@@ -208,7 +209,10 @@ class _Command:
             raise UnfitWordsError("does not understand how often to act")
 
     def _check_destination(self, clause: Clause) -> None:
-        """Raise `UnfitWordsError` if a thing goes nowhere, or to what the scene does not have."""
+        """Raise `UnfitWordsError` if a thing goes nowhere, or to what the scene does not have.
+
+        *Put the red cube*, which lacks a destination, and *put it into the bin* without a bin.
+        """
         if clause.verb == "put" and not clause.has(*_DESTINATION_ARGUMENTS):
             raise UnfitWordsError("does not understand where to put it")
         kinds_there = {item.kind for item in self._scene.objects} | {"table"}
@@ -435,7 +439,11 @@ class _Command:
         return [_Amount(color, self._count(thing, color)) for color in sorted(colors)]
 
     def _count(self, thing: Description, color: str) -> int:
-        """Return how many cubes of a color a description means; of *all red cubes*, all there."""
+        """Return how many cubes of a color a description means.
+
+        *two red cubes* means 2, and *all red cubes* as many as the scene has. Raises
+        `UnfitWordsError` for *the red cubes*, which does not say how many.
+        """
         if thing.number is None:
             raise UnfitWordsError("does not understand how many cubes are meant")
         if thing.number == ALL_OF_THEM:
@@ -463,7 +471,7 @@ class _Command:
                 has_named = True
 
     def _targets(self) -> Iterator[Target]:
-        """Yield the targets that the command names."""
+        """Yield the targets that the command names, as destinations or otherwise, in its order."""
         for clause in self._clauses:
             for value in (*clause.values("goal"), *clause.values("target")):
                 if isinstance(value, Target):

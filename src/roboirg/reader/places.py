@@ -208,7 +208,10 @@ def _between(anchor: SceneObject, other: SceneObject, candidates: Things) -> _Or
 
 
 def _on_side_of(place: Place, anchor: SceneObject, candidates: Things) -> _Ordering:
-    """Return the objects on one side of an anchor, which all tie: any of them may be meant."""
+    """Return the ordering for *to the left of the bin*: all objects there, which tie.
+
+    So any of them may be meant.
+    """
     across = _sideways(place)
     aside: list[SceneObject] = []
     for thing in candidates:
@@ -218,7 +221,10 @@ def _on_side_of(place: Place, anchor: SceneObject, candidates: Things) -> _Order
 
 
 def _by_distance(place: Place, anchor: SceneObject, candidates: Things) -> _Ordering:
-    """Return the ordering by distance from an anchor, nearest first, or farthest for depth +1."""
+    """Return the ordering for *nearest to the bin*, or for *farthest from the bin* with depth +1.
+
+    Words such as *next to the bin* are vague, so more objects tie.
+    """
     others = [thing for thing in candidates if thing is not anchor]
     tolerance = _WIDE_TOLERANCE if place.allows_several else _TOLERANCE
     sign = -1.0 if place.depth > 0 else 1.0
@@ -248,7 +254,10 @@ def _direction_orderings(place: Place, candidates: Things) -> Iterator[_Ordering
 
 
 def _corner_orderings(place: Place, candidates: Things) -> Iterator[_Ordering]:
-    """Yield the orderings by distance from a corner: of the table, and of the work area."""
+    """Yield the orderings for *in the back left corner*: by distance from two corners.
+
+    One is of the table, the other of the area where objects stand; words can mean either.
+    """
     end = "back" if place.depth > 0 else "front"
     is_left = (place.side == "left") != place.is_in_picture  # the picture is mirrored
     side = "left" if is_left else "right"
@@ -312,6 +321,6 @@ def _left_in_picture(thing: SceneObject) -> float:
     on the right of the picture.
     """
     to_x, to_y = thing.position.x - _CAMERA[0], thing.position.y - _CAMERA[1]
-    # Projected on the direction of view, times its length: how far ahead the object is.
+    # How far ahead of the camera it is, times the length of `_VIEW`, which cancels out below.
     ahead = to_x * _VIEW[0] + to_y * _VIEW[1] + (_CUBE_HEIGHT - _CAMERA[2]) * _VIEW[2]
     return -thing.position.y * math.hypot(*_VIEW) / ahead

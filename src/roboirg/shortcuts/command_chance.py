@@ -49,7 +49,10 @@ def blind_goals(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
 
 
 def right_share(goals: Sequence[Goal], episode: Episode) -> Fraction | None:
-    """Return the share of some goals of the scene that are right, 0 to 1; None without goals."""
+    """Return the share of some goals of the scene that are right: 1/3 for one of three.
+
+    That is the chance of a guess among them. None without goals.
+    """
     if not goals:
         return None
     right = [goal for goal in goals if is_right(goal, episode)]

@@ -255,7 +255,7 @@ class _ValueLearner:
                 self._best_specs[floor] = max(specs, key=numbers_right.__getitem__)
 
     def _count_right(self, spec: ModelSpec, validation: Sequence[_Example]) -> int:
-        """Return for how many instructions a fitted model predicts the goal's value."""
+        """Return for how many instructions a fitted model predicts the value that the goal has."""
         if not validation:
             return 0
         predicted = self._predict(spec, [example.given for example in validation])
@@ -275,7 +275,10 @@ class _ValueLearner:
         return self._predict(self._best_specs[floor], inputs)
 
     def _fit(self, spec: ModelSpec, examples: Sequence[_Example]) -> Any:  # noqa: ANN401 - scikit-learn has no types
-        """Return a scikit-learn pipeline, fitted on all examples."""
+        """Return a scikit-learn pipeline that has learned to predict the labels of some examples.
+
+        Its inputs are what the view of the model shows of them.
+        """
         labels = [self._label(spec.view, example) for example in examples]
         features = self._model_inputs(spec.view, [example.given for example in examples])
         model = _unfitted_model(spec, is_constant=len(set(labels)) == 1)

@@ -137,7 +137,10 @@ def _slot_chance(
 
 
 def score_guess(guess: TextGuess, instructed: InstructedEpisode) -> ShortcutScore:
-    """Return the shares of a guess that are right: of each slot that is scored, and of the goal."""
+    """Return the score of a guess: the share of each scored slot, and of the goal, that is right.
+
+    Red or blue, where red is right, scores 1/2 in the slot ``color``.
+    """
     episode, _ = instructed
     slots: dict[str, Fraction] = {}
     for slot, positions in counted_positions(instructed).items():
@@ -146,7 +149,10 @@ def score_guess(guess: TextGuess, instructed: InstructedEpisode) -> ShortcutScor
 
 
 def score_rule(rule: str, instructed: InstructedEpisode) -> ShortcutScore:
-    """Return the score of a surface rule, which sees only the text of the instruction."""
+    """Return the score of a surface rule, such as ``first-mention``, on an instruction.
+
+    The rule sees only the text.
+    """
     episode, instruction = instructed
     return score_guess(guess_goal(rule, instruction.text, episode.task), instructed)
 

@@ -140,7 +140,7 @@ class _Tally:
             self.goals_right.setdefault(name, []).append(float(score.goal))
 
     def row(self, group: Group) -> ShortcutRow:
-        """Return a row of the table with the mean scores of all instructions that were added."""
+        """Return the row of a group, with the mean scores of all instructions that were added."""
         slot_count = sum(self.slot_counts)
         text_count = len(self.slot_counts)
         shares: dict[str, ShortcutShares] = {}

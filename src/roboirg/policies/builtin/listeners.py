@@ -58,7 +58,13 @@ class ListenerPolicy(ScriptedPolicy):
         return self._chosen(understood_goals(env.instruction, env.episode), env, instruction)
 
     def _chosen(self, goals: Sequence[Goal], env: RoboIRGEnv, words: str) -> Goal:
-        """Return one of the goals that fit the words, at random; if none fits, one of all goals."""
+        """Return one of the goals that fit the words, at random; if none fits, one of all goals.
+
+        Args:
+            goals: of the scene, that fit.
+            env: with the episode.
+            words: that were heard; the choice depends on them.
+        """
         if not goals:
             self._has_guessed = True
             goals = goals_of(env.episode)

@@ -88,7 +88,10 @@ class ScriptedPolicy(AttachedPolicy, ABC):
         """
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
-        """Begin an episode: decide on a goal, or wait for the rest of the instruction."""
+        """Begin an episode: decide on a goal, or wait for the rest of the instruction.
+
+        It waits if it listens and something is still to be said, which `hear` will bring.
+        """
         self._heard = [instruction]
         self.stages: tuple[Stage, ...] = ()
         if self.listens and self.env.unheard:

@@ -167,7 +167,10 @@ def _makeup(ref: PolicyRef, system: System | None) -> Makeup:
 
 
 def _makeup_of_system(system: System) -> Makeup:
-    """Return the makeup of a planner with its hands; without a planner that of the policy alone."""
+    """Return the makeup of a planner with its hands; without a planner that of the policy alone.
+
+    ``planner:gemini?model=m1`` -> ``(("policy", "planner:gemini"), ("model", "m1"))``.
+    """
     if system.planner is None:
         return read_policy(system.policy).makeup
     kind = system.planner_kind
@@ -338,7 +341,10 @@ def _refuse_undeclared(ref: PolicyRef, made: object) -> None:
 
 
 def _can_be_imported(policy_class: type[Any]) -> bool:
-    """Return whether another process can import the class; not one of a script or a function."""
+    """Return whether another process can import the class by its module and name.
+
+    It cannot if the class is defined in the script that runs, or within a function.
+    """
     if policy_class.__module__ == "__main__":
         return False
     module = sys.modules.get(policy_class.__module__)

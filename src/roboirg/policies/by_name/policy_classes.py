@@ -100,7 +100,10 @@ def make_from_class(spec: str, policy_class: type[Any], seed: int) -> Policy:
 
 
 def _construct(spec: str, policy_class: type[Any], seed: int) -> Any:  # noqa: ANN401
-    """Call a class of policies with what it takes: the URL, if the spec is one, and the seed."""
+    """Return a new policy of a class, which gets the spec, if that is a URL, and the seed.
+
+    A class of a user's gets the seed only if it has such a parameter.
+    """
     if is_url(spec):
         return policy_class(spec, seed=seed)
     if "seed" in parameters_of(policy_class):

@@ -146,7 +146,7 @@ class HierarchicalPolicy(PlannerParts):
         }
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode with both."""
+        """Begin an episode with both; each gets the frames of the demonstration that it needs."""
         self.subgoal: str | None = None
         self._step = 0
         """Control steps of the policy so far."""
@@ -209,7 +209,7 @@ class HierarchicalPolicy(PlannerParts):
         self._gave_up = True
 
     def _report_endings(self) -> None:
-        """Tell a planner that learns from it how subgoals have ended since the last call."""
+        """Tell the planner how subgoals have ended since the last call, if it has ``learn``."""
         new_ends = self.endings[self._reported :]
         self._reported += len(new_ends)
         if hasattr(self.planner, "learn"):

@@ -63,7 +63,7 @@ class QwenPlanner(VLMPlanner[QwenOptions]):
         self._history: list[str] = []
 
     def make_query(self, observation: Observation) -> ModelQuery:
-        """Return a query with demonstration, task, past subgoals and the newest picture."""
+        """Return a query in one turn: demonstration, instruction, past subgoals, newest picture."""
         said = self.fill("first")
         if self._history:
             # Such as "1. press the button; 2. pick up the red cube at <|box_start|>…".
@@ -128,7 +128,7 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
         self._quoted = ""  # the instruction as far as the conversation has quoted it
 
     def watch(self, observation: Observation, step: int) -> None:
-        """Keep the front camera's frames since the last call."""
+        """Keep the front camera's frames since the last call, the newest one included."""
         frames = [front_picture(earlier) for earlier in observation.get("history", ())]
         # The last picture is in the history only if the chunk ends at a multiple of the period.
         if not frames or step % self.options.observe_every:
@@ -283,7 +283,10 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
         return subgoal
 
     def _parts(self) -> Iterator[Part]:
-        """Yield the parts of a query: video, what was said, key frames, recent frames, question."""
+        """Yield the parts of a query: video, instruction, key frames, recent frames, question.
+
+        Each group of frames stands between two prompts, ``remembered_begin`` and so on.
+        """
         yield from self.video_parts(self.options.video_frames)
         yield self.instruction_prompt()
         for name, frames in (("remembered", self.frames), ("recent", self._recent)):

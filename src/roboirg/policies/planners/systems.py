@@ -56,7 +56,7 @@ class System(BaseModel):
 
 
 def all_systems() -> tuple[str, ...]:
-    """Return the names of the systems in this package."""
+    """Return the names of the systems in this package, such as ``GroundSG-QwenVL``, sorted."""
     names: list[str] = []
     for file in resources.files(PACKAGE).joinpath(FOLDER).iterdir():
         if file.name.endswith(SUFFIX):

@@ -103,7 +103,7 @@ class VLMPlanner(ABC, Generic[Options]):
         }
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Forget the last episode and begin another."""
+        """Forget the last episode and begin another; an empty demonstration means no video."""
         self.vlm.start()
         self.instruction = instruction
         self.subgoal: str | None = None
@@ -126,7 +126,10 @@ class VLMPlanner(ABC, Generic[Options]):
         self._schedule.has_news = True
 
     def learn(self, end: SubgoalEnd) -> None:
-        """Remember how a subgoal ended, which is news to ask about; repetitions are left out."""
+        """Remember how a subgoal ended, which is news to ask about.
+
+        The same end several times in a row, at whatever step, is kept once.
+        """
         self._schedule.has_news = True
         self._was_refused = end.how == "refused"
         if self.ends:
