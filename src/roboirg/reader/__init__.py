@@ -189,9 +189,10 @@ def _speaks_of_number(words: Iterable[str]) -> bool:
 def _without_goals(sentences: Sequence[ParsedSentence]) -> Interpretation:
     """Return the result for a text that is not understood: no goals, and why, in sentences.
 
-    `sentences` are those of the command with words that no rule reads, *stack the cube*, which
-    gives ``finds no command`` and ``does not know the word "stack"``. There may be none, as in *do
-    it*.
+    *Stack the cube* gives ``finds no command`` and ``does not know the word "stack"``.
+
+    Args:
+        sentences: those of the command that are not read to the end; none for an empty text.
     """
     unread: dict[str, None] = {}  # each word once, in the order of speaking
     has_verb = False

@@ -381,8 +381,8 @@ class _ClauseBuilder:
         Two kinds depend on what stands before:
 
         - A place alone is a thing only right after a verb: *take on the left*, what is there.
-        - *Twice more* adds to a number after a conjunction, *lift it once and twice more*. In *lift
-          it twice more* it may be the total, so it is ``extra``.
+        - *Twice more* adds to a number after a conjunction: *lift the cube once and twice more*. In
+          *lift the cube twice more* it may be the total, so it is ``extra``.
         """
         if kind == "place":
             if not clause.verb or clause.arguments:

@@ -36,7 +36,7 @@ PhraseKind = Literal[
 | ``more`` | *twice more* | 2 |
 | ``goal`` | *on the target*, *into the bin* | a target or box, or the noun ``"bin"`` |
 | ``button``, ``down``, ``again``, ``it``, ``first`` | *the button* | the words themselves |
-| ``extra`` | *twice more*, where that may be the total or in addition | 2 |
+| ``extra`` | *lift the cube twice more*: in all, or in addition | 2 |
 """
 
 _MARK = re.compile(r"\(\?P<\w+>|\(\?[:=!<]+|\\.")

@@ -37,7 +37,7 @@ class Description(NamedTuple):
         place: where it stands.
         moment: when it stands at its place, which swaps may change.
         covers: the cube under a container.
-        same_color_as: another thing, in *one more of the same color as the red cube*.
+        same_color_as: another thing, in *two more of the same color as the red cube*.
     """
 
     noun: str
@@ -166,7 +166,7 @@ _OWNED = compiled(
     r"|(?:the )?(?P<other>COLOR) container",
     _PARTS,
 )
-# "one more of the same color as thing#1", "two like thing#1"
+# "two more of the same color as thing#1", "two like thing#1"
 _SAME_COLOR = compiled(
     r"(?P<count>NUMBER|an?)(?: more)?(?: cubes?)? (?:like|(?:of|in|with) the (?:same )?color "
     r"(?:as|of)|the (?:same )?color (?:as|of)) thing#(?P<like>\d+)"
@@ -316,7 +316,7 @@ def _number_by_determiner(determiner: str, *, is_plural: bool) -> int | None:
 
 
 def _read_same_color(match: PhraseMatch) -> Description:
-    """Return cubes of the color of another thing: *one more of the same color as the red one*."""
+    """Return cubes of the color of another thing: *two more of the same color as the red one*."""
     number = number_of(match["count"]) or 1
     return Description("cube", number=number, same_color_as=match.value("like"))
 
@@ -420,4 +420,4 @@ _DESCRIPTIONS = (
 )
 """Places, and words behind a thing that describe it: *on the left*, *from the video*."""
 _LIKENESSES = (PhraseRule("thing", _SAME_COLOR, _read_same_color),)
-"""Descriptions by another one, which has to be read first: *one more of the color of thing#1*."""
+"""Descriptions by another one, which has to be read first: *two like thing#1*."""

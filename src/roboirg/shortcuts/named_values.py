@@ -219,7 +219,7 @@ class _Mention(NamedTuple):
 def _mentions(words: Sentence, slot: str, vocabulary: SlotVocabulary) -> Iterator[_Mention]:
     """Yield the words of a sentence that name values of a goal slot, in order.
 
-    *take the red one , not the blue one* -> 2 (red) and 6 (blue) for the slot ``color``.
+    *take the red one , not the blue one* -> the words 2 (red) and 7 (blue) for the slot ``color``.
     """
     # All values of a slot have one type.
     if all(isinstance(value, int) for value in vocabulary.values):

@@ -141,7 +141,7 @@ def _pointed_values(words: SlotWords) -> list[Candidates]:
     For a text that begins with *Red and blue*:
 
     - *Take the latter.* -> blue
-    - *Red is gone; take the one that is left.* -> blue
+    - *Red is gone. Take the one that is left.* -> blue
     - *I mean the latter. Take both.* -> blue, then red
     """
     values = words.unique_values

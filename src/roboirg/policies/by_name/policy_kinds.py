@@ -225,6 +225,11 @@ def _of_process(spec: str, name: str, _options: Mapping[str, str]) -> PolicyMake
     """Return what makes policies of an object or class that Python code has handed over.
 
     An object plays every episode itself; of a class, each episode gets a policy of its own.
+
+    Args:
+        spec: the whole of it, ``live:Mine``.
+        name: under which `live` has the object or class.
+        _options: none are possible.
     """
     found = live[name]
     if isinstance(found, type):
