@@ -6,7 +6,7 @@ A slot of a goal has one place or several: the colors of two containers are two 
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -126,16 +126,21 @@ def goal_share(guess: TextGuess, episode: Episode) -> Fraction:
     return total
 
 
-def draw_goal(guess: TextGuess, episode: Episode, rng: np.random.Generator) -> Goal | None:
-    """Return a goal of the scene that is drawn at random from a guess.
+def draw_goal(guess: TextGuess, goals: Iterable[Goal], rng: np.random.Generator) -> Goal | None:
+    """Return a goal that is drawn at random from a guess, one of those that there are.
 
-    None if no goal of the scene has the values that were drawn.
+    None if none of them has the values that were drawn.
+
+    Args:
+        guess: candidates by slot.
+        goals: of a scene, or all of a task.
+        rng: draws one candidate for each place.
     """
     drawn: dict[str, tuple[Value, ...]] = {}
     for slot, places in guess.items():
         values = [candidates[int(rng.integers(len(candidates)))] for candidates in places]
         drawn[slot] = tuple(values)
-    for goal in goals_of(episode):
+    for goal in goals:
         for slots in orders(goal):
             goal_values = {slot: values_in(content) for slot, content in slots.items()}
             if goal_values == drawn:

@@ -94,7 +94,8 @@ class ShortcutPolicy(ScriptedPolicy):
         """Return the goal of the rule; what the rule leaves open is drawn at random."""
         episode = env.episode
         guess = guess_goal(self.rule, instruction, episode.task)
-        return draw_goal(guess, episode, choice_generator(self.seed, episode, instruction))
+        rng = choice_generator(self.seed, episode, instruction)
+        return draw_goal(guess, goals_of(episode), rng)
 
 
 class FirstMentionPolicy(ShortcutPolicy):

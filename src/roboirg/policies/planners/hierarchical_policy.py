@@ -222,7 +222,7 @@ def _attach(parts: tuple[object, ...], env: RoboIRGEnv) -> None:
             part.attach(env)
 
 
-def joint_version(*parts: object) -> str:
+def joint_version(*parts: object, between: str = BETWEEN_VERSIONS) -> str:
     """Return the versions of a planner and its policy as one; of a part's file if it has none."""
     versions = [read_version(part) or file_fingerprint(part) or UNKNOWN_VERSION for part in parts]
-    return BETWEEN_VERSIONS.join(versions)
+    return between.join(versions)
