@@ -23,8 +23,10 @@ if TYPE_CHECKING:
 
 BETWEEN = " → "
 """Stands between the versions of a namer and of the policy that hears it."""
-RESOLVED, PASSED_ON = "resolved", "passed_on"
-"""Entries of the usage: an episode whose policy heard a rewritten command, or what was said."""
+RESOLVED = "resolved"
+"""Entry of the usage: an episode whose policy heard a rewritten command."""
+PASSED_ON = "passed_on"
+"""Entry of the usage: an episode whose policy heard what was said."""
 
 
 class ResolvingPolicy(PlannerParts):

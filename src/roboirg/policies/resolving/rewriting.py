@@ -10,7 +10,8 @@ from roboirg.core.policy_ref import RESOLVE
 from roboirg.policies.builtin import BUILTIN
 from roboirg.shortcuts import SURFACE_RULES
 
-POLICY, WORDINGS = "policy", "wordings"
+POLICY = "policy"
+WORDINGS = "wordings"
 OPTIONS = (POLICY, WORDINGS)
 """Options of the rewriter; all others are the namer's."""
 
