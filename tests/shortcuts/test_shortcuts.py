@@ -40,7 +40,7 @@ from roboirg.shortcuts.shortcut_tables import (
     shortcut_table,
 )
 from roboirg.shortcuts.text_guess import slot_share
-from roboirg.tasks import get_task
+from roboirg.tasks import get_task, goals_of
 from roboirg.tasks.splits.splits import get_episode
 
 COLORS = ("blue", "green", "red")
@@ -193,7 +193,7 @@ def test_a_guess_of_amounts_in_another_order_than_the_goals_is_right():
     guess = guess_goal("first-mention", text, "BinFill")
 
     assert goal_share(guess, episode) == 1
-    assert draw_goal(guess, episode, np.random.default_rng(0)) == episode.goal
+    assert draw_goal(guess, goals_of(episode), np.random.default_rng(0)) == episode.goal
 
 
 WORDS_OF_RANDOM_TEXTS = (
@@ -219,7 +219,7 @@ def test_any_text_gives_a_guess_whose_values_exist_in_either_case(text, rule, ta
     episode = get_episode(task, "test", 0)
     assert 0 <= goal_share(guess, episode) <= 1
 
-    drawn = draw_goal(guess, episode, np.random.default_rng(1))
+    drawn = draw_goal(guess, goals_of(episode), np.random.default_rng(1))
     assert drawn is None or drawn in get_task(task).goals(episode.scene)
     assert guess_goal(rule, text.upper().replace(" ", "  "), task) == guess
 

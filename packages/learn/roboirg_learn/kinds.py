@@ -57,6 +57,14 @@ def _learned_listener_maker(
     return functools.partial(LearnedListener, _checked_path(spec, name, options))
 
 
+def _learned_namer_maker(spec: str, name: str, options: Mapping[str, str]) -> Callable[[int], Any]:
+    """Return a function from a seed to what names the goals of a learned listener."""
+    from roboirg_learn.listener.learned_listener import LearnedNamer
+
+    path = _checked_path(spec, name, options)
+    return lambda _seed: LearnedNamer(path)
+
+
 def _trained_policy_maker(spec: str, name: str, options: Mapping[str, str]) -> Callable[[int], Any]:
     """Return a function from a seed to a trained policy, for ``trained:BODY?reader=FILE``.
 
@@ -148,5 +156,5 @@ def _cached_model(files: PolicyFiles, changed: tuple[int, ...]) -> PolicyModel:
     return load_policy(files)
 
 
-LEARNED = PolicyKind("learned", _learned_listener_maker)
+LEARNED = PolicyKind("learned", _learned_listener_maker, read_namer=_learned_namer_maker)
 TRAINED = PolicyKind("trained", _trained_policy_maker, has_weights=True)

@@ -16,13 +16,16 @@ PRIVILEGED = "privileged:"
 """Before the spec of a policy of others: the user lets it read the simulator's state."""
 HANDS = "hands"
 """Option of a planner: what follows its subgoals, a policy or one of the next two."""
+RESOLVE = "resolve"
+"""Kind of a policy behind a rewriter of what was said."""
 SCRIPTED = "scripted"
 ELSEWHERE = "elsewhere"
 """Hands next to the world; and none, as a planner's own process has none."""
 
-Place = Literal["world", "own", "split", "server", "python"]
+Place = Literal["world", "own", "split", "behind", "server", "python"]
 """Where a policy runs: in the simulator's process; in a process of its own; its planner in one and
-its scripted hands in the simulator's; on a server, whose client is in the simulator's process; or
+its scripted hands in the simulator's; in one of its own, behind a rewriter in the simulator's; on a
+server, whose client is in the simulator's process; or
 in the Python process that made it, and so does the simulator."""
 
 Asker = Literal["listener", "planner"]
@@ -85,8 +88,8 @@ class PolicyRef:
 
     @property
     def is_hosted(self) -> bool:
-        """Whether it, or its planner, has a process of its own."""
-        return self.place in ("own", "split")
+        """Whether it, its planner, or what is behind its rewriter has a process of its own."""
+        return self.place in ("own", "split", "behind")
 
     @property
     def hosted_part(self) -> PolicyRef:

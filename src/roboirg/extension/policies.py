@@ -6,6 +6,7 @@ from roboirg.core.observations import Demonstration, Observation
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.policies.by_name.policy_kinds import PolicyKind, make_follower
+from roboirg.policies.contract.goal_naming import SaidAndShown
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.planners.planner import Planner
 
@@ -14,6 +15,7 @@ __all__ = [
     "Observation",
     "PolicyKind",
     "RoboIRGEnv",
+    "SaidAndShown",
     "ScriptedPolicy",
     "followed",
 ]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.inference_facts import inference_facts
 from roboirg.core.policy_needs import PolicyNeeds
-from roboirg.core.policy_ref import BUILT_IN, PolicyRef
+from roboirg.core.policy_ref import BUILT_IN, RESOLVE, PolicyRef
 from roboirg.policies.by_name.finding import make_policy, read_policy
 from roboirg.policies.by_name.policy_classes import find_class
 from roboirg.policies.by_name.policy_kinds import CLASS
@@ -65,6 +65,11 @@ def open_server(
         raise InvalidValueError(
             f"Policy {spec!r} is privileged: it reads the simulator in its own process, so it "
             "cannot be served."
+        )
+    if policy.kind == RESOLVE:
+        raise InvalidValueError(
+            f"Policy {spec!r} rewrites words next to the simulator, so it cannot be served; serve "
+            f"the policy behind it, and name {RESOLVE}:…?policy=URL where it plays."
         )
 
     if policy.is_foreign:

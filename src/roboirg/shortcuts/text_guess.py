@@ -7,7 +7,7 @@ positions of the slot ``colors``.
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -134,17 +134,22 @@ def goal_share(guess: TextGuess, episode: Episode) -> Fraction:
     return total
 
 
-def draw_goal(guess: TextGuess, episode: Episode, rng: np.random.Generator) -> Goal | None:
-    """Return a goal of the scene that is drawn at random from a guess.
+def draw_goal(guess: TextGuess, goals: Iterable[Goal], rng: np.random.Generator) -> Goal | None:
+    """Return a goal that is drawn at random from a guess, one of those that there are.
 
-    There is one draw for each position, in the order of the guess. None if no goal of the scene has
-    the values that were drawn.
+    There is one draw for each position, in the order of the guess. None if no goal has the values
+    that were drawn.
+
+    Args:
+        guess: candidates by slot.
+        goals: of a scene, or all of a task.
+        rng: draws one candidate for each position.
     """
     drawn: dict[str, tuple[Value, ...]] = {}
     for slot, positions in guess.items():
         values = [candidates[int(rng.integers(len(candidates)))] for candidates in positions]
         drawn[slot] = tuple(values)
-    for goal in goals_of(episode):
+    for goal in goals:
         for slots in wordings_of(goal):
             goal_values = {slot: values_in(content) for slot, content in slots.items()}
             if goal_values == drawn:

@@ -6,7 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from roboirg.extension.episodes import Goal, goals_of
-from roboirg.extension.policies import Demonstration, RoboIRGEnv, ScriptedPolicy
+from roboirg.extension.policies import (
+    Demonstration,
+    RoboIRGEnv,
+    SaidAndShown,
+    ScriptedPolicy,
+)
 from roboirg_learn.labeled_views import pictures_to_see
 from roboirg_learn.learn_support import check_learn_support
 
@@ -15,6 +20,32 @@ if TYPE_CHECKING:
 
 FRAMES_EVERY = 8
 """Control steps between the frames of the video that it gets."""
+
+
+class LearnedNamer:
+    """Names the goal that a trained listener understands, from words and pictures alone."""
+
+    cameras = ("front",)
+    demonstration_frames = FRAMES_EVERY
+
+    def __init__(self, path: Path) -> None:
+        check_learn_support()
+        from roboirg_learn.listener.learned_model import load_model
+
+        self._model: LearnedModel = load_model(path)
+        self.version = self._model.version
+        self.trained_tasks = self._model.vocabulary.tasks
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """How it was trained."""
+        return {"trained": self._model.about}
+
+    def name_goal(self, given: SaidAndShown) -> Goal:
+        """Return the goal that the listener understands, perhaps one that the scene lacks."""
+        frames = given.demonstration.get("front_rgb", ())
+        pictures = pictures_to_see(given.take_picture(), frames, FRAMES_EVERY)
+        return self._model.understand(given.task, given.text, pictures)
 
 
 class LearnedListener(ScriptedPolicy):
@@ -29,13 +60,10 @@ class LearnedListener(ScriptedPolicy):
 
     def __init__(self, path: Path, seed: int = 0) -> None:
         super().__init__(seed)
-        check_learn_support()
-        from roboirg_learn.listener.learned_model import load_model
-
         self.understood: Goal | None = None
-        self._model: LearnedModel = load_model(path)
-        self.version = self._model.version
-        self.trained_tasks = self._model.vocabulary.tasks
+        self._namer = LearnedNamer(path)
+        self.version = self._namer.version
+        self.trained_tasks = self._namer.trained_tasks
         self._demonstration: Demonstration = {}
 
     @property
@@ -43,7 +71,7 @@ class LearnedListener(ScriptedPolicy):
         """How it was trained, and the goal that it understood."""
         goal = self.understood
         understood = None if goal is None else dict(goal.as_mapping())
-        return {"trained": self._model.about, "understood": understood}
+        return {**self._namer.metadata, "understood": understood}
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode; the instruction is understood when it has been heard to its end."""
@@ -56,8 +84,12 @@ class LearnedListener(ScriptedPolicy):
 
         A goal that the scene does not have cannot be executed.
         """
-        frames = self._demonstration.get("front_rgb", ())
-        pictures = pictures_to_see(env.picture("front"), frames, FRAMES_EVERY)
+        given = SaidAndShown(
+            task=env.episode.task,
+            text=instruction,
+            demonstration=self._demonstration,
+            take_picture=lambda: env.picture("front"),
+        )
         self._demonstration = {}
-        self.understood = self._model.understand(env.episode.task, instruction, pictures)
+        self.understood = self._namer.name_goal(given)
         return self.understood if self.understood in goals_of(env.episode) else None

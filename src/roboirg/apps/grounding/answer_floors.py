@@ -76,7 +76,7 @@ def _right_answers(items: Iterable[GroundingItem]) -> Iterator[Answer]:
 def _learned_guess(items: Sequence[GroundingItem]) -> Guess:
     """Return the guess of the learner of words alone."""
     learned = _learn(items)
-    return lambda item, episode, rng: draw_goal(learned[item.id], episode, rng)
+    return lambda item, episode, rng: draw_goal(learned[item.id], goals_of(episode), rng)
 
 
 def _goal_answers(
@@ -122,7 +122,7 @@ def _left_by_command(item: GroundingItem, episode: Episode) -> tuple[Goal, ...]:
 def _rule_goal(
     rule: str, item: GroundingItem, episode: Episode, rng: np.random.Generator
 ) -> Goal | None:
-    return draw_goal(guess_goal(rule, item.text, item.task), episode, rng)
+    return draw_goal(guess_goal(rule, item.text, item.task), goals_of(episode), rng)
 
 
 _GUESSES: Mapping[str, Guess] = {

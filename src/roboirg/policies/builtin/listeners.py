@@ -108,7 +108,8 @@ class ShortcutPolicy(ScriptedPolicy):
         """
         episode = env.episode
         guess = guess_goal(self.rule, instruction, episode.task)
-        return draw_goal(guess, episode, choice_generator(self.seed, episode, instruction))
+        rng = choice_generator(self.seed, episode, instruction)
+        return draw_goal(guess, goals_of(episode), rng)
 
 
 class FirstMentionPolicy(ShortcutPolicy):

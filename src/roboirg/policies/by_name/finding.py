@@ -25,6 +25,7 @@ from roboirg.core.policy_ref import (
     ELSEWHERE,
     HANDS,
     PRIVILEGED,
+    RESOLVE,
     SCRIPTED,
     UNKNOWN_VERSION,
     Asker,
@@ -42,6 +43,7 @@ from roboirg.policies.by_name.policy_kinds import (
     known_kinds,
     live,
     maker_of,
+    namer_of,
     split_spec,
     system_of,
 )
@@ -52,6 +54,8 @@ from roboirg.policies.contract.policy_version import content_of, file_fingerprin
 from roboirg.policies.planners import OF_MODELS, make_planner
 from roboirg.policies.planners.planner_alone import PlannerAlone
 from roboirg.policies.planners.systems import System
+from roboirg.policies.resolving.resolving_policy import ResolvingPolicy, rewritten_version
+from roboirg.policies.resolving.rewriting import Rewriting, read_rewriting
 
 
 @dataclass(frozen=True)
@@ -83,6 +87,8 @@ def read_policy(spec: str, name: str | None = None) -> PolicyRef:
         MissingDependencyError: a library that the URL's scheme needs is not installed.
     """
     ref = split_spec(spec if name is None else name, spec)
+    if ref.kind == RESOLVE:
+        return _read_rewritten(ref)
     system = system_of(ref.kind, ref.target, dict(ref.options))
     ref = _with_code(ref, system)
     if ref.is_declared and not ref.is_foreign:
@@ -97,6 +103,61 @@ def read_policy(spec: str, name: str | None = None) -> PolicyRef:
     elif ref.place == "split":
         ref = replace(ref, is_privileged=True)  # its scripted hands read the world
     return replace(ref, makeup=_makeup(ref, system))
+
+
+def rewriting_in(ref: PolicyRef) -> Rewriting:
+    """Return what a policy behind a rewriter combines: the namer, and the spec of the policy."""
+    return read_rewriting(ref.spec, ref.target, dict(ref.options))
+
+
+def _read_rewritten(ref: PolicyRef) -> PolicyRef:
+    """Return a policy behind a rewriter, read like `read_policy` from what its spec combines.
+
+    The rewriter plays next to the world, whose task it knows; the policy where it plays alone.
+    """
+    if ref.is_declared:
+        raise InvalidValueError(
+            f"Policy {ref.spec!r} is not a class of your own; write {PRIVILEGED!r} before the "
+            "policy that it names, if that is one."
+        )
+    rewriting = rewriting_in(ref)
+    follower = read_policy(rewriting.policy)
+    options = _changed_options(namer_of(rewriting, 0), dict(rewriting.options))
+    options["behind"] = makeup_text(follower.makeup)
+    if rewriting.wordings is not None:
+        options["wordings"] = rewriting.wordings
+    is_asked = rewriting.namer.partition(":")[0] == LISTENER
+    ref = replace(
+        ref,
+        is_foreign=follower.is_foreign,
+        asks="listener" if is_asked else follower.asks,
+        place="behind" if follower.is_hosted else follower.place,
+        makeup=_joined(f"{RESOLVE}:{rewriting.namer}", options, SCRIPTED),
+    )
+    return behind_rewriter(ref, follower)
+
+
+def behind_rewriter(ref: PolicyRef, follower: PolicyRef) -> PolicyRef:
+    """Return a policy behind a rewriter with what namer and policy declare together.
+
+    Args:
+        ref: of the whole.
+        follower: of the policy behind the rewriter, as far as it is known now.
+    """
+    namer = namer_of(rewriting_in(ref), 0)
+    needs = follower.needs
+    if needs is not None:
+        needs = needs.merge(PolicyNeeds.of_planner(namer))
+    version = UNKNOWN_VERSION
+    if follower.version != UNKNOWN_VERSION:
+        version = rewritten_version(namer, follower)
+    return replace(
+        ref,
+        needs=needs,
+        version=version,
+        problem=follower.problem,
+        is_privileged=follower.is_privileged or hasattr(namer, "attach"),
+    )
 
 
 def _with_code(ref: PolicyRef, system: System | None) -> PolicyRef:
@@ -310,6 +371,8 @@ def declared_by(ref: PolicyRef, declaring: object) -> PolicyRef:
     else:
         version = read_version(declaring)
     is_ours_with_attach = not ref.is_foreign and hasattr(declaring, "attach")
+    if isinstance(declaring, ResolvingPolicy):
+        is_ours_with_attach = declaring.is_privileged
     return replace(
         ref,
         needs=PolicyNeeds.of(declaring),
@@ -328,6 +391,9 @@ def _refuse_undeclared(ref: PolicyRef, made: object) -> None:
         made: the policy, or its class.
     """
     foreign_part = made
+    if isinstance(made, ResolvingPolicy):
+        _refuse_undeclared(read_policy(rewriting_in(ref).policy), made.policy)
+        return
     if ref.place == "split" or isinstance(made, PlannerAlone):
         # With scripted hands the whole has attach; the planner, which is all that is foreign, must
         # not.

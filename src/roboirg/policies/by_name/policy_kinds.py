@@ -9,6 +9,7 @@
 | ``planner:KIND?hands=scripted&model=NAME`` | a planner, and the scripted expert as its hands |
 | ``planner:package.module:Class?hands=scripted`` | a planner of the user's own |
 | ``vlm-listener:PROVIDER?model=NAME&base_url=URL`` | a model names the goal |
+| ``resolve:NAMER?policy=SPEC`` | a policy, and what rewrites the words that it hears |
 
 Installed packages add kinds through entry points of the group ``roboirg.policy_kinds``: an entry
 point has the name of the kind, and names a `PolicyKind` or a module with one as ``KIND``.
@@ -25,7 +26,15 @@ from typing import Any, NamedTuple, cast
 
 from roboirg.core.error_words import OUR_PACKAGES
 from roboirg.core.errors import UnknownNameError
-from roboirg.core.policy_ref import BUILT_IN, ELSEWHERE, HANDS, PRIVILEGED, SCRIPTED, PolicyRef
+from roboirg.core.policy_ref import (
+    BUILT_IN,
+    ELSEWHERE,
+    HANDS,
+    PRIVILEGED,
+    RESOLVE,
+    SCRIPTED,
+    PolicyRef,
+)
 from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.by_name.policy_classes import (
     CHECKPOINTS,
@@ -35,6 +44,7 @@ from roboirg.policies.by_name.policy_classes import (
 )
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.batch_policy import make_batched, takes_batches
+from roboirg.policies.contract.goal_naming import GoalNamer
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.contract.policy_urls import is_url, parse_query, split_url
 from roboirg.policies.planners import make_planner
@@ -42,7 +52,10 @@ from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.planners.planner import Planner
 from roboirg.policies.planners.planner_alone import PlannerAlone
 from roboirg.policies.planners.systems import System, find_system, with_options
-from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
+from roboirg.policies.resolving.goal_namers import OF_OURS, make_namer
+from roboirg.policies.resolving.resolving_policy import ResolvingPolicy
+from roboirg.policies.resolving.rewriting import OPTIONS, Rewriting, read_rewriting
+from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener, VLMNamer
 from roboirg.util.discovery import entry_names, find_entry
 
 CLASS, LIVE, LISTENER, PLANNER, SYSTEM = "class", "live", "vlm-listener", "planner", "system"
@@ -64,11 +77,14 @@ class PolicyKind(NamedTuple):
         read: returns what makes the policies of a spec. For ``planner:gemini?model=m1`` it is
             called with the whole spec, with ``"gemini"``, and with ``{"model": "m1"}``.
         has_weights: whether its policies are trained networks, which get a process of their own.
+        read_namer: called like `read`, returns what makes, from a seed, the part of its policies
+            that names goals, for ``resolve:``; None if they have no such part.
     """
 
     name: str
     read: Callable[[str, str, Mapping[str, str]], PolicyMaker]
     has_weights: bool = False
+    read_namer: Callable[[str, str, Mapping[str, str]], Callable[[int], GoalNamer]] | None = None
 
 
 def split_spec(name: str, spec: str) -> PolicyRef:
@@ -174,6 +190,29 @@ def make_follower(spec: str, seed: int) -> Policy:
     return make(seed)
 
 
+def namer_of(rewriting: Rewriting, seed: int) -> GoalNamer:
+    """Make what names the goals of a rewriter, such as ``surface`` or ``vlm-listener:openai``.
+
+    Raises:
+        UnknownNameError: there is no such namer, or it has no such option.
+    """
+    name = rewriting.namer
+    if name in OF_OURS:
+        if rewriting.options:
+            raise UnknownNameError(f"option of {RESOLVE}:{name}:", min(rewriting.options), OPTIONS)
+        return make_namer(name, seed)
+    kind, _, target = name.partition(":")
+    read = find_kind(kind).read_namer if kind in known_kinds() else None
+    if read is None:
+        raise UnknownNameError("namer", name, (*OF_OURS, f"{LISTENER}:PROVIDER", "learned:FILE"))
+    return read(name, target, rewriting.options)(seed)
+
+
+def put_behind(rewriting: Rewriting, policy: Policy, seed: int) -> ResolvingPolicy:
+    """Return a policy behind a rewriter, whose namer is made now."""
+    return ResolvingPolicy(namer_of(rewriting, seed), policy, rewriting.wordings)
+
+
 def _build(system: System, seed: int) -> Policy:
     """Make the policy of a system: a planner with what follows it, as one policy.
 
@@ -212,13 +251,27 @@ def _of_system(kind: str, _spec: str, target: str, options: Mapping[str, str]) -
 
 
 def _of_listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
-    """Return what makes VLM listeners with a provider; raises for an unknown option.
+    """Return what makes VLM listeners with a provider; raises for an unknown option."""
+    return functools.partial(VLMListener, _listener_options(name, options))
 
-    In the spec, options of the listener and of its model stand side by side.
-    """
-    values = with_options({}, {**options, "provider": name})
-    checked = check_options(ListenerOptions, values, f"policy {LISTENER}:{name}")
-    return functools.partial(VLMListener, checked)
+
+def _of_namer(_spec: str, name: str, options: Mapping[str, str]) -> Callable[[int], GoalNamer]:
+    """Return what makes the namers of VLM listeners; options are those of the listener."""
+    checked = _listener_options(name, options)
+    return lambda _seed: VLMNamer(checked)
+
+
+def _listener_options(provider: str, options: Mapping[str, str]) -> ListenerOptions:
+    """Return the checked options of a VLM listener and its model, which stand side by side."""
+    values = with_options({}, {**options, "provider": provider})
+    return check_options(ListenerOptions, values, f"policy {LISTENER}:{provider}")
+
+
+def _of_rewriter(spec: str, target: str, options: Mapping[str, str]) -> PolicyMaker:
+    """Return what makes policies behind a rewriter."""
+    rewriting = read_rewriting(spec, target, options)
+    make = maker_of(split_spec(rewriting.policy, rewriting.policy))
+    return lambda seed: put_behind(rewriting, make(seed), seed)
 
 
 def _of_process(spec: str, name: str, _options: Mapping[str, str]) -> PolicyMaker:
@@ -242,6 +295,7 @@ def _of_process(spec: str, name: str, _options: Mapping[str, str]) -> PolicyMake
 OURS = {
     SYSTEM: PolicyKind(SYSTEM, functools.partial(_of_system, SYSTEM)),
     PLANNER: PolicyKind(PLANNER, functools.partial(_of_system, PLANNER)),
-    LISTENER: PolicyKind(LISTENER, _of_listener),
+    LISTENER: PolicyKind(LISTENER, _of_listener, read_namer=_of_namer),
+    RESOLVE: PolicyKind(RESOLVE, _of_rewriter),
     LIVE: PolicyKind(LIVE, _of_process),
 }

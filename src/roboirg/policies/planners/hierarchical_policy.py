@@ -229,10 +229,10 @@ def _attach(parts: tuple[object, ...], env: RoboIRGEnv) -> None:
             part.attach(env)
 
 
-def joint_version(*parts: object) -> str:
+def joint_version(*parts: object, between: str = BETWEEN_VERSIONS) -> str:
     """Return the versions of a planner and its policy as one text, in their order.
 
-    A part without a version counts with the fingerprint of its file.
+    A part without a version counts with the fingerprint of its file. `between` separates them.
     """
     versions = [read_version(part) or file_fingerprint(part) or UNKNOWN_VERSION for part in parts]
-    return BETWEEN_VERSIONS.join(versions)
+    return between.join(versions)

@@ -16,6 +16,7 @@ from pydantic import Field as Option
 from roboirg.core.episode import Goal
 from roboirg.core.observations import Demonstration
 from roboirg.policies.builtin.scripted import ScriptedPolicy
+from roboirg.policies.contract.goal_naming import SaidAndShown
 from roboirg.policies.vlm.goal_schema import GoalSchema, goal_schema
 from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
 from roboirg.policies.vlm.model_content import ChatTurn, Part, summary_clip
@@ -54,6 +55,91 @@ class ListenerOptions(BaseModel):
     prompts: str | None = None
 
 
+class VLMNamer:
+    """Names the goal that a vision-language model understands, from words and pictures alone.
+
+    Args:
+        options: of the listener and its model.
+        connect: connects the model.
+
+    Raises:
+        InvalidValueError: the prompts cannot be read.
+    """
+
+    cameras: tuple[str, ...] = (CAMERA,)
+
+    def __init__(
+        self, options: ListenerOptions, connect: Callable[[ModelOptions], Model] = make_model
+    ) -> None:
+        self.options = options
+        self.demonstration_frames: int | str = options.frames_every
+        if not options.pictures:
+            self.cameras = ()
+            self.demonstration_frames = "none"
+        self.prompts = load_prompts(PROMPTS, options.prompts)
+        self._vlm = VLMQuery(options.model, self.prompts["again"], connect)
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """Options and prompts; there is no key among them."""
+        return {
+            "model": self.options.model.about(),
+            "prompts": self.prompts.fingerprint,
+            **self.options.model_dump(mode="json", exclude={"model", "prompts"}),
+        }
+
+    @property
+    def version(self) -> str:
+        """The model, and a fingerprint of the options and prompts that may change its answers."""
+        return config_version(self.options.model, self.metadata)
+
+    def start(self) -> None:
+        """Reset the costs for a new episode."""
+        self._vlm.start()
+
+    def usage(self) -> dict[str, float]:
+        """Return the costs of the episode."""
+        return self._vlm.usage()
+
+    def name_goal(self, given: SaidAndShown) -> Goal | None:
+        """Return the goal that the model names; None if it gives no valid answer.
+
+        Raises:
+            PolicyConnectionError: the model cannot be reached.
+            PolicyTimeoutError: it did not answer in time.
+            PolicyReplyError: it replied with an error.
+        """
+        schema = goal_schema(given.task)
+        return self._vlm.ask(self._build_query(given, schema), schema.read)
+
+    def _build_query(self, given: SaidAndShown, schema: GoalSchema) -> ModelQuery:
+        """Return the query for the goal of an instruction, with video and picture if it has any.
+
+        Args:
+            given: what was said and shown.
+            schema: of the answer.
+        """
+        reasoning = None
+        if self.options.reasoning:
+            reasoning = self.prompts.fill("reasoning_field")
+        steps = len(given.demonstration.get("joint_positions", ()))
+        texts = question_texts(self.prompts, schema, given.text, steps, reasoning)
+        if self.options.pictures:
+            video = self._video(given.demonstration, steps)
+            parts = texts.parts(video, Picture(given.take_picture()))
+        else:
+            parts = (texts.instruction, texts.question)
+        turn = ChatTurn("user", parts)
+        return ModelQuery(texts.system, (turn,), schema.schema(reasoning))
+
+    def _video(self, demonstration: Demonstration, steps: int) -> tuple[Part, ...]:
+        """Return the demonstration, of so many control steps, as a clip; none without one."""
+        if not steps:
+            return ()
+        frames = demonstration[f"{CAMERA}_rgb"]
+        return (summary_clip(frames, self.options.frames, steps),)
+
+
 class VLMListener(ScriptedPolicy):
     """Executes the goal that a vision-language model names.
 
@@ -70,8 +156,6 @@ class VLMListener(ScriptedPolicy):
         InvalidValueError: the prompts cannot be read.
     """
 
-    cameras: tuple[str, ...] = (CAMERA,)
-
     def __init__(
         self,
         options: ListenerOptions,
@@ -79,37 +163,26 @@ class VLMListener(ScriptedPolicy):
         connect: Callable[[ModelOptions], Model] = make_model,
     ) -> None:
         super().__init__(seed)
+        self.namer = VLMNamer(options, connect)
         self.options = options
-        self.demonstration_frames: int | str = options.frames_every
-        if not options.pictures:
-            self.cameras = ()
-            self.demonstration_frames = "none"
-        self.prompts = load_prompts(PROMPTS, options.prompts)
-        self._about = {
-            "model": options.model.about(),
-            "prompts": self.prompts.fingerprint,
-            **options.model_dump(mode="json", exclude={"model", "prompts"}),
-        }
+        self.cameras = self.namer.cameras
+        self.demonstration_frames = self.namer.demonstration_frames
         self.understood: Goal | None = None
-        self._vlm = VLMQuery(options.model, self.prompts["again"], connect)
         self._demonstration: Demonstration = {}
         self._impossible = False
 
     @property
     def version(self) -> str:
         """The model, and a fingerprint of the options and prompts that may change its answers."""
-        return config_version(self.options.model, self._about)
+        return self.namer.version
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """Options and prompts, and the goal that the model named (None if none was valid).
-
-        There is no key among them.
-        """
+        """Options and prompts, and the goal that the model named (None if none was valid)."""
         understood = None
         if self.understood is not None:
             understood = dict(self.understood.as_mapping())
-        return {**self._about, "understood": understood}
+        return {**self.namer.metadata, "understood": understood}
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Query the goal and begin to execute it, or first hear the rest of the instruction.
@@ -119,7 +192,7 @@ class VLMListener(ScriptedPolicy):
             PolicyTimeoutError: it did not answer in time.
             PolicyReplyError: it replied with an error.
         """
-        self._vlm.start()
+        self.namer.start()
         self._demonstration = demonstration
         self.understood = None
         self._impossible = False
@@ -127,9 +200,13 @@ class VLMListener(ScriptedPolicy):
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
         """Return the goal that the model names; None if it names none, or one not in this scene."""
-        schema = goal_schema(env.episode.task)
-        query = self._build_query(env, schema, instruction)
-        goal = self._vlm.ask(query, schema.read)
+        given = SaidAndShown(
+            task=env.episode.task,
+            text=instruction,
+            demonstration=self._demonstration,
+            take_picture=lambda: env.picture(CAMERA),
+        )
+        goal = self.namer.name_goal(given)
         self.understood = goal
         if goal is not None and goal not in goals_of(env.episode):
             self._impossible = True
@@ -138,31 +215,4 @@ class VLMListener(ScriptedPolicy):
 
     def usage(self) -> dict[str, float]:
         """Return the cost of the episode."""
-        return {**self._vlm.usage(), "impossible": int(self._impossible)}
-
-    def _build_query(self, env: RoboIRGEnv, schema: GoalSchema, instruction: str) -> ModelQuery:
-        """Return the query for the goal of an instruction, with video and picture if it has any.
-
-        Args:
-            env: shows the scene.
-            schema: of the answer.
-            instruction: everything that was said.
-        """
-        reasoning = None
-        if self.options.reasoning:
-            reasoning = self.prompts.fill("reasoning_field")
-        steps = len(self._demonstration.get("joint_positions", ()))
-        texts = question_texts(self.prompts, schema, instruction, steps, reasoning)
-        if self.options.pictures:
-            parts = texts.parts(self._video(steps), Picture(env.picture(CAMERA)))
-        else:
-            parts = (texts.instruction, texts.question)
-        turn = ChatTurn("user", parts)
-        return ModelQuery(texts.system, (turn,), schema.schema(reasoning))
-
-    def _video(self, steps: int) -> tuple[Part, ...]:
-        """Return the demonstration as a clip; none without one."""
-        if not steps:
-            return ()
-        frames = self._demonstration[f"{CAMERA}_rgb"]
-        return (summary_clip(frames, self.options.frames, steps),)
+        return {**self.namer.usage(), "impossible": int(self._impossible)}

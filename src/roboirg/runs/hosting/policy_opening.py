@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.policy_needs import PolicyNeeds
-from roboirg.core.policy_ref import SCRIPTED, PolicyRef
+from roboirg.core.policy_ref import RESOLVE, SCRIPTED, PolicyRef
+from roboirg.policies.by_name.finding import behind_rewriter, read_policy, rewriting_in
 from roboirg.policies.by_name.policy_kinds import make_follower
 from roboirg.policies.contract.batch_policy import forget_batched
 from roboirg.policies.opening import opened
@@ -40,6 +41,9 @@ def open_policy(
     """
     if not ref.is_foreign:
         return ref
+    if ref.kind == RESOLVE:
+        follower = read_policy(rewriting_in(ref).policy)
+        return behind_rewriter(ref, open_policy(follower, limit_s, settings))
     forget_batched(ref.body)
     if ref.place == "python":
         return opened(ref)

@@ -27,6 +27,7 @@ from roboirg.policies.contract.policy_calls import (
     server_version,
 )
 from roboirg.policies.contract.policy_version import read_version
+from roboirg.policies.resolving.resolving_policy import ResolvingPolicy
 from roboirg.records.action_log import ActionLog
 from roboirg.records.record import Record, SubgoalRecord
 from roboirg.runs.job_instruction import PreparedJob
@@ -164,8 +165,11 @@ class GuardedLoop(EpisodeLoop):
         return moment
 
     def start_policy(self, instruction: str, demonstration: Demonstration) -> None:
-        """Start the policy, which gets the world only if its spec declares that."""
-        if self._record.ref.is_privileged:
+        """Start the policy, which gets the world only if its spec declares that.
+
+        So does a rewriter of ours, which hands the world on to nothing that is not privileged.
+        """
+        if self._record.ref.is_privileged or isinstance(self.policy, ResolvingPolicy):
             super().start_policy(instruction, demonstration)
         else:
             self.policy.reset(instruction, demonstration)

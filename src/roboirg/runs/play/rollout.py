@@ -26,13 +26,14 @@ from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import SCRIPTED, PolicyRef
-from roboirg.policies.by_name.finding import make_policy
-from roboirg.policies.by_name.policy_kinds import make_follower
+from roboirg.policies.by_name.finding import make_policy, read_policy, rewriting_in
+from roboirg.policies.by_name.policy_kinds import make_follower, put_behind
 from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_calls import GUESSED, policy_usage
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit
 from roboirg.policies.prompt_length.tokenizer_file import prompt_limit
+from roboirg.policies.resolving.resolving_policy import ResolvingPolicy
 from roboirg.policies.vlm.models.reply_store import ReplySettings, use_replies
 from roboirg.records.action_log import ActionLog, write_actions
 from roboirg.records.film import VIDEO_FOLDER, VideoMode
@@ -272,11 +273,11 @@ def load_policy(prepared: PreparedJob) -> Policy:
 
 def load_hosted_policy(
     hosts: socket, prepared: PreparedJob, limit_s: float | None, *, alone: bool = False
-) -> HostedPolicy | HierarchicalPolicy:
+) -> HostedPolicy | HierarchicalPolicy | ResolvingPolicy:
     """Return a policy of the user's, whose code runs in a process of its own.
 
     If a user's planner names subgoals for our scripted hands, only the planner is in that process:
-    the hands need the simulator, which is in this one.
+    the hands need the simulator, which is in this one. So does a rewriter before the policy.
 
     Args:
         hosts: the line on which to ask for the process.
@@ -284,13 +285,22 @@ def load_hosted_policy(
         limit_s: seconds that one call may take.
         alone: whether it must not be asked about this episode together with others.
     """
-    ref = _policy_of(prepared)
-    seed = _seed_of(prepared)
-    if ref.place != "split":
-        return HostedPolicy(hosts, ref, seed, limit_s, alone=alone)
-    planner = HostedPlanner(hosts, ref.hosted_part, seed, limit_s, alone=alone)
-    hands = make_follower(SCRIPTED, seed)
-    return HierarchicalPolicy(planner, hands, f"{ref.kind}:{ref.target}")
+    return _hosted(hosts, _policy_of(prepared), _seed_of(prepared), limit_s, alone=alone)
+
+
+def _hosted(
+    hosts: socket, ref: PolicyRef, seed: int, limit_s: float | None, *, alone: bool
+) -> HostedPolicy | HierarchicalPolicy | ResolvingPolicy:
+    """Return a policy of which something runs in a process of its own, as `load_hosted_policy`."""
+    if ref.place == "split":
+        planner = HostedPlanner(hosts, ref.hosted_part, seed, limit_s, alone=alone)
+        hands = make_follower(SCRIPTED, seed)
+        return HierarchicalPolicy(planner, hands, f"{ref.kind}:{ref.target}")
+    if ref.place == "behind":
+        rewriting = rewriting_in(ref)
+        follower = _hosted(hosts, read_policy(rewriting.policy), seed, limit_s, alone=alone)
+        return put_behind(rewriting, follower, seed)
+    return HostedPolicy(hosts, ref, seed, limit_s, alone=alone)
 
 
 def _policy_of(prepared: PreparedJob) -> PolicyRef:
