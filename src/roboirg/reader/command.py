@@ -278,8 +278,9 @@ def _read_words(match: PhraseMatch) -> str:
 def _read_goal(match: PhraseMatch) -> Value:
     """Return where a phrase says to put something: *on target#1*, *into the bin*.
 
-    A placeholder gives its meaning, such as a `Target`; a noun gives itself, ``"bin"``. None, so
-    that the phrase stays unread, if it is on a thing that can be no box: *on the red cube*.
+    *on target#1* gives the `Target` that the placeholder stands for, *into the bin* the noun
+    ``"bin"``. A thing must be a box, told by its color or place: *in the red box*. For any other,
+    *on the red cube*, it is None, so that the phrase stays unread.
     """
     words = match["goal"]  # after "on" or "to": "target#1", "the same bin"
     if "#" not in words:

@@ -271,17 +271,18 @@ def _counts_things(words: Sentence, index: int, slot: str) -> bool:
     | *the second three* | no: what it counts is a rank |
     | *one of them* | only in the slot ``counts``, where it is one cube |
     """
-    before = _word_before(words, index)
-    following = words[index + 1 : index + 3]
-    is_of_times = following[:1] == ("times",)  # "we tried this three times"
-    if ordinal_of(before) is not None or (before in POINTING and not is_of_times):
+    word_before = _word_before(words, index)
+    two_after = words[index + 1 : index + 3]
+    is_of_times = two_after[:1] == ("times",)  # "we tried this three times"
+    is_pronoun = word_before in POINTING and not is_of_times
+    if is_pronoun or ordinal_of(word_before) is not None:
         return False
-    is_part = following[:1] == ("of",) and not PRONOUNS.isdisjoint(following)  # "one of them"
+    is_part = two_after[:1] == ("of",) and not PRONOUNS.isdisjoint(two_after)  # "one of them"
     if is_part and slot != "counts":
         return False
     is_ordinal = SLOT_TYPE_NAMES.get(slot) in ORDINAL_TYPES
     differences = COMPARISONS | STEPS if is_ordinal else COMPARISONS
-    return differences.isdisjoint(following)
+    return differences.isdisjoint(two_after)
 
 
 def _is_stated_plainly(words: Sentence, mention: _Mention) -> bool:
