@@ -101,10 +101,10 @@ def learn_listener(
 
 
 def _listener_plan(words: PlanWords, without: str) -> TrainingPlan:
-    """Return how a listener is trained, from the words of the command and its plan file.
+    """Return how a listener is trained, from the command line and the plan file.
 
     Args:
-        words: what was given.
+        words: the command's options and its plan file.
         without: what it does not get: none, pictures, video or words.
     """
     from roboirg_learn.listener.learned_model import WITHOUTS
@@ -132,7 +132,7 @@ def _run_study(plan: TrainingPlan, out: Path, workers: int) -> None:
 
 
 def _check_folder(out: Path, needed: str) -> None:
-    """Refuse a file where a folder is needed."""
+    """Refuse a file where a folder is needed; `needed` says so, for the message."""
     if out.exists() and not out.is_dir():
         raise InvalidValueError(f"{str(out)!r} is a file; {needed}.")
 
@@ -200,9 +200,9 @@ def _reader_plan(
     Args:
         words: the command's options and its plan file.
         tasks: names of tasks.
-        settings: those whose instructions it hears, as given as an option; "none" for a reader
-            without words.
-        usual: values of fields that the plan file does not have, in place of `ReaderPlan`'s.
+        settings: those whose instructions it hears, as the option was given: ``explicit,direct``,
+            ``all``, or ``none`` for a reader without words. The plan file's come first.
+        usual: defaults in place of `ReaderPlan`'s, for fields that the plan file does not have.
     """
     from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.listener.vocabulary import WORD_POOLS
@@ -320,7 +320,10 @@ def _play_paper(
 
 
 def _plan_changes(words: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
-    """Return the options that a plan file changes in all parts of the paper's experiment."""
+    """Return the options of runs that hold in all parts of the paper's experiment.
+
+    They are the tasks, and ``episodes`` and ``split`` if the plan file has them.
+    """
     changes: dict[str, Any] = {"tasks": tasks}
     for name in ("episodes", "split"):
         if name in words.fields:
@@ -329,8 +332,11 @@ def _plan_changes(words: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _print_tenths() -> Progress:
-    """Return a function that prints progress to stderr: each tenth, and whatever has a note."""
-    shown: dict[str, int] = {}  # the last tenth of each kind of work
+    """Return a function that prints progress to stderr: each tenth, and whatever has a note.
+
+    A line is such as ``detector: 3 of 12, loss 1.234``.
+    """
+    shown: dict[str, int] = {}  # the last tenth printed of each kind of work
 
     def progress(work: str, done: int, total: int, note: str = "") -> None:
         tenth = 10 * done // total

@@ -54,7 +54,8 @@ class LearnedListener(ScriptedPolicy):
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
         """Return the goal that the listener understands, to be executed; None to hold still.
 
-        A goal that the scene does not have cannot be executed.
+        A goal that the scene does not have cannot be executed. What was understood stays in
+        `understood`, for the record.
         """
         frames = self._demonstration.get("front_rgb", ())
         pictures = pictures_to_see(env.picture("front"), frames, FRAMES_EVERY)
