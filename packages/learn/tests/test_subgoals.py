@@ -10,9 +10,10 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg_learn.policy.planner_history import (
     MAX_CHOSEN,
     MAX_SWITCHES,
-    PLANNER_HISTORIES,
     RECENT,
     VIDEO_FRAMES,
+    KeyframeHistory,
+    PlannerHistory,
     context_size,
     ideal_planner_inputs,
     recent_looks,
@@ -100,7 +101,7 @@ def test_recordings_give_the_due_subgoal_with_the_point_at_its_start():
 
 def test_planner_history_keeps_the_looks_at_which_the_subgoal_changed():
     """Subgoal templates are numbered; 0 is due at looks 2 and 4, 1 at 7, 0 again at 9."""
-    history = PLANNER_HISTORIES["subgoal"](3)
+    history = PlannerHistory(3)
     for template, look in ((0, 2), (0, 4), (1, 7), (0, 9)):
         history.name(template, look)
     assert history.switches == [2, 7, 9]
@@ -119,7 +120,7 @@ def test_planner_history_keeps_the_looks_at_which_the_subgoal_changed():
 
 def test_neighboring_key_frames_are_merged_into_their_middle_one():
     """Looks are as far apart as the merge rule's gap, so that neighbors join."""
-    history = PLANNER_HISTORIES["keyframes"](3)
+    history = KeyframeHistory(3)
     history.choose([5, 6, 7])
     history.choose([20, 21])
     history.choose([23, 40])
@@ -138,8 +139,8 @@ def test_neighboring_key_frames_are_merged_into_their_middle_one():
 def test_training_inputs_equal_those_of_a_planner_that_is_always_right():
     templates = np.array([0, 0, 1, 1, 0])
     looks = np.array([1, 4, 6, 9, 12])
-    subgoal_inputs = ideal_planner_inputs(PLANNER_HISTORIES["keyframes"](2), templates, looks, 0)
-    history = PLANNER_HISTORIES["keyframes"](2)
+    subgoal_inputs = ideal_planner_inputs(KeyframeHistory(2), templates, looks, 0)
+    history = KeyframeHistory(2)
     for number, (template, look) in enumerate(zip(templates, looks, strict=True)):
         assert np.array_equal(subgoal_inputs.context[number], history.context(look))
         assert np.array_equal(subgoal_inputs.kept_looks[number], history.kept(0, look))
@@ -149,13 +150,12 @@ def test_training_inputs_equal_those_of_a_planner_that_is_always_right():
 
     assert subgoal_inputs.to_keep[:, -1].tolist() == [1, 0, 1, 0, 1]
 
-    empty = PLANNER_HISTORIES["keyframes"](2)
-    unasked = ideal_planner_inputs(empty, np.array([0, -1, 1]), np.array([1, 2, 6]), 0)
+    unasked = ideal_planner_inputs(KeyframeHistory(2), np.array([0, -1, 1]), np.array([1, 2, 6]), 0)
     assert (unasked.to_keep[1] == -1).all()
     assert np.array_equal(unasked.context[2], subgoal_inputs.context[2])
     assert subgoal_inputs.to_keep[0, :-2].tolist() == [-1] * (RECENT - 2)
-    kept_at_9 = np.flatnonzero(subgoal_inputs.to_keep[3] == 1)
-    assert [recent_looks(9)[index] for index in kept_at_9] == [6]
+    kept = np.flatnonzero(subgoal_inputs.to_keep[3] == 1)
+    assert [recent_looks(9)[index] for index in kept] == [6]
 
 
 @pytest.fixture(params=["subgoal", "keyframes"])
@@ -271,8 +271,9 @@ def test_a_learned_planner_may_point_at_an_object_that_is_out_of_sight(saved_pol
         *(rng.normal(0, 0.1, (looks, things, 2)).astype(np.float32) for _ in range(2)),
         seen, np.ones_like(seen), rng.normal(0, 1, (looks, TOOL_NUMBERS)).astype(np.float32),
     )  # fmt: skip
-    history = PLANNER_HISTORIES[model.plan["memory"]](size)
-    subgoal_inputs = ideal_planner_inputs(history, np.array([0, 1]), np.array([2, 5]), 0)
+    subgoal_inputs = ideal_planner_inputs(
+        KeyframeHistory(size), np.array([0, 1]), np.array([2, 5]), 0
+    )
     goal = np.zeros(model.goals.size, np.float32)
     nothing = np.array([-1, -1])
     numbers = EpisodeArrays(shown, goal, np.array([2, 5]), *[nothing] * 3, subgoal_inputs)

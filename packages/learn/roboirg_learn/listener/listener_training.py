@@ -347,9 +347,11 @@ class DetectorCourse(Course[LabeledView]):
         return [tasks, list(self._classes), self.epochs, ENVIRONMENT_VERSION]
 
     def batches(self, epoch: int) -> Iterator[list[LabeledView]]:
+        """Return all labeled pictures of the train split in random batches."""
         return batches(self._learned, random.Random(f"{self._plan.reader.seed}/{epoch}"))
 
     def loss(self, batch: Sequence[LabeledView]) -> torch.Tensor:
+        """Return `detector_loss` of a batch."""
         return detector_loss(self.net, batch, self._classes)
 
     def score(self) -> dict[str, float]:

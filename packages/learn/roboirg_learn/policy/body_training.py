@@ -141,6 +141,7 @@ class BodyCourse(Course[EpisodeArrays]):
         return even_batches(self._learned, rng, _length, BATCH)
 
     def loss(self, batch: Sequence[EpisodeArrays]) -> Tensor:
+        """Return `body_loss` of a batch."""
         return body_loss(self.net, to_batch(batch))
 
     def score(self) -> dict[str, float]:

@@ -76,6 +76,7 @@ class KeptFrameMemory(EvenFrameMemory):
     """The same with looks that a planner keeps; it may choose objects that are out of sight."""
 
     def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
+        """Return the same; any object that was seen often enough may be chosen."""
         output = super().forward(looks, decisions)
         return output._replace(can_choose=values_at_looks(looks.confirmed, decisions))
 

@@ -42,6 +42,7 @@ class JointChunks:
 
     @property
     def metadata(self) -> dict[str, Any]:
+        """How the policy was trained."""
         return self.policy.metadata
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
@@ -79,6 +80,7 @@ class JointChunks:
         }
 
     def hear(self, text: str, step: int) -> None:
+        """Hear another utterance."""
         self.policy.hear(text, step)
 
     def act(self, observation: Observation) -> JointTrajectory:

@@ -197,9 +197,10 @@ def choose_only_visible(
 
 
 class NoMemory(LookMemory):
-    """Remembers nothing."""
+    """Remembers nothing but the last known positions, which are part of the looks."""
 
     def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
+        """Return zeros; only objects in sight may be chosen."""
         return choose_only_visible(looks, decisions)
 
 

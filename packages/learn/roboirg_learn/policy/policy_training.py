@@ -284,6 +284,7 @@ class ObjectDetectorCourse(Course[LabeledPicture]):
             yield [augmented(view, variation) for view in batch]
 
     def loss(self, batch: Sequence[LabeledPicture]) -> torch.Tensor:
+        """Return `detector_loss` of a batch."""
         return detector_loss(self.net, batch)
 
     def _decode_once(self) -> None:

@@ -151,13 +151,16 @@ class LearnedPlanner:
 
     @property
     def metadata(self) -> dict[str, Any]:
+        """How its body and its reader were trained."""
         return self._eyes.metadata
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Begin an episode: hear the instruction and look at the video."""
         self._eyes.reset(instruction, demonstration)
         self._namer = SubgoalNamer(self._eyes.model, self._eyes.seen)
 
     def hear(self, text: str, step: int) -> None:
+        """Hear another utterance; the goal is understood anew."""
         self._eyes.hear(text, step)
 
     def plan(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
