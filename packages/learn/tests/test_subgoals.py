@@ -139,23 +139,22 @@ def test_neighboring_key_frames_are_merged_into_their_middle_one():
 def test_training_inputs_equal_those_of_a_planner_that_is_always_right():
     templates = np.array([0, 0, 1, 1, 0])
     looks = np.array([1, 4, 6, 9, 12])
-    subgoal_inputs = ideal_planner_inputs(KeyframeHistory(2), templates, looks, 0)
+    inputs = ideal_planner_inputs(KeyframeHistory(2), templates, looks, 0)
     history = KeyframeHistory(2)
     for number, (template, look) in enumerate(zip(templates, looks, strict=True)):
-        assert np.array_equal(subgoal_inputs.context[number], history.context(look))
-        assert np.array_equal(subgoal_inputs.kept_looks[number], history.kept(0, look))
+        assert np.array_equal(inputs.context[number], history.context(look))
+        assert np.array_equal(inputs.kept_looks[number], history.kept(0, look))
         history.name(template, look)
         if look in history.switches:
             history.choose([look])
 
-    assert subgoal_inputs.to_keep[:, -1].tolist() == [1, 0, 1, 0, 1]
+    assert inputs.to_keep[:, -1].tolist() == [1, 0, 1, 0, 1]
 
     unasked = ideal_planner_inputs(KeyframeHistory(2), np.array([0, -1, 1]), np.array([1, 2, 6]), 0)
     assert (unasked.to_keep[1] == -1).all()
-    assert np.array_equal(unasked.context[2], subgoal_inputs.context[2])
-    assert subgoal_inputs.to_keep[0, :-2].tolist() == [-1] * (RECENT - 2)
-    kept = np.flatnonzero(subgoal_inputs.to_keep[3] == 1)
-    assert [recent_looks(9)[index] for index in kept] == [6]
+    assert np.array_equal(unasked.context[2], inputs.context[2])
+    assert inputs.to_keep[0, :-2].tolist() == [-1] * (RECENT - 2)
+    assert [recent_looks(9)[index] for index in np.flatnonzero(inputs.to_keep[3] == 1)] == [6]
 
 
 @pytest.fixture(params=["subgoal", "keyframes"])
