@@ -100,20 +100,20 @@ def learn_listener(
     typer.echo(f"{out}, {out.stat().st_size / 2**20:.1f} MiB")
 
 
-def _listener_plan(words: PlanWords, without: str) -> TrainingPlan:
-    """Return how a listener is trained, from the words of the command and its plan file.
+def _listener_plan(command_plan: PlanWords, without: str) -> TrainingPlan:
+    """Return how a listener is trained, from the command line and the plan file.
 
     Args:
-        words: what was given.
+        command_plan: the command's options and its plan file.
         without: what it does not get: none, pictures, video or words.
     """
     from roboirg_learn.listener.learned_model import WITHOUTS
     from roboirg_learn.listener.listener_training import TrainingPlan
 
     return TrainingPlan(
-        _reader_plan(words, words.tasks(), "all", reader_epochs=LISTENER_EPOCHS),
+        _reader_plan(command_plan, command_plan.tasks(), "all", reader_epochs=LISTENER_EPOCHS),
         without=known_name("variant", without, WITHOUTS),
-        **words.choices(TrainingPlan),
+        **command_plan.choices(TrainingPlan),
     )
 
 
@@ -132,7 +132,7 @@ def _run_study(plan: TrainingPlan, out: Path, workers: int) -> None:
 
 
 def _check_folder(out: Path, needed: str) -> None:
-    """Refuse a file where a folder is needed."""
+    """Refuse a file where a folder is needed; `needed` says so, for the message."""
     if out.exists() and not out.is_dir():
         raise InvalidValueError(f"{str(out)!r} is a file; {needed}.")
 
@@ -174,17 +174,17 @@ def learn_policy(
     from roboirg_learn.learn_support import check_learn_support
     from roboirg_learn.policy.policy_plan import MEMORY_NAMES, BodyPlan
 
-    words = PlanWords(context, plan, TRAINING, POLICY_OPTIONS)
-    reader_plan = _reader_plan(words, words.tasks(tasks), settings)
+    command_plan = PlanWords(context, plan, TRAINING, POLICY_OPTIONS)
+    reader_plan = _reader_plan(command_plan, command_plan.tasks(tasks), settings)
     memory = known_name("memory", memory, MEMORY_NAMES)
-    body_plan = BodyPlan(reader_plan.tasks, memory, **words.choices(BodyPlan))
+    body_plan = BodyPlan(reader_plan.tasks, memory, **command_plan.choices(BodyPlan))
     if paper and memory != USUAL_MEMORY:
         raise InvalidValueError("--paper has its memories from the plan: training.memories.")
     _check_folder(out, "--out needs a folder")
     check_learn_support()
     with locked(out / ".lock", f"Another command learns in {str(out)!r}."):
         if paper:
-            _play_paper(body_plan, reader_plan, words, out, worker_count(workers))
+            _play_paper(body_plan, reader_plan, command_plan, out, worker_count(workers))
             return
         from roboirg_learn.policy.policy_training import trained_files
 
@@ -193,28 +193,29 @@ def learn_policy(
 
 
 def _reader_plan(
-    words: PlanWords, tasks: tuple[str, ...], settings: str, **usual: int
+    command_plan: PlanWords, tasks: tuple[str, ...], settings: str, **usual: int
 ) -> ReaderPlan:
     """Return how a reader of words is trained.
 
     Args:
-        words: the command's options and its plan file.
+        command_plan: the command's options and its plan file.
         tasks: names of tasks.
-        settings: those whose instructions it hears, as given as an option; "none" for a reader
-            without words.
-        usual: values of fields that the plan file does not have, in place of `ReaderPlan`'s.
+        settings: those whose instructions it hears, as the option was given: ``explicit,direct``,
+            ``all``, or ``none`` for a reader without words. If it was not typed, the plan file's
+            are taken.
+        usual: defaults in place of `ReaderPlan`'s, for fields that the plan file does not have.
     """
     from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.listener.vocabulary import WORD_POOLS
 
-    hears_none = words.given("settings", settings) in ("none", ["none"])
-    heard = () if hears_none else words.settings(settings)
-    pool = words.fields.get("wordings") or "train"
+    hears_none = command_plan.given("settings", settings) in ("none", ["none"])
+    heard = () if hears_none else command_plan.settings(settings)
+    pool = command_plan.fields.get("wordings") or "train"
     return ReaderPlan(
         tasks,
         heard,
         words=known_name("pool of words", pool, WORD_POOLS),
-        **{**usual, **words.choices(ReaderPlan)},
+        **{**usual, **command_plan.choices(ReaderPlan)},
     )
 
 
@@ -245,12 +246,12 @@ def learn_reader(
     from roboirg_learn.policy.trained_reader import save_reader
     from roboirg_learn.policy.word_training import check_words, train_policy_reader
 
-    words = PlanWords(context, plan, TRAINING, READER_OPTIONS)
+    command_plan = PlanWords(context, plan, TRAINING, READER_OPTIONS)
     check_output_file(out)
     trained_body = load_body(body)
     if tasks == "all":
         tasks = ",".join(trained_body.goals.tasks)
-    reader_plan = _reader_plan(words, words.tasks(tasks), settings)
+    reader_plan = _reader_plan(command_plan, command_plan.tasks(tasks), settings)
     for task in reader_plan.tasks:
         known_name("task of this body", task, trained_body.goals.tasks)
     check_words(reader_plan)
@@ -276,14 +277,14 @@ def print_policy(files: PolicyFiles, plan: ReaderPlan) -> None:
 
 
 def _play_paper(
-    body_plan: BodyPlan, reader_plan: ReaderPlan, words: PlanWords, out: Path, workers: int
+    body_plan: BodyPlan, reader_plan: ReaderPlan, command_plan: PlanWords, out: Path, workers: int
 ) -> None:
     """Train a policy for each memory, play the paper's experiment, and print the page's path.
 
     Args:
         body_plan: of the bodies; the experiment sets the memory of each.
         reader_plan: of their reader.
-        words: the command's options and its plan file, which has the experiment.
+        command_plan: the command's options and its plan file, which has the experiment.
         out: folder for files, runs and the page.
         workers: processes that record and play.
     """
@@ -300,16 +301,17 @@ def _play_paper(
     )
     from roboirg_learn.policy.paper_page import INTRODUCTION, answers_text
 
-    experiment = ExperimentPlan(**words.choices(ExperimentPlan))
+    experiment = ExperimentPlan(**command_plan.choices(ExperimentPlan))
     check_experiment(experiment)
     files = train_rows(experiment, body_plan, reader_plan, out, workers, _print_tenths())
-    changes = _plan_changes(words, reader_plan.tasks)
+    changes = _plan_changes(command_plan, reader_plan.tasks)
     results = {}
     for part in experiment.parts:
         options = part_options(part, experiment, files, changes)
         run = MAIN if part == RESOLVED else part
         results[run] = roboirg.evaluate(**options, out=out / RUNS / run, workers=workers)
 
+    # The page: an introduction, the paper's tables with our rows, and its questions.
     texts = [INTRODUCTION]
     for run, result in results.items():
         texts.append(result.table(run, "markdown", published=True))
@@ -319,18 +321,24 @@ def _play_paper(
     typer.echo(str(page))
 
 
-def _plan_changes(words: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
-    """Return the options that a plan file changes in all parts of the paper's experiment."""
+def _plan_changes(command_plan: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
+    """Return the options of runs that hold in all parts of the paper's experiment.
+
+    They are the tasks, and ``episodes`` and ``split`` if the plan file has them.
+    """
     changes: dict[str, Any] = {"tasks": tasks}
     for name in ("episodes", "split"):
-        if name in words.fields:
-            changes[name] = words.fields[name]
+        if name in command_plan.fields:
+            changes[name] = command_plan.fields[name]
     return changes
 
 
 def _print_tenths() -> Progress:
-    """Return a function that prints progress to stderr: each tenth, and whatever has a note."""
-    shown: dict[str, int] = {}  # the last tenth of each kind of work
+    """Return a function that prints progress to stderr: each tenth, and whatever has a note.
+
+    A line is such as ``detector: 3 of 12, loss 1.234``.
+    """
+    shown: dict[str, int] = {}  # the last tenth printed of each kind of work
 
     def progress(work: str, done: int, total: int, note: str = "") -> None:
         tenth = 10 * done // total

@@ -34,8 +34,8 @@ def _checked_path(
 
     Args:
         spec: the whole, such as ``trained:body.safetensors?reader=reader.safetensors``.
-        name: the path in it.
-        options: those after the question mark.
+        name: the path in it: ``body.safetensors``.
+        options: those after the question mark: ``{"reader": "reader.safetensors"}``.
         known: names of options that there are.
 
     Raises:

@@ -1,4 +1,7 @@
-"""Pictures of scenes with free labels, kept in files."""
+"""Front pictures of scenes with labels, kept in files.
+
+A view is a picture with the objects in it, by class, point and position, which the simulator knows.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.extension.commands import InvalidValueError, parallel_map, write_atomically
+from roboirg.extension.commands import InvalidValueError, write_atomically
 from roboirg.extension.episodes import ENVIRONMENT_VERSION, Episode
 from roboirg.extension.sight import (
     LabeledView,
@@ -20,6 +23,7 @@ from roboirg.extension.sight import (
     labeled_views,
     shown_to_policy,
 )
+from roboirg_learn.learn_support import make_missing_files
 
 LATER_STEP = 40
 """Control step of a second look at scenes with a video: the containers have appeared by then."""
@@ -27,7 +31,7 @@ Pixels = NDArray[np.uint8]
 
 
 class _StoredView(NamedTuple):
-    """A view in a file: fields as in `LabeledView`, the picture as PNG."""
+    """A view as MessagePack stores it: fields as in `LabeledView`, the picture as PNG."""
 
     png: bytes
     names: tuple[str, ...]
@@ -51,7 +55,7 @@ def pictures_to_see(first: Pixels, frames: Sequence[Pixels] | Pixels, every: int
 
     Args:
         first: the first picture after the instruction, when it is the policy's turn.
-        frames: of the video, up to that step; may be empty.
+        frames: of the video, up to that step or longer; may be empty.
         every: control steps between two frames.
     """
     if not len(frames):
@@ -75,21 +79,18 @@ def draw_missing(
     workers: int,
     show: Callable[[int, int], object],
 ) -> None:
-    """Draw the views of those episodes that a folder does not have, and store them there.
+    """Render the views of those episodes that a folder does not have, and store them there.
 
     Args:
         folder: of the files, one for each episode.
         episodes: all of them.
         draw: `views_at_start`, with labels, or `views_as_played`, without.
-        workers: processes that draw; 0 uses this one.
+        workers: processes that render; 0 uses this one.
         show: called after each episode with how many are done, and how many there are.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    missing = [episode for episode in episodes if not _path(folder, episode).exists()]
-    done = len(episodes) - len(missing)
-    for _ in parallel_map(partial(_store, folder, draw), missing, workers):
-        done += 1
-        show(done, len(episodes))
+    store = partial(_store, folder, draw)
+    make_missing_files(episodes, partial(_path, folder), store, workers, show)
 
 
 def read_views(folder: Path, episode: Episode, *, pictures: bool) -> tuple[LabeledView, ...]:
@@ -118,24 +119,28 @@ def _loaded(view: _StoredView, *, pictures: bool) -> LabeledView:
 
 
 def _path(folder: Path, episode: Episode) -> Path:
-    """Return the file of an episode's views, whose name has all that they depend on."""
+    """Return the file of an episode's views, whose name has all that they depend on.
+
+    For example ``PickXtimes-train-0-1.views``, with the environment's version at the end.
+    """
     return folder / f"{episode.key.replace('/', '-')}-{ENVIRONMENT_VERSION}.views"
 
 
 def _store(
     folder: Path, draw: Callable[[Episode], tuple[LabeledView, ...]], episode: Episode
 ) -> None:
-    """Draw the views of an episode and write them to its file; runs in worker processes.
+    """Render the views of an episode and write them to its file; `read_views` reads it.
+
+    Runs in worker processes.
 
     Args:
         folder: of the files.
         draw: returns the views of an episode.
-        episode: to draw.
+        episode: to render.
     """
     stored = []
     for view in draw(episode):
-        # OpenCV has blue first.
-        _, png = cv2.imencode(".png", view.picture[..., ::-1])
+        _, png = cv2.imencode(".png", view.picture[..., ::-1])  # blue first, as OpenCV has it
         centers = view.centers.tolist()
         stored.append(_StoredView(png.tobytes(), view.names, centers, view.positions.tolist()))
     write_atomically(_path(folder, episode), msgspec.msgpack.encode(stored))

@@ -25,7 +25,7 @@ Trained = TypeVar("Trained")
 
 
 class TrainedFile(NamedTuple):
-    """What a file holds.
+    """The content of a file of trained networks.
 
     Attributes:
         about: what is needed to make the networks, as plain data; its ``plan`` says how they were
@@ -48,7 +48,8 @@ class TrainedFile(NamedTuple):
     def load(self, nets: nn.ModuleDict) -> None:
         """Load the file's weights into networks, by their names, and set them to evaluation.
 
-        A name without a dot is no weight, but another number that the file keeps.
+        ``detector.scores.bias`` is a weight of the network ``detector``. A name without a dot, such
+        as ``heights``, is no weight, but another tensor that the file keeps.
         """
         weights = {name: tensor for name, tensor in self.tensors.items() if "." in name}
         nets.load_state_dict(weights)
@@ -62,7 +63,7 @@ def save_trained(
     tensors: Mapping[str, Tensor],
     path: Path,
 ) -> None:
-    """Write what was learned, whole or not at all.
+    """Write trained networks to a file, whole or not at all; `load_trained` reads it.
 
     Args:
         kind: what it is: ``listener``, ``body`` or ``reader``.
@@ -85,7 +86,7 @@ def load_trained(path: Path, kind: str, read: Callable[[TrainedFile], Trained]) 
     Args:
         path: the file.
         kind: what it must be: ``listener``, ``body`` or ``reader``.
-        read: builds the networks and loads their weights.
+        read: builds the networks and loads their weights; whatever it raises means a damaged file.
 
     Raises:
         InvalidValueError: the file is none of that kind.
@@ -111,7 +112,7 @@ def _reason(error: Exception) -> str:
     return "it is damaged, or was not written by this version"
 
 
-def save_unfinished(content: Mapping[str, Any], path: Path) -> None:
+def save_checkpoint(content: Mapping[str, Any], path: Path) -> None:
     """Write the state of an unfinished training, whole or not at all.
 
     Raises:
@@ -122,11 +123,11 @@ def save_unfinished(content: Mapping[str, Any], path: Path) -> None:
     write_atomically(path, file.getvalue())
 
 
-def load_unfinished(path: Path, made_of: object) -> dict[str, Any] | None:
-    """Return the state of an unfinished training.
+def load_checkpoint(path: Path, made_of: object) -> dict[str, Any] | None:
+    """Return the state of an unfinished training, as `save_checkpoint` wrote it.
 
     None if there is no file, or if it is of another training: one with another `made_of`, all that
-    the result depends on.
+    the result depends on. A file without `made_of` is of another training, too.
 
     Raises:
         InvalidValueError: the file cannot be read.

@@ -1,7 +1,8 @@
-"""Training of small networks: batches, and steps with a falling rate.
+"""Training of small networks: batches, and steps with a falling learning rate.
 
-An epoch is a pass over all that is learned from, a batch is what one step learns from. A training
-is kept in a file after each epoch, so that a command that was killed goes on.
+An epoch is a pass over all examples, a batch is what one step learns from. A course is one network
+with its examples and its loss, which a training goes through. A checkpoint is written after each
+epoch, so that a command that was killed goes on.
 """
 
 from __future__ import annotations
@@ -16,25 +17,33 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 import torch
 from torch import nn
 
-from roboirg_learn.trained_file import load_unfinished, save_unfinished
+from roboirg_learn.trained_file import load_checkpoint, save_checkpoint
 
 BATCH = 32
+"""Examples of a batch unless a course has its own size."""
 RISING_SHARE = 0.1
-"""Of all steps, those in which the rate rises."""
+"""Of all steps, those in which the learning rate rises."""
 SPOILED_TOTAL = 10
 """Number of steps at which PyTorch's schedule divides by 0: its rising tenth takes no time."""
 MOST_GRADIENT = 1.0
 """Norm to which gradients are clipped."""
 Item = TypeVar("Item")
 Curve = list[dict[str, float]]
-"""Of each pass the mean loss, and the score after it."""
+"""Of each epoch the mean loss, and the scores after it."""
 
 
 class Progress(Protocol):
-    """Shows what is done of a kind of work, all of it, and how well it goes."""
+    """Shows how far a kind of work is, and how well it goes."""
 
     def __call__(self, work: str, done: int, total: int, note: str = "") -> None:
-        """Show it."""
+        """Show it.
+
+        Args:
+            work: what is done, such as ``recordings``.
+            done: how much of it.
+            total: all of it.
+            note: such as the loss.
+        """
 
 
 def part_of(progress: Progress, name: str) -> Progress:
@@ -42,71 +51,80 @@ def part_of(progress: Progress, name: str) -> Progress:
     return lambda work, *done: progress(f"{name}: {work}", *done)
 
 
-class KeptTraining(NamedTuple):
-    """The file in which a training is kept after each pass, and all that the result depends on."""
+class Checkpoint(NamedTuple):
+    """Where the state of a training is kept after each epoch.
+
+    Attributes:
+        path: of the file.
+        made_of: all that the result depends on, as plain data; the file of a training with another
+            one is not used.
+    """
 
     path: Path
     made_of: object
 
 
-def batch_count(lessons: Sequence[object]) -> int:
-    """Return how many batches lessons make, the last one maybe smaller."""
-    return math.ceil(len(lessons) / BATCH)
+def batch_count(examples: Sequence[object]) -> int:
+    """Return how many batches of `BATCH` examples there are, the last one maybe smaller."""
+    return math.ceil(len(examples) / BATCH)
 
 
-def batches(lessons: Sequence[Item], rng: random.Random, size: int = BATCH) -> Iterator[list[Item]]:
-    """Yield lessons in random order, in batches."""
-    mixed = rng.sample(lessons, len(lessons))
-    for start in range(0, len(mixed), size):
-        yield mixed[start : start + size]
+def batches(
+    examples: Sequence[Item], rng: random.Random, size: int = BATCH
+) -> Iterator[list[Item]]:
+    """Yield all examples in random order, in batches of a size; the last one may be smaller."""
+    shuffled = rng.sample(examples, len(examples))
+    for start in range(0, len(shuffled), size):
+        yield shuffled[start : start + size]
 
 
 def even_batches(
-    lessons: Sequence[Item], rng: random.Random, length: Callable[[Item], int], size: int = BATCH
+    examples: Sequence[Item], rng: random.Random, length: Callable[[Item], int], size: int = BATCH
 ) -> Iterator[list[Item]]:
-    """Yield batches of lessons of about equal length, in random order, so that little is padding.
+    """Yield batches of examples of about equal length, in random order, so that little is padding.
 
     Args:
-        lessons: mixed first, so that those of equal length meet others in each pass.
-        rng: mixes lessons and batches.
-        length: of a lesson.
-        size: most lessons of a batch.
+        examples: shuffled first, so that those of equal length meet others in each epoch.
+        rng: shuffles the examples, then the batches.
+        length: returns the length of an example.
+        size: most examples of a batch.
     """
-    by_length = sorted(rng.sample(lessons, len(lessons)), key=length)
+    shuffled = rng.sample(examples, len(examples))
+    by_length = sorted(shuffled, key=length)
     groups = [by_length[start : start + size] for start in range(0, len(by_length), size)]
     yield from rng.sample(groups, len(groups))
 
 
 class Course(ABC, Generic[Item]):
-    """What a network learns: in which order, for how long, and how wrong it is.
+    """What a network learns: its examples in batches, for how long, and its loss.
 
     Attributes:
         net: the network, untrained at first.
-        rate: the greatest learning rate, between a short rise and a long fall.
-        epochs: passes over all that is learned from.
-        steps: batches of a pass.
+        learning_rate: the greatest, between a short rise and a long fall.
+        epochs: how many passes over all examples.
+        steps_per_epoch: how many batches `batches` returns.
     """
 
     net: nn.Module
-    rate: float
+    learning_rate: float
     epochs: int
-    steps: int
+    steps_per_epoch: int
 
     @abstractmethod
     def batches(self, epoch: int) -> Iterable[Sequence[Item]]:
-        """Return what is learned from in a pass, numbered from 0."""
+        """Return the batches of an epoch, numbered from 0; the same in every process."""
 
     @abstractmethod
     def loss(self, batch: Sequence[Item]) -> torch.Tensor:
-        """Return how wrong the network is about a batch."""
+        """Return the loss of a batch, a scalar with its gradient."""
 
     def score(self) -> Mapping[str, float]:
-        """Return how good the network is now, by the names of measures."""
+        """Return how good the network is now on validation examples, by the names of measures."""
         return {}
 
 
 class Training:
-    """Trains a network with AdamW; the rate falls to zero along a cosine.
+    """Trains the network of a course with AdamW; the learning rate falls to zero along a cosine.
 
     Args:
         course: what it learns.
@@ -116,28 +134,28 @@ class Training:
         self._course = course
         self._net = course.net
         self._optimizer = torch.optim.AdamW(
-            course.net.parameters(), lr=course.rate, weight_decay=0.01
+            course.net.parameters(), lr=course.learning_rate, weight_decay=0.01
         )
         # The rate rises for a tenth of all steps, then falls along a cosine.
-        total = max(course.epochs * course.steps, 1)
+        total = max(course.epochs * course.steps_per_epoch, 1)
         if total == SPOILED_TOTAL:
             total += 1
         self._schedule = torch.optim.lr_scheduler.OneCycleLR(
-            self._optimizer, course.rate, total_steps=total, pct_start=RISING_SHARE
+            self._optimizer, course.learning_rate, total_steps=total, pct_start=RISING_SHARE
         )
         self._curve: list[dict[str, float]] = []
 
-    def run(self, show: Callable[[int, int, str], None], kept: KeptTraining) -> Curve:
-        """Train the network for all epochs, or go on where a kept training stopped.
+    def run(self, show: Callable[[int, int, str], None], checkpoint: Checkpoint) -> Curve:
+        """Train the network for all epochs, or go on from a checkpoint; return loss and scores.
 
-        Returns the loss and the scores of each epoch.
+        Afterwards the network is in evaluation mode.
 
         Args:
             show: called after each epoch with its number from 1, the number of all, and a note of
                 loss and scores.
-            kept: the file in which the training is kept after each epoch.
+            checkpoint: read at first, and written after each epoch.
         """
-        self._restore(kept)
+        self._restore(checkpoint)
         epochs = self._course.epochs
         for epoch in range(len(self._curve), epochs):
             loss = self._learn_from(self._course.batches(epoch))
@@ -145,7 +163,7 @@ class Training:
             with torch.no_grad():
                 measures = {"loss": loss, **self._course.score()}
             self._curve.append(measures)
-            self._keep(kept)
+            self._save(checkpoint)
             note = ", ".join(f"{name} {value:.3f}" for name, value in measures.items())
             show(epoch + 1, epochs, note)
         self._net.eval()
@@ -167,12 +185,12 @@ class Training:
 
     @property
     def _parts(self) -> dict[str, Any]:
-        """What has a state that changes from step to step, by its name in the kept file."""
+        """What has a state that changes from step to step, by its name in the checkpoint."""
         return {"net": self._net, "optimizer": self._optimizer, "schedule": self._schedule}
 
-    def _restore(self, kept: KeptTraining) -> None:
-        """Load the training of a file, with PyTorch's random state, if it is of this training."""
-        state = load_unfinished(kept.path, kept.made_of)
+    def _restore(self, checkpoint: Checkpoint) -> None:
+        """Load a checkpoint, with PyTorch's random state, if there is one of this training."""
+        state = load_checkpoint(checkpoint.path, checkpoint.made_of)
         if state is None or "found" not in state:
             return
         for name, part in self._parts.items():
@@ -180,10 +198,10 @@ class Training:
         torch.set_rng_state(state["random"])
         self._curve = state["found"]
 
-    def _keep(self, kept: KeptTraining) -> None:
-        """Write all that is needed to go on after this epoch: states, curve, and random numbers."""
+    def _save(self, checkpoint: Checkpoint) -> None:
+        """Write all that `_restore` needs to go on after this epoch."""
         state = {name: part.state_dict() for name, part in self._parts.items()}
         state["random"] = torch.get_rng_state()
         state["found"] = self._curve
-        state["made_of"] = kept.made_of
-        save_unfinished(state, kept.path)
+        state["made_of"] = checkpoint.made_of
+        save_checkpoint(state, checkpoint.path)

@@ -288,8 +288,8 @@ def test_variants_of_the_listener_get_no_words_no_pictures_or_no_video(torch):
     given = ListenerInput("StopCube", "Stop it.", seen)
     assert hide_inputs(given, "none") is given
     assert hide_inputs(given, "words").text == ""
-    assert len(hide_inputs(given, "pictures").seen.kinds) == 0
-    assert len(hide_inputs(given, "video").seen.kinds) == 0
+    assert len(hide_inputs(given, "pictures").seen.classes) == 0
+    assert len(hide_inputs(given, "video").seen.classes) == 0
     without_video = given._replace(seen=scene_of([("cube red", 0.0, 0.1)]))
     assert hide_inputs(without_video, "video") is without_video
 

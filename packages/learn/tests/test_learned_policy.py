@@ -29,7 +29,7 @@ from roboirg_learn.policy.moves import common_moves, decisions_of
 from roboirg_learn.policy.policy_files import PolicyFiles
 from roboirg_learn.policy.policy_plan import BodyPlan, Recorded
 from roboirg_learn.policy.recording_files import load_recording, save_recording
-from roboirg_learn.policy.sight import sight_of, turns_of
+from roboirg_learn.policy.sight import encode_yaws, object_classes_of
 
 RESULTS = Path(__file__).parents[3] / "results"
 SHIPPED = PolicyFiles(
@@ -73,12 +73,14 @@ def test_recorded_labels_are_the_expert_s_though_its_motion_was_disturbed(record
 
     episode = get_episode("ButtonUnmask", "random", 0)
     for decision in decisions_of(recorded):
-        if decision.move.at_thing:
-            at = recorded.things[decision.look, decision.thing, :2]
+        if decision.move.at_object:
+            at = recorded.things[decision.look, decision.object_number, :2]
             action = recorded.actions[recorded.looks.tolist().index(decision.look)]
             assert np.linalg.norm(action[:2] - at) < 0.02
     grasped = [
-        decision.thing for decision in decisions_of(recorded) if decision.move.turn == "align"
+        decision.object_number
+        for decision in decisions_of(recorded)
+        if decision.move.turn == "align"
     ]
     goal = episode.goal.texts("colors")
     inside = {item.inside for item in episode.scene.objects if item.color in goal}
@@ -150,20 +152,20 @@ def test_a_training_that_was_interrupted_ends_with_the_same_weights(recorded, tm
 def trainer(recorded, out):
     """Return what trains a body in four passes, in a folder of a given name."""
     from roboirg_learn.listener.vocabulary import parts_of_tasks
-    from roboirg_learn.policy.body_training import BodyLayout, BodyLesson, train_body
+    from roboirg_learn.policy.body_training import BodyExample, BodyLayout, train_body
     from roboirg_learn.policy.trained_body import GoalLayout
 
     plan = BodyPlan(("ButtonUnmask",), body_epochs=4)
     episode = get_episode("ButtonUnmask", "random", 0)
     decisions = decisions_of(recorded)
     goals = GoalLayout(plan.tasks, parts_of_tasks(plan.tasks))
-    layout = BodyLayout(sight_of([recorded]), goals, common_moves([decisions]))
+    layout = BodyLayout(object_classes_of([recorded]), goals, common_moves([decisions]))
 
     def train(name, progress):
         folder_of_policy = out / name
         folder_of_policy.mkdir(exist_ok=True)
-        lessons = [BodyLesson(Recorded(episode, recorded), decisions)] * 3
-        return train_body(plan, lessons, layout, folder_of_policy, progress)
+        examples = [BodyExample(Recorded(episode, recorded), decisions)] * 3
+        return train_body(plan, examples, layout, folder_of_policy, progress)
 
     return train
 
@@ -172,17 +174,17 @@ def trainer(recorded, out):
 def test_moved_and_mirrored_pictures_keep_their_labels(seed):
     """The one white pixel of the picture is the labeled object."""
     pytest.importorskip("torch")
-    from roboirg_learn.policy.thing_detector import LabeledPicture, augmented
+    from roboirg_learn.policy.object_detector import LabeledPicture, augmented
 
     picture = np.zeros((256, 256, 3), np.uint8)
     picture[100, 50] = 255
-    turns = turns_of(np.array([0.2]))
-    view = LabeledPicture(picture, np.array([0]), np.array([[50.5, 100.5]]), turns)
+    yaw_codes = encode_yaws(np.array([0.2]))
+    view = LabeledPicture(picture, np.array([0]), np.array([[50.5, 100.5]]), yaw_codes)
     found = augmented(view, np.random.default_rng(seed))
     ((row, column),) = np.argwhere(found.picture[..., 0] == 255)
     assert found.points.tolist() == [[column + 0.5, row + 0.5]]
     is_mirrored = column > 128
-    assert np.allclose(found.turns, turns_of(np.array([-0.2 if is_mirrored else 0.2])))
+    assert np.allclose(found.yaw_codes, encode_yaws(np.array([-0.2 if is_mirrored else 0.2])))
 
 
 @pytest.mark.sim
@@ -273,13 +275,13 @@ def test_the_version_of_a_trained_file_depends_on_plan_and_weights_only(tmp_path
 @given(st.lists(st.sampled_from(["PickXtimes", "BinFill", "StopCube"]), max_size=90))
 def test_each_task_has_decisions_for_training_and_some_held_back_for_checking(tasks):
     pytest.importorskip("torch")
-    from roboirg_learn.policy.body_training import HELD_BACK, held_back
+    from roboirg_learn.policy.body_training import VALIDATION_EVERY, validation_flags
 
-    found = list(zip(tasks, held_back(tasks), strict=True))
+    found = list(zip(tasks, validation_flags(tasks), strict=True))
     for task in set(tasks):
         own = [is_held for decision_task, is_held in found if decision_task == task]
         assert not own[0]
-        assert sum(own) == (len(own) + HELD_BACK - 2) // HELD_BACK
+        assert sum(own) == (len(own) + VALIDATION_EVERY - 2) // VALIDATION_EVERY
 
 
 def error_of_learning(*options, what="policy"):
@@ -421,7 +423,7 @@ def test_a_reader_is_trained_for_an_existing_body_without_new_recordings(tmp_pat
     reader = load_reader(out)
     body = load_body(SHIPPED.body)
     assert (reader.plan["tasks"], reader.plan["body"]) == (["StopCube"], body.version)
-    assert reader.vocabulary.classes == body.sight.classes
+    assert reader.vocabulary.classes == body.object_classes.names
     assert reader.vocabulary[2:] == (body.goals.tasks, body.goals.parts)
     assert not list(tmp_path.rglob("recordings"))
     out.unlink()
@@ -472,12 +474,12 @@ def test_a_reader_trained_for_other_objects_or_goals_is_refused_by_a_body(tmp_pa
     files = PolicyFiles(SHIPPED.body, tmp_path / "a.reader")
     parts = body.goals.parts
     for classes, goals in (
-        (body.sight.classes[1:], body.goals),
-        (body.sight.classes, GoalLayout(body.goals.tasks[::-1], parts)),
-        (body.sight.classes, GoalLayout(body.goals.tasks, ("color=pink", *parts))),
+        (body.object_classes.names[1:], body.goals),
+        (body.object_classes.names, GoalLayout(body.goals.tasks[::-1], parts)),
+        (body.object_classes.names, GoalLayout(body.goals.tasks, ("color=pink", *parts))),
     ):
         save_reader(reader_for(classes, goals), files.reader)
         with pytest.raises(InvalidValueError, match="does not fit the body"):
             load_policy(files)
-    save_reader(reader_for(body.sight.classes, body.goals), files.reader)
+    save_reader(reader_for(body.object_classes.names, body.goals), files.reader)
     assert load_policy(files).reader.vocabulary.tasks == body.goals.tasks

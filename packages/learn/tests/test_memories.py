@@ -13,11 +13,11 @@ from roboirg_learn.policy.body_net import (  # noqa: E402
 )
 from roboirg_learn.policy.fast_weights import (  # noqa: E402
     MOST_CHANGE,
-    Fast,
     FastNorm,
+    FastWeights,
 )
 from roboirg_learn.policy.frame_memory import even_frames  # noqa: E402
-from roboirg_learn.policy.memories import Carried  # noqa: E402
+from roboirg_learn.policy.memories import MemoryCache  # noqa: E402
 from roboirg_learn.policy.policy_plan import (  # noqa: E402
     HANDS,
     PLANNERS,
@@ -62,10 +62,10 @@ def body_of(memory):
 def with_changed_looks(batch, looks):
     """Return a batch in which these looks show something else."""
     other = batch_of(99)
-    places = batch.places.clone()
+    positions = batch.positions.clone()
     tool = batch.tool.clone()
-    places[:, looks], tool[:, looks] = other.places[:, looks], other.tool[:, looks]
-    return batch._replace(places=places, tool=tool)
+    positions[:, looks], tool[:, looks] = other.positions[:, looks], other.tool[:, looks]
+    return batch._replace(positions=positions, tool=tool)
 
 
 def gives_same_answers(first, other):
@@ -97,13 +97,13 @@ def test_memory_carried_from_look_to_look_equals_reading_all_looks_at_once(memor
     """A policy reads one look more each time; training reads all. Objects 3 and 4 appear late."""
     body = body_of(memory)
     batch = batch_of(1)
-    batch.seen[:, :4, 3:], batch.known[:, :4, 3:] = False, False
+    batch.visible[:, :4, 3:], batch.confirmed[:, :4, 3:] = False, False
 
-    carried = Carried()
+    cache = MemoryCache()
 
     for looks, things in ((1, 3), (4, 3), (5, THINGS), (5, THINGS), (LOOKS, THINGS)):
         part = first_looks_of(batch, looks, things)
-        assert gives_same_answers(body(part, carried), body(part))
+        assert gives_same_answers(body(part, cache), body(part))
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
@@ -126,7 +126,15 @@ def test_padding_changes_nothing(memory):
     short = batch._replace(
         **{
             name: getattr(batch, name)[:, :9]
-            for name in ("classes", "places", "turns", "seen", "known", "tool", "has_look")
+            for name in (
+                "classes",
+                "positions",
+                "yaw_codes",
+                "visible",
+                "confirmed",
+                "tool",
+                "has_look",
+            )
         }
     )
     has_look = batch.has_look.clone()
@@ -141,12 +149,12 @@ def test_an_object_that_was_never_seen_is_never_chosen(memory):
     """The objects are numbered; number 2 is unknown."""
     body = body_of(memory)
     batch = batch_of(1)
-    seen = batch.seen.clone()
-    known = batch.known.clone()
+    seen = batch.visible.clone()
+    known = batch.confirmed.clone()
     seen[:, :, 2] = False
     known[:, :, 2] = False
 
-    things = body(batch._replace(seen=seen, known=known)).things
+    things = body(batch._replace(visible=seen, confirmed=known)).tracks
 
     assert (things.argmax(-1) != 2).all()
 
@@ -155,9 +163,9 @@ def test_an_object_that_was_never_seen_is_never_chosen(memory):
 def test_only_the_recurrent_memory_may_choose_an_object_out_of_sight(memory):
     body = body_of(memory)
     batch = batch_of(1)
-    seen = batch.seen.clone()
+    seen = batch.visible.clone()
     seen[:, 7, 2] = False
-    things = body(batch._replace(seen=seen)).things
+    things = body(batch._replace(visible=seen)).tracks
 
     can = bool((things[0, 1, :, 2] > -1e3).all())
 
@@ -166,7 +174,7 @@ def test_only_the_recurrent_memory_may_choose_an_object_out_of_sight(memory):
 
 def fast_numbers(seed, tokens=3, size=2):
     torch.manual_seed(seed)
-    fast = Fast(torch.randn(1, 1, size, size), torch.randn(1, 1, 1, size))
+    fast = FastWeights(torch.randn(1, 1, size, size), torch.randn(1, 1, 1, size))
     norm = FastNorm(torch.randn(1, 1, size) * 0.3, torch.randn(1, 1, size) * 0.3)
     keys, values = torch.randn(2, 1, 1, tokens, size)
     return fast, norm, keys, values, torch.rand(1, 1, tokens, 1) * 0.1
@@ -174,7 +182,7 @@ def fast_numbers(seed, tokens=3, size=2):
 
 def test_reading_fast_weights_gives_the_value_computed_by_hand():
     """With W = 2, b = (0, 1) and k = (3, 4): z = (6, 9) and rms(z) = sqrt(58.5)."""
-    fast = Fast(2 * torch.eye(2)[None, None], torch.tensor([[[[0.0, 1.0]]]]))
+    fast = FastWeights(2 * torch.eye(2)[None, None], torch.tensor([[[[0.0, 1.0]]]]))
     norm = FastNorm(torch.zeros(1, 1, 2), torch.zeros(1, 1, 2))
 
     read = fast.read(torch.tensor([[[[3.0, 4.0]]]]), norm).flatten()
@@ -189,7 +197,7 @@ def test_an_update_of_fast_weights_follows_the_gradient_of_its_loss(seed):
     error = norm(keys @ weights + biases) - (values - keys)
     (rates * error.square() / 2).sum().backward()
 
-    after = fast.after(keys, values, rates, norm)
+    after = fast.updated(keys, values, rates, norm)
 
     assert torch.allclose(after.weights, weights.detach() - weights.grad, atol=1e-5)
     assert torch.allclose(after.biases, biases.detach() - biases.grad, atol=1e-5)
@@ -197,10 +205,10 @@ def test_an_update_of_fast_weights_follows_the_gradient_of_its_loss(seed):
 
 def test_an_update_of_fast_weights_is_limited_and_zero_for_a_rate_of_zero():
     fast, norm, keys, values, rates = fast_numbers(0)
-    far = fast.after(keys * 100, values, rates * 100, norm)
+    far = fast.updated(keys * 100, values, rates * 100, norm)
     assert torch.allclose((far.weights - fast.weights).norm(), torch.tensor(MOST_CHANGE))
 
-    still = fast.after(keys, values, torch.zeros_like(rates), norm)
+    still = fast.updated(keys, values, torch.zeros_like(rates), norm)
     assert torch.equal(still.weights, fast.weights)
     assert torch.equal(still.biases, fast.biases)
 

@@ -109,12 +109,10 @@ def test_published_success_rates_give_the_published_answers():
     """Resolved forms are compared with references, and with nothing else."""
     systems = "pi0.5", "FrameS-Modul"
     found = rows_like(result for system in systems for result in like_published("main", system))
-    carried, apart, where, kept = sections_of_answers("main", *found)
+    cache, apart, where, kept = sections_of_answers("main", *found)
     for system in systems:
         row = ROW_OF[system]
-        assert values_in_row(carried, row) == pytest.approx(
-            values_in_row(carried, system), abs=0.11
-        )
+        assert values_in_row(cache, row) == pytest.approx(values_in_row(cache, system), abs=0.11)
         assert values_in_row(kept, row) == pytest.approx(values_in_row(kept, system), abs=1.01)
         if row != row_name("none"):
             assert values_in_row(apart, row) == pytest.approx(
@@ -124,7 +122,7 @@ def test_published_success_rates_give_the_published_answers():
                 values_in_row(where, system), abs=0.11
             )
     assert values_in_row(where, "FrameS-Modul") == pytest.approx([39.8, 5.3, 24.4, 17.3], abs=0.1)
-    assert values_in_row(carried, "FrameS-Modul")[0] == pytest.approx(-16.1, abs=0.1)
+    assert values_in_row(cache, "FrameS-Modul")[0] == pytest.approx(-16.1, abs=0.1)
 
     both = sections_of_answers("main", *found, *all_won_in_resolved_form(found))
     lost = [100 - 21.2, 100 - 13.6, 100 - 17.3, 100 - 12.4]

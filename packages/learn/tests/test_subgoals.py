@@ -12,23 +12,24 @@ from roboirg_learn.policy.planner_history import (
     MAX_SWITCHES,
     RECENT,
     VIDEO_FRAMES,
+    KeyframeHistory,
     PlannerHistory,
     context_size,
     ideal_planner_inputs,
     recent_looks,
 )
-from roboirg_learn.policy.sight import Sight
+from roboirg_learn.policy.sight import ObjectClasses
 from roboirg_learn.policy.subgoals import (
     MOST_POINT_NOISE,
     REQUEST_WORDS,
-    SubgoalForm,
+    SubgoalTemplate,
     encode_request,
-    forms_of,
     recorded_subgoals,
     subgoals_due,
+    templates_of,
 )
 
-SIGHT = Sight(
+OBJECTS = ObjectClasses(
     ("button", "container", "cube blue", "cube green", "cube red", "target"),
     np.array([0.01, 0.05, 0.02, 0.02, 0.02, 0.0]),
 )
@@ -39,8 +40,8 @@ def test_every_subgoal_of_a_task_is_encoded_with_its_motion(task):
     """Learned hands read a subgoal as numbers, one of which marks the motion."""
     for number in range(10):
         for stage in get_episode(task, "train", number).stages:
-            subgoal = SubgoalForm(stage.subgoal).at(np.array([100.0, 90.0]))
-            found = encode_request(subgoal, SIGHT)
+            subgoal = SubgoalTemplate(stage.subgoal).at(np.array([100.0, 90.0]))
+            found = encode_request(subgoal, OBJECTS)
             assert found is not None, subgoal
             assert found[REQUEST_WORDS.index(stage.primitive.kind.removesuffix("_until"))] or (
                 stage.primitive.kind == "press_below"
@@ -49,14 +50,14 @@ def test_every_subgoal_of_a_task_is_encoded_with_its_motion(task):
 
 def test_a_point_in_a_subgoal_is_encoded_as_the_place_on_the_table():
     place = np.array([-0.05, 0.11, 0.02])
-    subgoal = SubgoalForm("pick up the red cube {at}").at(points_of(place))
+    subgoal = SubgoalTemplate("pick up the red cube {at}").at(points_of(place))
     assert split_point(subgoal)[1] is not None
 
-    found = encode_request(subgoal, SIGHT)
+    found = encode_request(subgoal, OBJECTS)
     assert found[-3] == 1
     assert np.allclose(found[-2:], place[:2], atol=0.004)
-    assert encode_request("pick up the red cube", SIGHT)[-3] == 0
-    assert encode_request("make me a sandwich", SIGHT) is None
+    assert encode_request("pick up the red cube", OBJECTS)[-3] == 0
+    assert encode_request("make me a sandwich", OBJECTS) is None
 
 
 def recording_of(episode, done):
@@ -87,10 +88,10 @@ def test_recordings_give_the_due_subgoal_with_the_point_at_its_start():
     exact = recorded_subgoals(recorded, episode, done, None)
 
     assert [decision.move.words for decision in due] == [stage.subgoal for stage in stages]
-    names = [recorded.names[decision.thing] for decision in due]
+    names = [recorded.names[decision.object_number] for decision in due]
     assert names == [stage.points_at for stage in stages]
     assert exact[0] == exact[1] != exact[2] == exact[3] == exact[4]
-    wanted = points_of(recorded.things[2, due[2].thing, :3].astype(float))
+    wanted = points_of(recorded.things[2, due[2].object_number, :3].astype(float))
     assert np.abs(np.array(split_point(exact[2])[1])[::-1] - wanted).max() <= 0.5
 
     moved = recorded_subgoals(recorded, episode, done, np.random.default_rng(0))
@@ -99,13 +100,13 @@ def test_recordings_give_the_due_subgoal_with_the_point_at_its_start():
 
 
 def test_planner_history_keeps_the_looks_at_which_the_subgoal_changed():
-    """Forms of subgoals are numbered; form 0 is due at looks 2 and 4, form 1 at 7, 0 again at 9."""
-    history = PlannerHistory(3, chooses=False)
-    for form, look in ((0, 2), (0, 4), (1, 7), (0, 9)):
-        history.name(form, look)
+    """Subgoal templates are numbered; 0 is due at looks 2 and 4, 1 at 7, 0 again at 9."""
+    history = PlannerHistory(3)
+    for template, look in ((0, 2), (0, 4), (1, 7), (0, 9)):
+        history.name(template, look)
     assert history.switches == [2, 7, 9]
 
-    # At look 19, of three forms: how often each was done, which is under way, and since when.
+    # At look 19, of three templates: how often each was done, which is under way, and since when.
     done, under_way, rest = np.split(history.context(19), [3, 6])
     assert done.tolist() == [1, 1, 0]
     assert under_way.tolist() == [1, 0, 0]
@@ -119,7 +120,7 @@ def test_planner_history_keeps_the_looks_at_which_the_subgoal_changed():
 
 def test_neighboring_key_frames_are_merged_into_their_middle_one():
     """Looks are as far apart as the merge rule's gap, so that neighbors join."""
-    history = PlannerHistory(3, chooses=True)
+    history = KeyframeHistory(3)
     history.choose([5, 6, 7])
     history.choose([20, 21])
     history.choose([23, 40])
@@ -136,24 +137,24 @@ def test_neighboring_key_frames_are_merged_into_their_middle_one():
 
 
 def test_training_inputs_equal_those_of_a_planner_that_is_always_right():
-    forms = np.array([0, 0, 1, 1, 0])
+    templates = np.array([0, 0, 1, 1, 0])
     looks = np.array([1, 4, 6, 9, 12])
-    planned = ideal_planner_inputs(forms, looks, 0, 2, chooses=True)
-    history = PlannerHistory(2, chooses=True)
-    for number, (form, look) in enumerate(zip(forms, looks, strict=True)):
-        assert np.array_equal(planned.context[number], history.context(look))
-        assert np.array_equal(planned.kept_looks[number], history.kept(0, look))
-        history.name(form, look)
+    inputs = ideal_planner_inputs(KeyframeHistory(2), templates, looks, 0)
+    history = KeyframeHistory(2)
+    for number, (template, look) in enumerate(zip(templates, looks, strict=True)):
+        assert np.array_equal(inputs.context[number], history.context(look))
+        assert np.array_equal(inputs.kept_looks[number], history.kept(0, look))
+        history.name(template, look)
         if look in history.switches:
             history.choose([look])
 
-    assert planned.to_keep[:, -1].tolist() == [1, 0, 1, 0, 1]
+    assert inputs.to_keep[:, -1].tolist() == [1, 0, 1, 0, 1]
 
-    unasked = ideal_planner_inputs(np.array([0, -1, 1]), np.array([1, 2, 6]), 0, 2, chooses=True)
+    unasked = ideal_planner_inputs(KeyframeHistory(2), np.array([0, -1, 1]), np.array([1, 2, 6]), 0)
     assert (unasked.to_keep[1] == -1).all()
-    assert np.array_equal(unasked.context[2], planned.context[2])
-    assert planned.to_keep[0, :-2].tolist() == [-1] * (RECENT - 2)
-    assert [recent_looks(9)[place] for place in np.flatnonzero(planned.to_keep[3] == 1)] == [6]
+    assert np.array_equal(unasked.context[2], inputs.context[2])
+    assert inputs.to_keep[0, :-2].tolist() == [-1] * (RECENT - 2)
+    assert [recent_looks(9)[index] for index in np.flatnonzero(inputs.to_keep[3] == 1)] == [6]
 
 
 @pytest.fixture(params=["subgoal", "keyframes"])
@@ -164,24 +165,24 @@ def saved_policy(request, tmp_path):
 
     from roboirg_learn.listener.vocabulary import parts_of_tasks
     from roboirg_learn.policy.moves import Move
+    from roboirg_learn.policy.object_detector import ObjectDetector
     from roboirg_learn.policy.policy_files import PolicyFiles
     from roboirg_learn.policy.policy_plan import HANDS, BodyPlan
-    from roboirg_learn.policy.thing_detector import ThingDetector
     from roboirg_learn.policy.trained_body import GoalLayout, TrainedBody, make_body, save_body
     from roboirg_learn.policy.trained_reader import save_reader
 
     torch.manual_seed(0)
     goals = GoalLayout(("PickXtimes",), parts_of_tasks(["PickXtimes"]))
     moves = Move(True, 0.0, 0.0, 0.15, "align", 0.0), Move(False, 0.0, 0.0, 0.1, "keep", 0.0)
-    forms = forms_of([get_episode("PickXtimes", "train", 0)])
-    acts = make_body(SIGHT, goals, moves, HANDS)
-    plans = make_body(SIGHT, goals, forms, request.param)
+    templates = templates_of([get_episode("PickXtimes", "train", 0)])
+    acts = make_body(OBJECTS, goals, moves, HANDS)
+    plans = make_body(OBJECTS, goals, templates, request.param)
     plan = BodyPlan(goals.tasks, request.param).about
-    detector = ThingDetector(len(SIGHT.classes))
-    body = TrainedBody(SIGHT, detector, goals, moves, acts, plan, forms, plans)
+    detector = ObjectDetector(len(OBJECTS.names))
+    body = TrainedBody(OBJECTS, detector, goals, moves, acts, plan, templates, plans)
     files = PolicyFiles(tmp_path / "a.body", tmp_path / "a.reader")
     save_body(body, files.body)
-    save_reader(reader_for(SIGHT.classes, goals), files.reader)
+    save_reader(reader_for(OBJECTS.names, goals), files.reader)
     return files
 
 
@@ -208,7 +209,9 @@ def test_learned_hands_follow_given_subgoals_or_name_their_own(saved_policy):
     hands.reset("pick the cube", NO_VIDEO)
     assert hands.act(observation_of()).shape == (1, 7)
     words = split_point(hands.subgoal)[0]
-    assert words in {SubgoalForm(form.words).at(None) for form in hands.model.body.forms}
+    assert words in {
+        SubgoalTemplate(template.words).at(None) for template in hands.model.body.templates
+    }
     hands.follow("press the button at <100, 90>")
     hands.act(observation_of())
     assert hands.subgoal == "press the button at <100, 90>"
@@ -252,28 +255,30 @@ def test_a_learned_planner_may_point_at_an_object_that_is_out_of_sight(saved_pol
     """Object 1 is out of sight from look 4 on; the decision is made at look 5."""
     torch = pytest.importorskip("torch")
     from roboirg_learn.policy.body_net import TOOL_NUMBERS
-    from roboirg_learn.policy.policy_data import EpisodeNumbers, LookNumbers, to_batch
+    from roboirg_learn.policy.policy_data import EpisodeArrays, LookArrays, to_batch
     from roboirg_learn.policy.trained_body import load_body
 
     model = load_body(saved_policy.body)
-    size = len(model.forms)
+    size = len(model.templates)
     looks = 6
     things = 3
     rng = np.random.default_rng(0)
     seen = np.ones((looks, things), bool)
     seen[4:, 1] = False
-    shown = LookNumbers(
+    shown = LookArrays(
         rng.integers(0, 5, (looks, things)),
         *(rng.normal(0, 0.1, (looks, things, 2)).astype(np.float32) for _ in range(2)),
         seen, np.ones_like(seen), rng.normal(0, 1, (looks, TOOL_NUMBERS)).astype(np.float32),
     )  # fmt: skip
-    planned = ideal_planner_inputs(np.array([0, 1]), np.array([2, 5]), 0, size, chooses=True)
+    subgoal_inputs = ideal_planner_inputs(
+        KeyframeHistory(size), np.array([0, 1]), np.array([2, 5]), 0
+    )
     goal = np.zeros(model.goals.size, np.float32)
     nothing = np.array([-1, -1])
-    numbers = EpisodeNumbers(shown, goal, np.array([2, 5]), *[nothing] * 3, planned)
+    numbers = EpisodeArrays(shown, goal, np.array([2, 5]), *[nothing] * 3, subgoal_inputs)
     answer = model.planner(to_batch([numbers]))
-    assert (answer.things[0, 1, :, 1] > -1e3).all()
+    assert (answer.tracks[0, 1, :, 1] > -1e3).all()
     assert (answer.keep_scores is None) == (model.plan["memory"] == "subgoal")
-    context = planned._replace(context=planned.context + 1)
-    other = model.planner(to_batch([numbers._replace(planned=context)]))
+    context = subgoal_inputs._replace(context=subgoal_inputs.context + 1)
+    other = model.planner(to_batch([numbers._replace(subgoal_inputs=context)]))
     assert not torch.equal(answer.moves, other.moves)

@@ -8,18 +8,18 @@ from hypothesis import strategies as st
 
 from roboirg.extension.sight import points_of
 from roboirg_learn.policy.moves import LEAST_SHARE, LookDecision, Move, common_moves, waypoint
-from roboirg_learn.policy.sight import Sight
-from roboirg_learn.policy.tracks import MOST_TRACKS, LookTokens, Tracks
+from roboirg_learn.policy.sight import ObjectClasses
+from roboirg_learn.policy.tracks import MOST_TRACKS, Detections, Tracker
 
-SIGHT = Sight(("button", "cube red", "target"), np.array([0.01, 0.02, 0.005]))
+OBJECTS = ObjectClasses(("button", "cube red", "target"), np.array([0.01, 0.02, 0.005]))
 places = st.tuples(st.floats(-0.25, 0.15), st.floats(-0.25, 0.25))
 
 
 def look_at(classes, spots):
     count = len(classes)
-    turns = np.tile(np.array([1.0, 0.0], np.float32), (count, 1))
-    return LookTokens(
-        np.array(classes, np.int64), np.array(spots, np.float32).reshape(count, 2), turns
+    yaw_codes = np.tile(np.array([1.0, 0.0], np.float32), (count, 1))
+    return Detections(
+        np.array(classes, np.int64), np.array(spots, np.float32).reshape(count, 2), yaw_codes
     )
 
 
@@ -27,9 +27,9 @@ def look_at(classes, spots):
 def test_a_point_in_the_picture_is_converted_to_its_place_on_the_table(things):
     spots = np.array([spot for spot, _ in things])
     classes = np.array([kind for _, kind in things])
-    positions = np.column_stack([spots, SIGHT.heights[classes]])
+    positions = np.column_stack([spots, OBJECTS.heights[classes]])
 
-    found = SIGHT.places(classes, points_of(positions))
+    found = OBJECTS.table_positions(classes, points_of(positions))
 
     np.testing.assert_allclose(found, spots, atol=1e-5)
 
@@ -45,19 +45,19 @@ def test_objects_that_stay_keep_their_track_numbers_in_any_order_of_detection(th
             apart.append((spot, kind))
     order = rng.sample(range(len(apart)), len(apart))
     spots, kinds = zip(*apart, strict=True)
-    tracks = Tracks()
+    tracks = Tracker()
 
     first = tracks.update(look_at(kinds, spots))
     again = tracks.update(look_at([kinds[n] for n in order], [spots[n] for n in order]))
 
     assert again.tolist() == [first[n] for n in order]
     assert tracks.count == len(apart)
-    assert tracks.seen[: tracks.count].all()
+    assert tracks.visible[: tracks.count].all()
 
 
 def test_two_containers_that_exchange_places_keep_their_track_numbers():
     """They pass each other on opposite sides, as in the videos."""
-    tracks = Tracks()
+    tracks = Tracker()
     for share in np.linspace(0.0, 1.0, 8):
         smooth = share * share * (3 - 2 * share)
         aside = 0.07 * math.sin(math.pi * smooth)
@@ -65,18 +65,18 @@ def test_two_containers_that_exchange_places_keep_their_track_numbers():
         other = (0.1 - 0.2 * smooth, -aside)
         mine = tracks.update(look_at([0, 0], [one, other]))
         assert mine.tolist() == [0, 1], share
-    np.testing.assert_allclose(tracks.places[:2], [(0.1, 0.0), (-0.1, 0.0)], atol=1e-6)
+    np.testing.assert_allclose(tracks.positions[:2], [(0.1, 0.0), (-0.1, 0.0)], atol=1e-6)
 
 
 def test_an_object_out_of_sight_keeps_its_place_and_its_track_number():
     """Two objects are seen, then only the second, then the first one at other places."""
-    tracks = Tracks()
+    tracks = Tracker()
     tracks.update(look_at([1, 2], [(0.0, 0.1), (0.1, -0.1)]))
 
     tracks.update(look_at([2], [(0.1, -0.1)]))
 
-    assert tracks.seen[:2].tolist() == [False, True]
-    np.testing.assert_allclose(tracks.places[0], (0.0, 0.1))
+    assert tracks.visible[:2].tolist() == [False, True]
+    np.testing.assert_allclose(tracks.positions[0], (0.0, 0.1))
     # The way it was carried out of sight is no speed: it need not go on.
     for x in (0.35, 0.2):
         assert tracks.update(look_at([1], [(x, 0.1)])).tolist() == [0]
@@ -85,7 +85,7 @@ def test_an_object_out_of_sight_keeps_its_place_and_its_track_number():
 def test_objects_beyond_the_maximum_number_of_tracks_get_none():
     """Minus one stands for no track."""
     spots = [(0.001 * n, 0.0) for n in range(MOST_TRACKS + 5)]
-    mine = Tracks().update(look_at([1] * len(spots), spots))
+    mine = Tracker().update(look_at([1] * len(spots), spots))
     assert mine.tolist() == [*range(MOST_TRACKS), *[-1] * 5]
 
 

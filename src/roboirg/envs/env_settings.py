@@ -55,8 +55,9 @@ class EnvSettings:
     """Options of an environment; `roboirg.make` documents them.
 
     Attributes:
-        words: of the instruction; the file of its wordings has been opened.
-        environment: how it is played; none of it is left to a policy.
+        words: options of the instruction; the file of its wordings has been opened.
+        environment: options of how it is played; none of them is left to a policy.
+        split, episode, arm, …: as the keyword arguments of `make`.
 
     Raises:
         UnknownNameError: there is no such render mode or arm.
@@ -112,7 +113,10 @@ class EnvSettings:
         ).validated()
 
     def with_reset_options(self, options: Mapping[str, Any]) -> EnvSettings:
-        """Return the settings of one reset.
+        """Return the settings of one reset, which change these for that reset alone.
+
+        Args:
+            options: values by the names in `RESET_OPTIONS`.
 
         Raises:
             UnknownNameError: an option is not one that a reset may change.
@@ -149,7 +153,12 @@ class EnvSettings:
         )
 
     def find_episode(self, task: str | Episode, index: int) -> Episode:
-        """Return the episode to play: number `index`, or `task` itself if it is an episode."""
+        """Return the episode to play.
+
+        Args:
+            task: name of the task, or the episode itself.
+            index: number of the episode in the split; ignored where the task is an episode.
+        """
         if isinstance(task, Episode):
             return task
         return get_episode(task, self.split, index)

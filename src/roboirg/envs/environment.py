@@ -142,7 +142,11 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
 
     @property
     def status(self) -> str:
-        """Episode status: ongoing, success, failure or timeout."""
+        """Episode status: ongoing, success, failure or timeout.
+
+        In the arm other-goal it is that of the stated goal, once the scene's own goal is decided,
+        too.
+        """
         session = self.session
         is_late = self._current.steps >= self.max_steps
         # In the arm other-goal the episode goes on after the verdict, until both are decided.
@@ -340,7 +344,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
         return self._state
 
     def _choose_episode(self, seed: int | None, options: dict[str, Any]) -> None:
-        """Choose the episode and the instruction of a reset."""
+        """Choose the episode and the instruction of a reset; arguments as of `reset`."""
         choosing = {"split", "episode"} & options.keys()
         if isinstance(self._task, Episode) and choosing:
             raise InvalidValueError(
@@ -354,6 +358,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
         """Make an episode the current one, with its words.
 
         Words are slow to make, so they are kept while episode, options and arm are the same.
+
+        Args:
+            settings: of the reset.
+            index: number of the episode in its split; ignored where the task is an episode itself.
         """
         wanted = (settings.find_episode(self._task, index), settings.words, settings.arm)
         if self._instructed != wanted:
@@ -368,7 +376,11 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
             self.choices = choices_of(self.episode)
 
     def _play_demonstration(self, recording: Recording | None) -> Recording:
-        """Start the episode and play its demonstration: a recording, or planned without one."""
+        """Start the episode in a new world and play its demonstration; return what was played.
+
+        Args:
+            recording: to replay; None plans the demonstration.
+        """
         state = self._start_episode()
         self._state = state
 
@@ -380,7 +392,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
         return state.session.play_demonstration(record_step, recording)
 
     def _start_episode(self) -> EpisodeState:
-        """Return the state at the beginning, with a new world."""
+        """Return the state of the episode at its beginning, with a new world."""
         session = EpisodeSession(
             self.episode,
             visible=self._renders,
@@ -397,7 +409,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
         )
 
     def _execute(self, action: NDArray[np.float64]) -> None:
-        """Execute one validated action, stopping if the episode ends."""
+        """Execute one validated action in all its control steps, stopping if the episode ends.
+
+        A pose that cannot be reached ends it as a failure.
+        """
         self._current.executed_actions += 1
         try:
             for trajectory in self._current.controller.trajectories(action):
@@ -435,7 +450,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
         state.history.append({**entry, "instruction": state.spoken.said_at(state.steps)})
 
     def _observe(self) -> dict[str, Any]:
-        """Return what the policy sees now, and let it hear what has been said."""
+        """Return what the policy sees now, and let it hear what has been said.
+
+        The history is handed over and emptied.
+        """
         state = self._current
         if self.status == "ongoing":  # afterwards no policy hears anything
             state.spoken.hear(state.steps)
@@ -479,9 +497,9 @@ def _subgoal_of(stage: Stage | None) -> str:
 
 
 def _shipped_recording(episode: Episode) -> Recording | None:
-    """Return RoboMME's recording of the demonstration; None if there is none."""
+    """Return RoboMME's recording of an episode's demonstration; None if none is shipped."""
     slot = (episode.task, episode.split, episode.index)
-    # An episode that is made by hand may have the place of one that was recorded.
+    # An episode that is made by hand may have task, split and index of one that was recorded.
     if not episode.recorded or not is_recorded(*slot):
         return None
     recorded = recorded_actions(*slot)

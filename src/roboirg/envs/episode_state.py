@@ -49,25 +49,29 @@ class EpisodeState:
     reported_utterances: int = 0
 
     def after_step(self, stage: Stage | None) -> None:
-        """Update after a control step; call after each one with the published stage."""
+        """Update after a control step; call it after each one.
+
+        Args:
+            stage: the stage whose subgoal is published; None after the last.
+        """
         self.observation_builder.proprioception.update()
         if self.pixel_grounding is not None:
             self.pixel_grounding.update(stage)
 
     def describe_stage(self, stage: Stage) -> str:
-        """Return the subgoal of a video's stage, grounded if requested."""
+        """Return the subgoal of a video's stage in words; with its object's pixel if requested."""
         if self.pixel_grounding is not None:
             return self.pixel_grounding.text
         return plain_subgoal(stage)
 
     def take_new_events(self) -> Sequence[Event]:
-        """Return the events since the last call, which counts them as reported."""
+        """Return the events since the last call; they are not returned again."""
         new_events = self.session.events[self.reported_events :]
         self.reported_events += len(new_events)
         return new_events
 
     def take_new_utterances(self) -> Sequence[HeardUtterance]:
-        """Return the utterances that the policy has heard since the last call, likewise."""
+        """Return the utterances that the policy has heard since the last call, each once."""
         new_utterances = self.spoken.heard[self.reported_utterances :]
         self.reported_utterances += len(new_utterances)
         return new_utterances

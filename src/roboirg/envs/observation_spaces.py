@@ -39,7 +39,13 @@ class InstructionSpace(spaces.Text):
 
 
 class _TextView(Sequence[str]):
-    """The texts in a block of shared memory, one for each environment; copies are tuples."""
+    """The texts in a block of shared memory, one for each environment.
+
+    It reads the memory at each access; a copy is a tuple of the texts as they are then.
+
+    Attributes:
+        rows: (environments, MAX_INSTRUCTION_LENGTH) uint8, each a text with zeros after it.
+    """
 
     def __init__(self, block: Any) -> None:  # noqa: ANN401 - a synchronized array of ctypes
         bytes_of_all = np.frombuffer(block.get_obj(), np.uint8)
@@ -59,13 +65,13 @@ class _TextView(Sequence[str]):
 
 @shared_memory.create_shared_memory.register(InstructionSpace)
 def _create(space: InstructionSpace, n: int = 1, ctx: Any = None) -> Any:  # noqa: ANN401, ARG001
-    """Return shared memory for the texts of `n` environments."""
+    """Return shared memory for the texts of `n` environments; `_TextView` reads it."""
     return ctx.Array(ctypes.c_uint8, n * MAX_INSTRUCTION_LENGTH)
 
 
 @shared_memory.write_to_shared_memory.register(InstructionSpace)
 def _write(space: InstructionSpace, index: int, values: str, block: Any) -> None:  # noqa: ANN401, ARG001
-    """Write the text of an environment, with zeros up to the end of its place."""
+    """Write the text of an environment into its row, with zeros up to the end of the row."""
     text = values.encode("ascii")
     row = _TextView(block).rows[index]
     row[: len(text)] = np.frombuffer(text, np.uint8)

@@ -15,7 +15,7 @@ NAMESPACE = "RoboIRG"
 
 
 def environment_id(task: str) -> str:
-    """Return the registered id of a task's environment."""
+    """Return the registered id of a task's environment, such as ``RoboIRG/PickXtimes-v1``."""
     return f"{NAMESPACE}/{task}-v{ENVIRONMENT_VERSION}"
 
 

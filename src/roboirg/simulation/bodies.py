@@ -149,6 +149,7 @@ def _pose(item: SceneObject, position: Point) -> sapien.Pose:
 
 
 def _material(rgba: Rgba) -> sapien.render.RenderMaterial:
+    """Return SAPIEN's usual material in a color."""
     return sapien.render.RenderMaterial(base_color=list(rgba))
 
 
@@ -162,7 +163,14 @@ def _rgba(item: SceneObject, usual: Rgba) -> Rgba:
 def finish_body(
     builder: ActorBuilder, scene: sapien.Scene, item: SceneObject, body_type: str
 ) -> Body:
-    """Build an actor with all its shapes at its object's place, ``dynamic`` or ``kinematic``."""
+    """Build an actor with all its shapes where its object stands, and return it as a body.
+
+    Args:
+        builder: has the shapes.
+        scene: to which it is added.
+        item: the object.
+        body_type: ``dynamic`` if it moves by physics, ``kinematic`` if only by itself.
+    """
     builder.set_scene(scene)
     builder.set_physx_body_type(body_type)
     builder.set_initial_pose(_pose(item, item.position))
@@ -172,6 +180,7 @@ def finish_body(
 
 
 def _build_cube(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    """Build a cube; one that is hidden in a container is smaller."""
     half = object_sizes.HIDDEN_CUBE_HALF if item.kind == "hidden_cube" else object_sizes.CUBE_HALF
     builder = ActorBuilder()
     builder.add_box_collision(half_size=[half] * 3)
@@ -220,7 +229,14 @@ def _build_marker(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body
 
 
 def _add_rings(builder: ActorBuilder, item: SceneObject, rgba: Rgba, half_height: float) -> None:
-    """Add five concentric discs, colored and white in turn; the smaller ones rise a bit higher."""
+    """Add five concentric discs, colored and white in turn; the smaller ones rise a bit higher.
+
+    Args:
+        builder: of the target or marker.
+        item: with the radius of the largest disc, m.
+        rgba: color of the first, third and fifth disc.
+        half_height: half the thickness of the largest one, m.
+    """
     radius = float(item.radius or 0.0)
     for number, share in enumerate(RING_SHARES):
         color = WHITE if number % 2 else rgba
@@ -302,7 +318,7 @@ def _walls(half_side: float, half_wall: float, half_height: float) -> list[Cuboi
 
 
 def _add_boxes(builder: ActorBuilder, cuboids: Sequence[Cuboid], rgba: Rgba | None) -> None:
-    """Add boxes with collision and, if they have a color, visual shapes."""
+    """Add boxes with collision shapes and, with a color, visual shapes; None draws nothing."""
     for center, half in cuboids:
         builder.add_box_collision(sapien.Pose(center), half_size=half)
         if rgba is not None:
@@ -311,7 +327,10 @@ def _add_boxes(builder: ActorBuilder, cuboids: Sequence[Cuboid], rgba: Rgba | No
 
 
 def _build_tape(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """Build a ring of boxes, to be grasped from outside or by its wall; it looks round."""
+    """Build a roll of tape: collision is by a ring of boxes, and what is drawn is a round tube.
+
+    It can be grasped from outside or by its wall.
+    """
     outer = object_sizes.TAPE_RADIUS
     inner = object_sizes.TAPE_HOLE_RADIUS
     half_height = object_sizes.TAPE_HALF
@@ -338,7 +357,10 @@ def _pose_on_circle(radius: float, angle: float) -> sapien.Pose:
 
 
 def _build_button(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """Build a base and a cap on a sprung vertical joint; negative positions are pressed."""
+    """Build a base and a cap on a sprung vertical joint, an articulation of two links.
+
+    The joint's position is 0 at rest and negative when pressed, down to `BUTTON_TRAVEL`.
+    """
     base_half = object_sizes.BUTTON_BASE_HALF
     cap_size = {
         "radius": object_sizes.BUTTON_CAP_RADIUS,

@@ -42,12 +42,12 @@ backward) and the entity id."""
 
 @dataclass
 class _View:
-    """A view of a camera, which is drawn or will be: its inputs and fetched outputs.
+    """What a camera has drawn, or is about to: its inputs and fetched outputs.
 
     Attributes:
-        state: everything that determines the picture.
-        bodies: for each body of the scene, whether it is drawn.
-        poses: of all bodies, so of the wrist camera, when this last was the view.
+        state: everything that determines the picture; equal states give equal pictures.
+        bodies: (n,) for each body of the scene, whether it is drawn.
+        poses: of all bodies, and so of the wrist camera, when they last gave this view.
         fetched: shader outputs that have been fetched, by name.
     """
 
@@ -130,7 +130,7 @@ class Cameras:
             self._take_pictures(changed)
 
     def _take_pictures(self, views: Mapping[str, _View]) -> None:
-        """Start drawing views of cameras."""
+        """Start drawing views, by camera, and keep them as the last ones."""
         with DRAWING:
             self._scene.update_render()
             for camera, view in views.items():
@@ -142,7 +142,7 @@ class Cameras:
                 self._last[camera] = view
 
     def _view_of(self, camera: str, poses: NDArray[np.float64]) -> _View:
-        """Return what a camera would draw now."""
+        """Return what a camera would draw now, given the poses of all bodies (n, 4, 4)."""
         component = self._components[camera]
         if self._has_culling:
             extrinsic = np.asarray(component.get_extrinsic_matrix(), dtype=np.float64)[:3]
@@ -169,7 +169,7 @@ class Cameras:
         return self._fetch(camera, GEOMETRY)
 
     def _fetch(self, camera: str, output: str) -> NDArray[np.integer[Any]]:
-        """Return an output of the camera's last drawing."""
+        """Return an output of the camera's last drawing, (256, 256, channels); waits for it."""
         fetched = self._last[camera].fetched
         if output not in fetched:
             with DRAWING:

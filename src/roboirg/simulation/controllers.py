@@ -36,7 +36,7 @@ LONG_NUMBER = 1e6
 
 
 class Controller(Protocol):
-    """Converts validated actions of one action space to joint actions."""
+    """Converts validated actions of one action space to joint actions: targets (8), one a step."""
 
     def trajectories(self, action: CheckedActions) -> Iterator[JointTrajectory]:
         """Yield the trajectories of one action; take the next after executing the last.
@@ -88,13 +88,11 @@ class ToolPoseController:
         yield np.append(arm, action[POSE_SIZE])[None]
 
 
-class WaypointController:
+class WaypointController(ToolPoseController):
     """Moves the tool to poses in a straight line, then opens or closes the gripper."""
 
-    def __init__(self, robot: Panda) -> None:
-        self._robot = robot
-        self._planner = _make_planner(robot)
-        self._gripper = OPEN
+    _gripper = OPEN
+    """The gripper action of the last waypoint that opened or closed it."""
 
     def trajectories(self, action: CheckedActions) -> Iterator[JointTrajectory]:
         """Yield the move with the gripper unchanged, then six steps if it opens or closes."""
@@ -113,7 +111,14 @@ class WaypointController:
 
 
 class ChoiceController:
-    """Executes the scripted expert's motions by a task's choices, on what a point is nearest to."""
+    """Executes the scripted expert's motions: an action is the number of a choice, and a point.
+
+    The choice says what is done, and the object of its kind nearest to the point with what.
+
+    Args:
+        world: in which they are executed.
+        choices: of the task.
+    """
 
     def __init__(self, world: World, choices: Sequence[Choice]) -> None:
         from roboirg.simulation.expert.primitives import MotionPrimitives
@@ -132,7 +137,10 @@ class ChoiceController:
         yield from self._expert.execute(motion)
 
     def _motion(self, choice: Choice, point: Point) -> Primitive | None:
-        """Return the motion of a choice; None if nothing is left to wait for or to point at.
+        """Return the motion of a choice, with its object; None if there is nothing to do.
+
+        There is none if the time of all its motions has passed, or if the picture has no object of
+        its kind.
 
         Args:
             choice: its motion lacks the object, which is the one of its kind nearest to the point.
@@ -175,13 +183,14 @@ def tool_pose(action: CheckedActions) -> ToolPose:
 
 
 def describe_pose(action: CheckedActions) -> str:
-    """Return the pose of an action in words."""
+    """Return the pose of an action in words: "(0.1, …) with roll 3.142, pitch 0.000, yaw …"."""
     numbers = [_format_number(number) for number in action[:POSE_SIZE]]
     x, y, z, roll, pitch, yaw = numbers
     return f"({x}, {y}, {z}) with roll {roll}, pitch {pitch}, yaw {yaw}"
 
 
 def _make_planner(robot: Panda) -> MotionPlanner:
+    """Return the motion planner of a robot."""
     # Importing it takes a third of a second, and joint actions do not need it.
     from roboirg.simulation.expert.motion_planning import MotionPlanner
 
@@ -189,6 +198,7 @@ def _make_planner(robot: Panda) -> MotionPlanner:
 
 
 def _format_number(number: float) -> str:
+    """Return a number with three digits after the point: "0.123", "1.000e+06"."""
     if abs(number) < LONG_NUMBER:
         return f"{number:.3f}"
     return f"{number:.3e}"

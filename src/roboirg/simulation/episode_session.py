@@ -25,6 +25,7 @@ StepHook = Callable[[Stage], object]
 
 
 def _do_nothing(stage: Stage) -> None:
+    """Ignore the stage: a hook for those who want none."""
     del stage
 
 
@@ -36,8 +37,10 @@ class EpisodeSession:
         judge: follows all stages, those of the demonstration first.
         original: follows the stages to the scene's own goal in the same way, if the episode has
             another one; else None.
-        events: all events since the start.
-        attempts: the same of facts of attempts, which nothing is judged by.
+        events: all events since the start: a fact, such as *picked, cube 1*, begins or ceases to
+            hold.
+        attempts: the same of attempts, facts about what the hand tries; nothing is judged by them,
+            but causes of failures are told from them.
     """
 
     def __init__(
@@ -132,7 +135,7 @@ class EpisodeSession:
         return np.concatenate(numbers)
 
     def _state(self) -> list[NDArray[Any]]:
-        """Return the arrays of `state_numbers`, of any shape and type."""
+        """Return the arrays of `state_numbers`, of any shape and type; `state_hash` hashes them."""
         robot = self.world.robot.articulation
         numbers = [robot.get_qpos(), robot.get_qvel()]
         for body in self.world.bodies.values():
@@ -154,19 +157,20 @@ class EpisodeSession:
 
     @property
     def _judges(self) -> tuple[Judge, ...]:
+        """The judges of all goals that are followed: one or two."""
         if self.original is None:
             return (self.judge,)
         return self.judge, self.original
 
     def _judge(self) -> None:
-        """Let the judges see the facts, and the world the stage that is due."""
+        """Show the judges the facts of this step, and tell the world which stage is due."""
         for judge in self._judges:
             judge.update(self.world.elapsed, self.world.facts)
         self.world.note_stage(self.judge.index)
 
 
 def _body_state(body: Body) -> list[NDArray[Any]]:
-    """Return the pose, velocities and joints of an object."""
+    """Return position, quaternion, velocities and joints of an object, as far as it has them."""
     pose = body.entity.pose
     numbers = [pose.p, pose.q]
     if isinstance(body.physics, sapien.physx.PhysxRigidDynamicComponent):

@@ -75,6 +75,10 @@ class FactDetector:
 
     It keeps the last ones: some facts start and cease at different thresholds, or last.
 
+    Args:
+        bodies: all objects, by name.
+        robot: the robot.
+
     Attributes:
         attempts: detects what the hand tries.
     """
@@ -85,6 +89,7 @@ class FactDetector:
         self._targets = self._of_kinds("target")
         self._places = self._of_kinds("target", "site")
         self._bins = self._of_kinds("bin", "box")
+        # What follows is of the present step; `detect` sets it before the facts are found.
         self._place_positions: dict[str, Point] = {}
         self._last_facts: frozenset[Fact] = frozenset()
         self._contacts: Contacts = []
@@ -139,7 +144,10 @@ class FactDetector:
                 yield Fact(*found)
 
     def _cube_facts(self, cube: Body) -> Iterator[Fact]:
-        """Yield the facts about a cube or a roll of tape."""
+        """Yield the facts about a cube or a roll of tape: held, over a target, picked or placed.
+
+        *over* begins and ceases at different thresholds (hysteresis), so it reads the last facts.
+        """
         name = cube.item.name
         position = cube.position
         is_held = yield from self._hand_facts(cube, position)
@@ -178,6 +186,7 @@ class FactDetector:
         return distance_in_plane(position, center) <= distance
 
     def _container_facts(self, container: Body) -> Iterator[Fact]:
+        """Yield the facts about a container: held, lifted or put down."""
         name = container.item.name
         position = container.position
         is_held = yield from self._hand_facts(container, position)
@@ -188,6 +197,7 @@ class FactDetector:
             yield Fact("put_down", name)
 
     def _button_facts(self, button: Body) -> Iterator[Fact]:
+        """Yield whether a button is pressed, and whether the hand hovers over it."""
         if button.pressed_depth > PRESSED_DEPTH:
             yield Fact("pressed", button.item.name)
         distance = distance_in_plane(self._tool, button.position)
@@ -204,6 +214,7 @@ class FactDetector:
                     yield Fact("stopped", name, target.item.name)
 
     def _robot_facts(self) -> Iterator[Fact]:
+        """Yield whether the robot is still, and whether it is at home with open fingers."""
         if self._robot.is_still():
             yield Fact("still", "robot")
         arm_error = np.abs(self._robot.arm_positions - HOME).max()
@@ -212,7 +223,10 @@ class FactDetector:
             yield Fact("home", "robot")
 
     def _hand_facts(self, body: Body, position: Point) -> Generator[Fact, None, bool]:
-        """Yield the facts about the hand at a movable object; return whether the hand holds it."""
+        """Yield the facts about the hand at a movable object; return whether the hand holds it.
+
+        Callers get the return value by ``yield from``. The object is noted for the attempts, too.
+        """
         apart = distance_in_plane(position, self._tool)
         if apart > REACH:  # spares the search through all contacts
             return False

@@ -40,7 +40,12 @@ class MotionContext(NamedTuple):
 
 
 class MotionPlayer:
-    """Plays all motions of a scene."""
+    """Plays all scripted motions of a scene; call its methods in every control step.
+
+    Args:
+        motions: of the scene.
+        bodies: all objects of the scene, by name.
+    """
 
     def __init__(self, motions: Sequence[Motion], bodies: Bodies) -> None:
         players: list[_ScriptedMotion[Any]] = []
@@ -94,13 +99,16 @@ class _ScriptedMotion(ABC, Generic[M]):
         self._body = bodies[self.subject]
 
     @abstractmethod
-    def before_step(self, context: MotionContext) -> None: ...
+    def before_step(self, context: MotionContext) -> None:
+        """Move the object for the next control step."""
 
     def after_step(self, facts: AbstractSet[Fact]) -> None:
-        del facts
+        """Take note of the facts after the step; most motions need none."""
 
 
 class _AwayMotion(_ScriptedMotion[Away]):
+    """Takes an object out of the world for a while; it may return under another one."""
+
     def __init__(self, motion: Away, bodies: Bodies, parking: Point) -> None:
         super().__init__(motion, bodies, parking)
         self.absent = motion.start == 0
@@ -118,6 +126,8 @@ class _AwayMotion(_ScriptedMotion[Away]):
 
 
 class _SwapMotion(_ScriptedMotion[Swap]):
+    """Exchanges two objects on curved lanes, while others (pinned) are held in place."""
+
     # The poses when the motion began: of the two that swap, and of those that are held in place.
     _first_start: sapien.Pose
     _second_start: sapien.Pose
@@ -150,6 +160,8 @@ class _SwapMotion(_ScriptedMotion[Swap]):
 
 
 class _ShuttleMotion(_ScriptedMotion[Shuttle]):
+    """Moves an object back and forth until a fact, such as a pressed button, stops it for good."""
+
     def before_step(self, context: MotionContext) -> None:
         if self.stopped:
             return
@@ -158,6 +170,8 @@ class _ShuttleMotion(_ScriptedMotion[Shuttle]):
 
 
 class _GlowMotion(_ScriptedMotion[Glow]):
+    """Shows a marker while a fact holds, and for some steps after it."""
+
     absent = True
     _lit_at: int | None = None
     """The last step with the fact that it glows during; None before the first."""
@@ -170,6 +184,8 @@ class _GlowMotion(_ScriptedMotion[Glow]):
 
 
 class _VanishMotion(_ScriptedMotion[Vanish]):
+    """Takes an object out of the world for good once a fact holds."""
+
     def before_step(self, context: MotionContext) -> None:
         del context
         if self.absent:
@@ -182,7 +198,10 @@ class _VanishMotion(_ScriptedMotion[Vanish]):
 
 
 def _turn(player: _ScriptedMotion[Any]) -> int:
-    """Put swaps first: an object that returns under another needs the place that it has then."""
+    """Return the sort key by which swaps move first in a step.
+
+    An object that returns under another needs the position that this one has then.
+    """
     return 0 if isinstance(player, _SwapMotion) else 1
 
 
@@ -199,11 +218,12 @@ _PLAYERS: Mapping[type[Motion], type[_ScriptedMotion[Any]]] = {
 def shuttle_position(motion: Shuttle, step: int) -> Point:
     """Return the position of an unstopped shuttle at a control step.
 
-    It goes from the motion's begin to its end, back again, and so on, `passes` times in all.
+    It goes from the motion's begin to its end, back again, and so on, `passes` times in all, each
+    in `interval` steps. After the last it stays where it is.
     """
-    done = min(step / motion.interval, float(motion.passes))
-    complete_passes = min(int(done), motion.passes - 1)
-    share = _smooth(done - complete_passes)
+    passes_done = min(step / motion.interval, float(motion.passes))
+    complete_passes = min(int(passes_done), motion.passes - 1)
+    share = _smooth(passes_done - complete_passes)
     if complete_passes % 2 == 0:
         return Point(*_between(motion.begin, motion.end, share))
     return Point(*_between(motion.end, motion.begin, share))
@@ -212,10 +232,12 @@ def shuttle_position(motion: Shuttle, step: int) -> Point:
 def _pose_on_lane(start: sapien.Pose, goal: sapien.Pose, share: float, lane: float) -> sapien.Pose:
     """Return the pose on a curve from one pose to another, at the height of the first.
 
+    Two objects that swap take curves on opposite sides of the line between them.
+
     Args:
         start: pose at share 0.
-        goal: pose at share 1.
-        share: of the motion that is done.
+        goal: pose at share 1; elsewhere in the plane.
+        share: of the motion's time that has passed, 0 to 1 or more.
         lane: distance of the curve's middle from the straight line, to its left, m.
     """
     height = start.p[2]
@@ -226,12 +248,13 @@ def _pose_on_lane(start: sapien.Pose, goal: sapien.Pose, share: float, lane: flo
     x, y, _ = _between(start.p, goal.p, smooth)
     dx = float(goal.p[0] - start.p[0])
     dy = float(goal.p[1] - start.p[1])
+    # (-dy, dx) points to the left of the line, and is as long as it.
     swing = lane * math.sin(math.pi * smooth) / math.hypot(dx, dy)
     return sapien.Pose([x - dy * swing, y + dx * swing, height], _turned(start, goal, smooth))
 
 
 def _turned(start: sapien.Pose, goal: sapien.Pose, share: float) -> NDArray[np.float32]:
-    """Return the quaternion that has turned by a share from one pose to another."""
+    """Return the quaternion (w, x, y, z) that has turned by a share from one pose to another."""
     begin = np.asarray(start.q)
     end = np.asarray(goal.q)
     # Quaternions q and -q are the same rotation; the nearer one gives the shorter turn.
@@ -247,5 +270,5 @@ def _between(begin: Iterable[float], end: Iterable[float], share: float) -> tupl
 
 
 def _smooth(share: float) -> float:
-    """Ease in and out: map 0..1 to 0..1 with zero speed at both ends."""
+    """Map a share of time, 0 to 1, to one of the way, with zero speed at both ends: 0.5 → 0.5."""
     return share * share * (3.0 - 2.0 * share)

@@ -64,8 +64,12 @@ class ObservationSpec:
 class ObservationBuilder:
     """Reads observations of one world.
 
+    Args:
+        world: the world.
+        spec: which fields observations have.
+
     Attributes:
-        proprioception: the robot's proprioception.
+        proprioception: the robot's proprioception; its `update` is called after each control step.
     """
 
     def __init__(self, world: World, spec: ObservationSpec) -> None:
@@ -153,7 +157,12 @@ def proprioception_fields(spec: ObservationSpec) -> dict[str, FieldFormat]:
 def stack_proprioception(
     readings: Sequence[dict[str, Any]], spec: ObservationSpec
 ) -> dict[str, NDArray[Any]]:
-    """Stack readings of `read_proprioception` to arrays with a leading axis T >= 0."""
+    """Stack readings of `read_proprioception` to arrays with a leading axis T >= 0.
+
+    Args:
+        readings: T of them; without any, arrays are empty, with the right shapes and types.
+        spec: which fields they have.
+    """
     arrays = {}
     for field, kind in proprioception_fields(spec).items():
         if readings:

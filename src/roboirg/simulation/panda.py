@@ -23,6 +23,7 @@ from roboirg.simulation.model_files import ROBOT_FILE, find_model_files
 from roboirg.simulation.rendering.culling import CullableBody
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.simulation.rendering.robot_meshes import apply_shading, link_hull, link_shapes
+from roboirg.simulation.rendering.viewpoint import transformed
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -52,7 +53,7 @@ class Panda:
     """A Panda in a scene, fixed at its base, at home with an open gripper.
 
     Args:
-        scene: the scene; the robot must be built first.
+        scene: the scene, still empty: the robot must be built first.
         visible: whether to load meshes for drawing.
         rendering: how pictures are drawn.
 
@@ -88,11 +89,11 @@ class Panda:
         self.reset()
 
     def _add_meshes(self, link: str, records: Sequence[Any], rendering: RenderSettings) -> None:
-        """Add what is drawn of a link.
+        """Add what is drawn of a link: one render body, or for the base one for each camera.
 
         Args:
             link: name of the link.
-            records: SAPIEN's visual records of the link's meshes.
+            records: SAPIEN's visual records of the link's meshes: file, material and pose of each.
             rendering: how pictures are drawn.
         """
         hull = _hull(records, rendering)
@@ -151,9 +152,14 @@ class Panda:
     def grasps(
         self, body: sapien.physx.PhysxBaseComponent, contacts: list[sapien.physx.PhysxContact]
     ) -> bool:
-        """Return whether both fingers push a body hard enough against their opening direction.
+        """Return whether both fingers push a body hard enough, in about their closing direction.
 
-        `contacts` are those of the last physics step.
+        The force on a finger must be `GRASP_FORCE` or more, and at most `GRASP_ANGLE` from the
+        direction in which the finger opens (ManiSkill's rule).
+
+        Args:
+            body: the component that collides.
+            contacts: those of the last physics step.
         """
         for finger, sign in zip(self._fingers, OPENING_SIGNS, strict=True):
             force = _force_on(finger, body, contacts)
@@ -180,7 +186,7 @@ def rotation_of(pose: sapien.Pose) -> Rotation:
 def _render_body(
     records: Sequence[Any], rendering: RenderSettings, fixed_at: sapien.Pose | None = None
 ) -> sapien.render.RenderBodyComponent:
-    """Return the meshes of a link as one body.
+    """Return the meshes of a link as one render body, which is in no scene yet.
 
     Args:
         records: SAPIEN's visual records of the link's meshes.
@@ -198,12 +204,12 @@ def _render_body(
 
 
 def _hull(records: Sequence[Any], rendering: RenderSettings) -> NDArray[np.float64]:
-    """Return the vertices (n, 3) of the convex hulls of a link's meshes, m in its frame."""
+    """Return the vertices (n, 3) of the convex hulls of a link's meshes, m in the link's frame."""
     hulls = []
     for record in records:
         matrix = record.pose.to_transformation_matrix()
         hull = link_hull(Path(record.filename), rendering)
-        hulls.append(hull @ matrix[:3, :3].T + matrix[:3, 3])
+        hulls.append(transformed(hull, matrix))
     return np.concatenate(hulls)
 
 

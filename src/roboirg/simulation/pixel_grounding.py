@@ -35,9 +35,10 @@ class PixelGrounding:
         self.text = ""
 
     def update(self, stage: Stage | None) -> None:
-        """Update the text for the published stage; None, after the last one, keeps it.
+        """Update the text; call it after every control step.
 
-        Call it after every control step.
+        Args:
+            stage: the stage whose subgoal is published; None after the last one keeps the text.
         """
         if stage is None:
             return
@@ -71,5 +72,5 @@ def objects_at(bodies: Mapping[str, Body], cameras: Cameras, point: Point) -> fr
 
 
 def _reach_of(pixel: int) -> slice:
-    """Return the rows or columns within `REACH_PIXELS` of one."""
+    """Return the rows or columns within `REACH_PIXELS` of one, as a slice from 0 on."""
     return slice(max(pixel - REACH_PIXELS, 0), pixel + REACH_PIXELS + 1)

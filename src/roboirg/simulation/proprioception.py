@@ -53,7 +53,8 @@ class Proprioception:
 def unwrap_angle(previous: float, angle: float) -> float:
     """Return an angle plus full turns, at most half a turn from the previous one; rad.
 
-    For example 3.3 after 3.2 for an angle of -2.98. It is `numpy.unwrap`, but faster.
+    For example 3.3 after 3.2 for an angle of -2.98. It is `numpy.unwrap`, to the last bit, but
+    faster.
     """
     change = angle - previous
     if abs(change) < math.pi:
@@ -67,18 +68,22 @@ def unwrap_angle(previous: float, angle: float) -> float:
 def euler_angles(pose: sapien.Pose) -> NDArray[np.float64]:
     """Return roll, pitch and yaw of a pose (extrinsic x-y-z), rad, each from -pi to pi.
 
-    Uses the formulas of Bernardes and Viollet (2022), as SciPy does, and gives the same bits;
-    importing SciPy would take a fifth of a process's startup time. Where roll and yaw turn about
-    the same axis (gimbal lock), yaw is 0.
+    Uses the formulas of Bernardes and Viollet (2022), as SciPy does, and gives the same bits, so
+    that the order of operations matters; importing SciPy would take a fifth of a process's startup
+    time. Where roll and yaw turn about the same axis (gimbal lock), yaw is 0.
     """
     w, x, y, z = pose.q.tolist()
-    # The order of the sum determines the last bit.
     norm = math.sqrt(x * x + y * y + z * z + w * w)
-    # Sums and differences of the unit quaternion's parts.
-    a = w / norm - y / norm
-    b = x / norm + z / norm
-    c = w / norm + y / norm
-    d = z / norm - x / norm
+    w /= norm
+    x /= norm
+    y /= norm
+    z /= norm
+    # Sums and differences of the unit quaternion's parts: a and b give half the sum of roll and
+    # yaw, c and d half the difference, and their lengths the pitch.
+    a = w - y
+    b = x + z
+    c = w + y
+    d = z - x
     half_sum = math.atan2(b, a)
     half_difference = math.atan2(d, c)
     # NumPy's hypot is the C library's; Python's is not.

@@ -69,7 +69,7 @@ class Recording:
         return len(self.video_actions(episode))
 
     def to_bytes(self) -> bytes:
-        """Serialize without loss."""
+        """Serialize without loss, as an NPZ file; `source` is not kept."""
         file = io.BytesIO()
         end = np.array(self.end)
         np.savez_compressed(file, actions=self.actions, stages=self.stages, end=end)

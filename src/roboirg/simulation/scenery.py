@@ -108,7 +108,10 @@ def _floor_piece(
 ) -> sapien.render.RenderShapeTriangleMesh:
     """Return a range of the floor's squares along x and y as a textured mesh.
 
-    `step` squares per side are merged into one.
+    Args:
+        along_x: range of squares.
+        along_y: range of squares.
+        step: so many squares per side are merged into one; it divides both ranges.
     """
     x_ticks = _floor_ticks(along_x, step)
     y_ticks = _floor_ticks(along_y, step)
@@ -130,14 +133,20 @@ def _floor_piece(
 
 
 def _floor_ticks(squares: Range, step: int) -> NDArray[np.float64]:
-    """Return the coordinates of the lines between a range of the floor's squares, m."""
+    """Return the coordinates of the lines around a range of the floor's squares, m.
+
+    With 100 squares of 1 m, squares 40 to 60 and a step of 20 → [-10, 10].
+    """
     ticks = np.linspace(-FLOOR_WIDTH / 2, FLOOR_WIDTH / 2, FLOOR_CELLS + 1)
     first, end = squares
     return ticks[first : end + 1 : step]
 
 
 def _grid_triangles(columns: int, rows: int) -> NDArray[np.intp]:
-    """Return the triangles of a grid of vertices, which are numbered column by column, (n, 3)."""
+    """Return the triangles of a grid of vertices, as vertex numbers, (n, 3), two for each square.
+
+    Vertices are numbered column by column: along y first.
+    """
     numbers = np.arange(columns * rows).reshape(columns, rows)
     # The corners of each square: near and far along y, in its own column and the next.
     near = numbers[:-1, :-1].ravel()

@@ -34,8 +34,10 @@ class World:
         rendering: how pictures are drawn.
 
     Attributes:
+        robot: the robot.
+        bodies: the objects, by name.
         elapsed: control steps since the start.
-        facts: all facts that hold now.
+        facts: all facts that hold now, such as *picked, cube 1* (`roboirg.core.fact_traits`).
     """
 
     def __init__(
@@ -102,7 +104,10 @@ class World:
         return self._motions.absent()
 
     def note_stage(self, index: int) -> None:
-        """Record the step at which a stage became due, for the motions that wait for it."""
+        """Record the step at which a stage became due, for the motions that wait for it.
+
+        Call it in every step with the index of the stage that is due; only the first call counts.
+        """
         self._stage_starts.setdefault(index, self.elapsed)
 
     def picture(self, camera: str) -> Pixels:
@@ -119,7 +124,7 @@ class World:
 
 
 _drawing_processes: set[int] = set()
-"""The id of this process, if it has drawn; a fork inherits that of its parent."""
+"""The id of this process, if it has drawn; a forked process inherits that of its parent."""
 
 
 def check_drawing_process() -> None:

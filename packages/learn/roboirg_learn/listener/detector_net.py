@@ -25,7 +25,9 @@ INPUT_SIZE = 256
 GRID = INPUT_SIZE // CELL
 CHANNELS = (16, 32, 64, 64)
 MAX_OBJECTS = 20
+"""Most objects that are found in a picture."""
 MIN_SCORE = 0.3
+"""Probability of a class above which a cell counts as having an object of it."""
 BACKGROUND_WEIGHT = 0.02
 """Of a cell without an object in the loss: there are two hundred times as many."""
 
@@ -50,7 +52,9 @@ class DetectorNet(nn.Module):
         self.offsets = nn.Conv2d(fourth, 2, 1)
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Return logits (n, classes + 1, grid, grid) and offsets in cells (n, 2, grid, grid).
+        """Return class logits (n, classes + 1, GRID, GRID) and offsets (n, 2, GRID, GRID).
+
+        Class 0 is background; offsets are column and row of the center in its cell, in cells.
 
         Args:
             pictures: uint8 (n, 256, 256, 3).
@@ -67,39 +71,44 @@ class DetectorNet(nn.Module):
         neighbors, and more than `MIN_SCORE`.
         """
         logits, offsets = self(torch.from_numpy(np.stack(pictures)))
-        scores, kinds = logits.softmax(dim=1)[:, 1:].max(dim=1)  # without background
+        scores, classes = logits.softmax(dim=1)[:, 1:].max(dim=1)  # without background
         peaks = functional.max_pool2d(scores[:, None], 3, stride=1, padding=1)[:, 0]
         is_object = (scores >= peaks) & (scores > MIN_SCORE)
-        return [
-            _objects_at(is_object[number], scores[number], kinds[number], offsets[number])
-            for number in range(len(pictures))
-        ]
+        of_each_picture = zip(is_object, scores, classes, offsets, strict=True)
+        return [_objects_at(*grids) for grids in of_each_picture]
 
 
-def _objects_at(is_object: Tensor, scores: Tensor, kinds: Tensor, offsets: Tensor) -> SeenObjects:
+def _objects_at(is_object: Tensor, scores: Tensor, classes: Tensor, offsets: Tensor) -> SeenObjects:
     """Return the objects of one picture, the surest first, at most `MAX_OBJECTS`.
 
     Args:
         is_object: (GRID, GRID) whether a cell has one.
         scores: (GRID, GRID) of the best class.
-        kinds: (GRID, GRID) numbers of classes.
+        classes: (GRID, GRID) class numbers, from 0.
         offsets: (2, GRID, GRID) column and row of the center in the cell, in cells.
     """
     rows, columns = torch.nonzero(is_object, as_tuple=True)
     surest = scores[rows, columns].argsort(descending=True)[:MAX_OBJECTS]
     rows = rows[surest]
     columns = columns[surest]
-    shift = offsets[:, rows, columns]
-    centers = torch.stack([columns + shift[0], rows + shift[1]], dim=1) / GRID
-    return SeenObjects(kinds[rows, columns].numpy(), centers.numpy().astype(np.float32))
+    column_offsets, row_offsets = offsets[:, rows, columns]
+    centers = torch.stack([columns + column_offsets, rows + row_offsets], dim=1) / GRID
+    return SeenObjects(classes[rows, columns].numpy(), centers.numpy().astype(np.float32))
 
 
 def block(
     inputs: int, outputs: int, size: int = 3, stride: int = 1, dilation: int = 1
 ) -> tuple[nn.Module, ...]:
-    """Return the layers of a convolution, batch normalization and ReLU.
+    """Return a convolution, batch normalization and ReLU, for ``nn.Sequential(*block(…))``.
 
     Rows and columns are divided by the stride; at stride 1 they stay as they are.
+
+    Args:
+        inputs: channels.
+        outputs: channels.
+        size: odd, rows and columns of the kernel.
+        stride: of the convolution.
+        dilation: of the convolution.
     """
     padding = dilation * (size // 2)
     convolution = nn.Conv2d(
@@ -108,7 +117,9 @@ def block(
     return convolution, nn.BatchNorm2d(outputs), nn.ReLU()
 
 
-def detector_loss(net: DetectorNet, views: Sequence[LabeledView], classes: Sequence[str]) -> Tensor:
+def detector_loss(
+    net: DetectorNet, views: Sequence[LabeledView], class_names: Sequence[str]
+) -> Tensor:
     """Return the loss of a batch of labeled pictures.
 
     It adds that of the class of every cell, where background weighs little, and the mean distance
@@ -117,48 +128,49 @@ def detector_loss(net: DetectorNet, views: Sequence[LabeledView], classes: Seque
     Args:
         net: that learns.
         views: uint8 pictures (256, 256, 3) with labels.
-        classes: names in the order of their numbers.
+        class_names: in the order of their numbers.
     """
-    labels = _cell_labels(views, classes)
+    labels = _cell_labels(views, class_names)
     logits, offsets = net(torch.from_numpy(np.stack([view.picture for view in views])))
-    weights = torch.ones(len(classes) + 1)
+    weights = torch.ones(len(class_names) + 1)
     weights[0] = BACKGROUND_WEIGHT
-    kind_loss = functional.cross_entropy(logits, labels.kinds, weights)
+    class_loss = functional.cross_entropy(logits, labels.classes, weights)
 
-    has_object = (labels.kinds > 0)[:, None]
+    has_object = (labels.classes > 0)[:, None]
     distances = functional.l1_loss(offsets, labels.offsets, reduction="none")
     offset_loss = (distances * has_object).sum()
-    return kind_loss + offset_loss / has_object.sum().clamp(min=1)
+    return class_loss + offset_loss / has_object.sum().clamp(min=1)
 
 
 class CellLabels(NamedTuple):
-    """What is in the cells of n pictures.
+    """What is in the cells of n pictures: what the network should return for them.
 
     Attributes:
-        kinds: (n, GRID, GRID) numbers of classes from 1; 0 for background.
+        classes: (n, GRID, GRID) class numbers from 1; 0 for background.
         offsets: (n, 2, GRID, GRID) of the center in its cell, column and row, in cells.
     """
 
-    kinds: Tensor
+    classes: Tensor
     offsets: Tensor
 
 
-def _cell_labels(views: Sequence[LabeledView], classes: Sequence[str]) -> CellLabels:
+def _cell_labels(views: Sequence[LabeledView], class_names: Sequence[str]) -> CellLabels:
     """Return what the network should say of each cell of some pictures.
 
-    A cell belongs to the object whose center it has; of two objects the later one counts.
+    A cell belongs to the object whose center it has; of two objects the later one counts. A center
+    at (20, 9) pixels is in row 1 and column 2 of cells of 8 pixels, with the offset (0.5, 0.125).
 
     Args:
         views: with names and centers, column and row in pixels, of their objects.
-        classes: names in the order of their numbers; 0 is background, so classes begin at 1.
+        class_names: in the order of their numbers; 0 is background, so classes begin at 1.
     """
-    numbers = {name: number for number, name in enumerate(classes, start=1)}
-    kinds = torch.zeros(len(views), GRID, GRID, dtype=torch.long)
+    numbers = {name: number for number, name in enumerate(class_names, start=1)}
+    classes = torch.zeros(len(views), GRID, GRID, dtype=torch.long)
     offsets = torch.zeros(len(views), 2, GRID, GRID)
-    for place, view in enumerate(views):
+    for picture, view in enumerate(views):
         for name, (x, y) in zip(view.names, view.centers / CELL, strict=True):
             row = int(y)
             column = int(x)
-            kinds[place, row, column] = numbers[name]
-            offsets[place, :, row, column] = torch.tensor([x - column, y - row])
-    return CellLabels(kinds, offsets)
+            classes[picture, row, column] = numbers[name]
+            offsets[picture, :, row, column] = torch.tensor([x - column, y - row])
+    return CellLabels(classes, offsets)

@@ -22,15 +22,16 @@ from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary, split_w
 WIDTH = 96
 """Numbers of a token."""
 MAX_WORDS = 96
-WAVES = 6
-"""Frequencies of the sines that encode a place."""
+FREQUENCIES = 6
+"""Of the Fourier features that encode a position."""
 METERS = 0.5
-"""Of a place, which the longest wave spans about once."""
+"""Unit of positions: the slowest sine spans it about once."""
 PADDING, UNKNOWN = 0, 1
+"""Numbers of no word, and of a word that is not in the vocabulary; known words begin at 2."""
 
 
 class InputTokens(NamedTuple):
-    """Tokens of n inputs: (n, tokens, WIDTH), and (n, tokens) False for padding."""
+    """Tokens of n inputs (n, tokens, WIDTH), and `there` (n, tokens), False for padding."""
 
     values: Tensor
     there: Tensor
@@ -48,12 +49,11 @@ class TokenEncoder(nn.Module):
 
 
 class WordEncoder(TokenEncoder):
-    """A token for each word: its embedding, and that of its place."""
+    """A token for each word: its embedding, and that of its position in the text."""
 
     def __init__(self, vocabulary: Vocabulary) -> None:
         super().__init__()
-        # 0 is padding, 1 an unknown word.
-        self._numbers = {word: place + 2 for place, word in enumerate(vocabulary.words)}
+        self._numbers = {word: number for number, word in enumerate(vocabulary.words, UNKNOWN + 1)}
         self.words = nn.Embedding(len(vocabulary.words) + 2, WIDTH, padding_idx=PADDING)
         self.order = nn.Parameter(torch.randn(MAX_WORDS, WIDTH) * 0.02)
 
@@ -71,7 +71,7 @@ class WordEncoder(TokenEncoder):
 
 
 class ObjectEncoder(TokenEncoder):
-    """A token for each object that the detector found: its class, picture, place and ranks."""
+    """A token for each object that the detector found: its class, picture, position and ranks."""
 
     def __init__(self, vocabulary: Vocabulary) -> None:
         super().__init__()
@@ -79,20 +79,22 @@ class ObjectEncoder(TokenEncoder):
         # One layer for each property of an object; a token is the sum of what they return.
         self.kinds = nn.Embedding(classes, WIDTH)
         self.views = nn.Embedding(VIEWS, WIDTH)
-        self.places = nn.Linear(4 * WAVES + 2, WIDTH)
+        self.places = nn.Linear(4 * FREQUENCIES + 2, WIDTH)
         self.relations = nn.Linear(relation_count(classes), WIDTH, bias=False)
 
     def forward(self, inputs: Sequence[ListenerInput]) -> InputTokens:
         """Return a token for each object that is seen, padded to the input with most objects."""
-        kinds = _padded([given.seen.kinds for given in inputs])
+        classes = _padded([given.seen.classes for given in inputs])
         views = _padded([given.seen.views for given in inputs])
-        places = _padded([given.seen.positions for given in inputs]) / METERS
+        positions = _padded([given.seen.positions for given in inputs]) / METERS
         relations = _padded([given.seen.relations for given in inputs]).float()
-        values = self.kinds(kinds) + self.views(views) + self.places(waves(places, WAVES))
+        values = self.kinds(classes) + self.views(views)
+        values = values + self.places(fourier_features(positions, FREQUENCIES))
+        values = values + self.relations(relations)
 
-        counts = torch.tensor([len(given.seen.kinds) for given in inputs])
-        is_object = torch.arange(kinds.shape[1]) < counts[:, None]
-        return InputTokens(values + self.relations(relations), is_object)
+        counts = torch.tensor([len(given.seen.classes) for given in inputs])
+        is_object = torch.arange(classes.shape[1]) < counts[:, None]
+        return InputTokens(values, is_object)
 
 
 def _padded(arrays: Sequence[NDArray[Any]]) -> Tensor:
@@ -126,15 +128,15 @@ def make_encoders(
     return found
 
 
-def waves(places: Tensor, count: int) -> Tensor:
-    """Return places followed by sines and cosines of them: (..., 4 * count + 2).
+def fourier_features(positions: Tensor, count: int) -> Tensor:
+    """Return positions followed by sines and cosines of them: (..., 4 * count + 2).
 
-    A network separates places near each other by the fast waves, and far ones by the slow.
+    A network tells positions near each other apart by the fast ones, and far ones by the slow.
 
     Args:
-        places: (..., 2) in units that the slowest wave spans about once.
+        positions: (..., 2) in units that the slowest sine spans about once.
         count: number of frequencies, each twice the one before.
     """
-    scales = math.pi * 2.0 ** torch.arange(count)
-    angles = (places[..., None] * scales).flatten(-2)
-    return torch.cat([places, angles.sin(), angles.cos()], -1)
+    frequencies = math.pi * 2.0 ** torch.arange(count)
+    angles = (positions[..., None] * frequencies).flatten(-2)
+    return torch.cat([positions, angles.sin(), angles.cos()], -1)

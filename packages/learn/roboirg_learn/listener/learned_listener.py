@@ -82,7 +82,8 @@ class LearnedListener(ScriptedPolicy):
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
         """Return the goal that the listener understands, to be executed; None to hold still.
 
-        A goal that the scene does not have cannot be executed.
+        A goal that the scene does not have cannot be executed. What was understood stays in
+        `understood`, for the record.
         """
         given = SaidAndShown(
             task=env.episode.task,

@@ -37,11 +37,11 @@ class LearnedModel:
 
     Attributes:
         vocabulary: what it can name.
-        detector: finds objects.
-        plane: of the table in the picture.
+        detector: finds objects in pictures.
+        plane: maps points of pictures to the table.
         reader: scores goals.
-        without: what it does not get.
-        about: how it was trained, for records.
+        without: what it does not get: pictures, video or words; "none" for all.
+        about: how it was trained, for records; as `TrainingPlan.about` returns it.
         version: fingerprint of its file; empty if it comes from none.
     """
 
@@ -85,7 +85,7 @@ class LearnedModel:
         return goals[int(scores.argmax())]
 
     def see(self, pictures: Sequence[Pixels]) -> ListenerInput:
-        """Return the objects found in pictures as an input that has no task and words yet."""
+        """Return the objects found in one or two pictures; task and words are still empty."""
         seen = locate_and_rank(self.detector.find(pictures), self.plane, self.vocabulary.classes)
         return ListenerInput("", "", seen, tuple(pictures))
 
@@ -93,7 +93,8 @@ class LearnedModel:
 def hide_inputs(given: ListenerInput, without: Without) -> ListenerInput:
     """Return an input without what a listener does not get.
 
-    Without the video nothing is seen of a scene that has one, which is seen in two pictures.
+    Without the video nothing is seen of a scene that has one, which is seen in two pictures; other
+    scenes are seen as they are.
 
     Args:
         given: what there is.
@@ -131,7 +132,10 @@ def load_model(path: Path) -> LearnedModel:
 
 
 def _read(file: TrainedFile) -> LearnedModel:
-    """Return the listener of a file: networks made by its plan, then given its weights."""
+    """Return the listener of a file: networks made by its plan, then given its weights.
+
+    `save_model` writes what is read here.
+    """
     plan = file.about["plan"]
     vocabulary = Vocabulary.of(file.about["vocabulary"])
     plane = TablePlane(file.tensors["matrix"].numpy(), file.tensors["corners"].numpy())

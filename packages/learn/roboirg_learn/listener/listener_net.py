@@ -37,7 +37,7 @@ class ListenerNet(nn.Module):
     ) -> None:
         super().__init__()
         self.encoders = make_encoders(vocabulary, settings)
-        self._tasks = {task: place for place, task in enumerate(vocabulary.tasks)}
+        self._task_numbers = {task: number for number, task in enumerate(vocabulary.tasks)}
         # The task is the first token, from which the parts of answers are scored.
         self.tasks = nn.Embedding(len(vocabulary.tasks), WIDTH)
         self.encoder = transformer(WIDTH, HEADS, LAYERS)
@@ -50,8 +50,8 @@ class ListenerNet(nn.Module):
         The transformer reads a token of the task and those of all encoders. From the task's token
         every part of an answer gets a score; a goal's score is the sum of its parts'.
         """
-        numbers = torch.tensor([self._tasks[given.task] for given in inputs])
-        values = [self.tasks(numbers)[:, None]]
+        task_numbers = torch.tensor([self._task_numbers[given.task] for given in inputs])
+        values = [self.tasks(task_numbers)[:, None]]
         is_there = [torch.ones(len(inputs), 1, dtype=torch.bool)]
         for encoder in self.encoders.values():
             tokens = encoder(inputs)
@@ -60,9 +60,11 @@ class ListenerNet(nn.Module):
 
         is_padding = ~torch.cat(is_there, 1)
         encoded = self.encoder(torch.cat(values, 1), src_key_padding_mask=is_padding)
-        part_scores = self.answer(encoded[:, 0])  # of the token of the task
-        goal_parts = [self.goals[given.task] for given in inputs]
-        return [parts @ scores for parts, scores in zip(goal_parts, part_scores, strict=True)]
+        part_scores = self.answer(encoded[:, 0])  # from the token of the task, (n, parts)
+        goal_scores = []
+        for given, scores in zip(inputs, part_scores, strict=True):
+            goal_scores.append(self.goals[given.task] @ scores)
+        return goal_scores
 
 
 def transformer(width: int, heads: int, layers: int) -> nn.TransformerEncoder:
@@ -74,10 +76,13 @@ def transformer(width: int, heads: int, layers: int) -> nn.TransformerEncoder:
 
 
 def _goal_parts(task: str, parts: Sequence[str]) -> Tensor:
-    """Return which parts each goal of a task has: 1 or 0, (goals, parts), in the schema's order."""
+    """Return which parts each goal of a task has: 1 or 0, (goals, parts), in the schema's order.
+
+    With the parts (color=blue, color=red) the goal red is the row [0, 1].
+    """
     answers = list(goal_schema(task).goals)
-    found = torch.zeros(len(answers), len(parts))
-    for row, answer in zip(found, answers, strict=True):
+    has_part = torch.zeros(len(answers), len(parts))
+    for row, answer in zip(has_part, answers, strict=True):
         for part in parts_of(answer):
             row[parts.index(part)] = 1.0
-    return found
+    return has_part

@@ -46,8 +46,8 @@ class StudyVariant(NamedTuple):
         name: of its file.
         title: of its row.
         settings: that it hears; None for those of the common plan.
-        without: what it does not get.
-        hears: harder settings that it hears, too, if it hears the plain ones.
+        without: what it does not get: pictures, video or words.
+        hears: harder settings that it hears, too, if it hears the plain ones that they build on.
     """
 
     name: str
@@ -60,6 +60,9 @@ class StudyVariant(NamedTuple):
         """Return the plan of this listener: the common one with its own settings and inputs.
 
         A harder setting is added only where the plain one that it builds on is heard.
+
+        Args:
+            common: what all listeners of a seed share.
         """
         settings = self.settings or common.reader.settings
         harder = [name for name in self.hears if all_settings()[name].plain in settings]
@@ -79,9 +82,17 @@ VARIANTS = (
 
 
 class StudyAnswer(NamedTuple):
-    """What one listener made of one instruction of the test split.
+    """What one listener made of one instruction of the test split; a line of its answer file.
 
-    `words` is their pool, `understood` has the slots of the goal.
+    Attributes:
+        listener: name of the variant.
+        seed: of its training.
+        task: of the episode.
+        episode: its index.
+        setting: in which the goal was said.
+        words: pool of the words, ``train`` or ``test``.
+        understood: values of the goal that it chose, by slot, such as ``{"color": "red"}``.
+        is_right: whether that is the episode's goal.
     """
 
     listener: str
@@ -138,7 +149,7 @@ class _Study:
         self._tested: list[ShownEpisode] = []
 
     def begin_seed(self, common: TrainingPlan) -> None:
-        """Begin the trainings with a plan's seed."""
+        """Begin the trainings with a plan's seed; call it before the other methods."""
         self._common = common
         self._scenes: SeenEpisodes | None = None
 
@@ -161,8 +172,8 @@ class _Study:
 
         scenes = self._seen_scenes()
         self._answer_file(variant, plan.reader).unlink(missing_ok=True)
-        kept = self._work / f"reader-{name}.pt"
-        model = train_on_scenes(scenes, plan, kept, part_of(self._progress, name))
+        checkpoint_path = self._work / f"reader-{name}.pt"
+        model = train_on_scenes(scenes, plan, checkpoint_path, part_of(self._progress, name))
         save_model(model, path)
         return model
 
@@ -179,6 +190,7 @@ class _Study:
             yield StudyAnswer(**json.loads(line))
 
     def _answer_file(self, variant: StudyVariant, plan: ReaderPlan) -> Path:
+        """Return the file of a listener's answers, such as ``no-video-0.jsonl``."""
         return self._folder / f"{variant.name}-{plan.seed}.jsonl"
 
     def _seen_scenes(self) -> SeenEpisodes:
@@ -233,7 +245,10 @@ def _answers(
 
 
 def _tested_settings() -> Iterator[tuple[str, WordPool]]:
-    """Yield each setting that is tested with a pool of words in which it is spoken."""
+    """Yield each setting that is tested with each pool of words in which it is spoken.
+
+    Plain settings are spoken in both pools, the one with a rival in held-out words only.
+    """
     for setting in plain_settings():
         for pool in WORD_POOLS:
             yield setting, pool

@@ -1,10 +1,11 @@
 """Where the objects of pictures stand on the table, and how they rank among their kind.
 
-Words such as *the cube second closest to the button* name a rank. Each object has its ranks
-itself, so that a small network need not count and compare places.
+Words such as *the cube second closest to the button* name a rank. Each object comes with its ranks,
+so that a small network need not count and compare positions.
 
 A landmark is what objects of a kind are ordered by: two directions, the robot, the corners of the
-area where objects stand, and every object. The first and the last few have a rank there.
+area where objects stand, and every object. The first and the last few have a rank there. A view is
+a picture in which objects are seen, by its number.
 """
 
 from __future__ import annotations
@@ -33,16 +34,16 @@ class SeenObjects(NamedTuple):
     """The objects found in a picture, the surest first.
 
     Attributes:
-        kinds: (n,) numbers of classes, from 0.
-        places: (n, 2) column and row, as shares of the picture's size.
+        classes: (n,) class numbers, from 0.
+        centers: (n, 2) column and row, as shares of the picture's size.
     """
 
-    kinds: NDArray[np.int64]
-    places: NDArray[np.float32]
+    classes: NDArray[np.int64]
+    centers: NDArray[np.float32]
 
 
 class TablePlane(NamedTuple):
-    """What a picture's places are on the table.
+    """Where on the table the points of a picture are: a homography.
 
     Attributes:
         matrix: (3, 3), from column and row, as shares of the picture's size, to x and y, m.
@@ -52,9 +53,9 @@ class TablePlane(NamedTuple):
     matrix: Points
     corners: Points
 
-    def find(self, places: NDArray[np.floating]) -> Points:
-        """Return x and y (n, 2) on the table, m, of places (n, 2) in a picture."""
-        mapped = np.column_stack([places, np.ones(len(places))]) @ self.matrix.T
+    def find(self, centers: NDArray[np.floating]) -> Points:
+        """Return x and y (n, 2) on the table, m, of points (n, 2) in a picture, as shares."""
+        mapped = np.column_stack([centers, np.ones(len(centers))]) @ self.matrix.T
         return np.asarray(mapped[:, :2] / mapped[:, 2:], np.float64)
 
 
@@ -62,116 +63,128 @@ class ObjectsInView(NamedTuple):
     """All objects seen, of one or two pictures.
 
     Attributes:
-        kinds: (n,) numbers of classes, from 0.
+        classes: (n,) class numbers, from 0.
         views: (n,) the picture of each, from 0.
         positions: (n, 2) x and y on the table, m.
-        relations: (n, `relation_count`) 1 where an object has a rank, else 0.
+        relations: (n, `relation_count`) 1 where an object has a rank, else 0; see `_mark_ranks`.
         looks: number of pictures.
     """
 
-    kinds: NDArray[np.int64]
+    classes: NDArray[np.int64]
     views: NDArray[np.int64]
     positions: NDArray[np.float32]
     relations: NDArray[np.uint8]
     looks: int
 
 
-def fit_plane(places: NDArray[np.floating], positions: NDArray[np.floating]) -> TablePlane:
-    """Return the map from places in a picture to the table that fits n known points best.
+def fit_plane(centers: NDArray[np.floating], positions: NDArray[np.floating]) -> TablePlane:
+    """Return the map from points of a picture to the table that fits n known points best.
 
     It is a homography, found by least squares; its ninth coefficient is set to 1.
 
     Args:
-        places: (n, 2) column and row, as shares of the picture's size.
+        centers: (n, 2) column and row, as shares of the picture's size.
         positions: (n, 2) x and y on the table, m.
     """
-    count = len(places)
-    columns = np.column_stack([places, np.ones(count)])
-    zeros = np.zeros_like(columns)
+    homogeneous = np.column_stack([centers, np.ones(len(centers))])
+    zeros = np.zeros_like(homogeneous)
     x = positions[:, :1]
     y = positions[:, 1:]
     # x = (a·c + b·r + d) / (g·c + h·r + 1) is linear in the unknowns a to h; so is y.
-    of_x = np.hstack([columns, zeros, -places * x])
-    of_y = np.hstack([zeros, columns, -places * y])
-    coefficients = np.linalg.lstsq(np.vstack([of_x, of_y]), positions.T.reshape(-1), rcond=None)[0]
+    of_x = np.hstack([homogeneous, zeros, -centers * x])
+    of_y = np.hstack([zeros, homogeneous, -centers * y])
+    every_x_then_y = positions.T.reshape(-1)
+    coefficients = np.linalg.lstsq(np.vstack([of_x, of_y]), every_x_then_y, rcond=None)[0]
     matrix = np.append(coefficients, 1.0).reshape(3, 3)
     return TablePlane(matrix, corners_of(positions))
 
 
 def corners_of(positions: NDArray[np.floating]) -> Points:
-    """Return the corners (4, 2), x and y, m, of the rectangle around positions (n, 2)."""
-    left, near = positions.min(axis=0)
-    right, far = positions.max(axis=0)
-    return np.array([(left, near), (left, far), (right, near), (right, far)], np.float64)
+    """Return the corners (4, 2), x and y, m, of the rectangle around positions (n, 2).
+
+    The order is that of landmarks in trained networks.
+    """
+    low_x, low_y = positions.min(axis=0)
+    high_x, high_y = positions.max(axis=0)
+    corners = [(low_x, low_y), (low_x, high_y), (high_x, low_y), (high_x, high_y)]
+    return np.array(corners, np.float64)
 
 
 def relation_count(classes: int) -> int:
-    """Return how many ranks `relations` has columns for, given the number of classes."""
+    """Return how many columns `ObjectsInView.relations` has, given the number of classes.
+
+    Landmarks are the fixed ones and each class in each view; each has `_CODES_PER_LANDMARK` ranks.
+    """
     return (_FIXED_LANDMARKS + VIEWS * classes) * _CODES_PER_LANDMARK
 
 
 def locate_and_rank(
-    views: Sequence[SeenObjects], plane: TablePlane, classes: Sequence[str]
+    views: Sequence[SeenObjects], plane: TablePlane, class_names: Sequence[str]
 ) -> ObjectsInView:
     """Return where the objects of pictures stand on the table, and how they rank among their kind.
 
     Args:
         views: the objects found in each picture, one or two.
-        plane: maps places in a picture to the table.
-        classes: names of classes; the first word of each is its kind.
+        plane: maps points of a picture to the table.
+        class_names: in the order of their numbers; the first word of each is its kind.
     """
-    positions = plane.find(np.concatenate([view.places for view in views]))
-    kinds = [view.kinds for view in views]
-    return rank_objects(kinds, positions, plane.corners, classes)
+    positions = plane.find(np.concatenate([view.centers for view in views]))
+    classes_of_views = [view.classes for view in views]
+    return rank_objects(classes_of_views, positions, plane.corners, class_names)
 
 
 def rank_objects(
-    views: Sequence[NDArray[np.int64]], positions: Points, corners: Points, classes: Sequence[str]
+    classes_of_views: Sequence[NDArray[np.int64]],
+    positions: Points,
+    corners: Points,
+    class_names: Sequence[str],
 ) -> ObjectsInView:
     """Return objects, given where they stand, with their ranks among their kind.
 
     A rank is such as *second closest to the button*, among the cubes of the same picture.
 
     Args:
-        views: the numbers of classes of the objects of each picture, one or two.
-        positions: (n, 2) x and y of all of them, m.
-        corners: (4, 2) of the area where objects stand, m.
-        classes: names of classes; the first word of each is its kind.
+        classes_of_views: the class numbers of the objects of each picture, one or two.
+        positions: (n, 2) x and y of all of them, m, those of the first picture first.
+        corners: (4, 2) x and y of the corners of the area where objects stand, m.
+        class_names: in the order of their numbers; the first word of each is its kind.
     """
-    view_numbers = np.repeat(np.arange(len(views)), [len(kinds) for kinds in views])
-    scene = _Scene(np.concatenate(list(views)), view_numbers, positions, corners, len(classes))
-    relations = np.zeros((len(positions), relation_count(len(classes))), np.uint8)
-    for members in _groups_of_one_kind(scene, classes):
+    objects_per_view = [len(classes) for classes in classes_of_views]
+    views = np.repeat(np.arange(len(classes_of_views)), objects_per_view)
+    classes = np.concatenate(list(classes_of_views))
+    scene = _Scene(classes, views, positions, corners, len(class_names))
+    relations = np.zeros((len(positions), relation_count(len(class_names))), np.uint8)
+    for members in _groups_of_one_kind(scene, class_names):
         for order in _landmark_orders(members, scene):
-            _note_ranks(relations, order)
+            _mark_ranks(relations, order)
     stored_positions = positions.astype(np.float32)
-    return ObjectsInView(scene.kinds, view_numbers, stored_positions, relations, len(views))
+    return ObjectsInView(classes, views, stored_positions, relations, len(classes_of_views))
 
 
 def without_objects(seen: ObjectsInView) -> ObjectsInView:
     """Return the same without any objects or pictures, as of a scene that is not looked at."""
     return ObjectsInView(
-        seen.kinds[:0], seen.views[:0], seen.positions[:0], seen.relations[:0], looks=0
+        seen.classes[:0], seen.views[:0], seen.positions[:0], seen.relations[:0], looks=0
     )
 
 
 class _Scene(NamedTuple):
     """All objects of the pictures of a scene; fields as in `ObjectsInView` and `TablePlane`."""
 
-    kinds: NDArray[np.int64]
+    classes: NDArray[np.int64]
     views: NDArray[np.int64]
     positions: Points
     corners: Points
     class_count: int
 
 
-def _groups_of_one_kind(scene: _Scene, classes: Sequence[str]) -> Iterator[NDArray[np.int64]]:
+def _groups_of_one_kind(scene: _Scene, class_names: Sequence[str]) -> Iterator[NDArray[np.int64]]:
     """Yield the numbers of the objects of each kind in each picture.
 
     The kind is the first word of the class: a red and a blue cube are both cubes.
     """
-    first_words = np.array([name.split()[0] for name in classes])
-    names = first_words[scene.kinds]
+    first_words = np.array([name.split()[0] for name in class_names])
+    names = first_words[scene.classes]
     for view in set(scene.views.tolist()):
         is_in_view = scene.views == view
         for name in set(names[is_in_view].tolist()):
@@ -179,7 +192,13 @@ def _groups_of_one_kind(scene: _Scene, classes: Sequence[str]) -> Iterator[NDArr
 
 
 class _LandmarkOrder(NamedTuple):
-    """Objects (n,), and the value (n,) by which a landmark, given by its number, orders them."""
+    """How a landmark orders objects of one kind.
+
+    Attributes:
+        landmark: its number.
+        objects: (n,) numbers of the objects, in any order.
+        values: (n,) by which they are ordered, the least first.
+    """
 
     landmark: int
     objects: NDArray[np.int64]
@@ -204,10 +223,10 @@ def _landmark_orders(members: NDArray[np.int64], scene: _Scene) -> Iterator[_Lan
         yield _LandmarkOrder(number, members, _distances(positions, point))
 
     for other, position in enumerate(scene.positions):
-        # An object has no rank at itself.
+        # An object has no rank at itself. Objects of one class and view share a landmark.
         rest = members[members != other]
-        first_of_view = int(scene.views[other]) * scene.class_count
-        landmark = _FIXED_LANDMARKS + first_of_view + int(scene.kinds[other])
+        first_of_view = _FIXED_LANDMARKS + int(scene.views[other]) * scene.class_count
+        landmark = first_of_view + int(scene.classes[other])
         yield _LandmarkOrder(landmark, rest, _distances(scene.positions[rest], position))
 
 
@@ -216,7 +235,7 @@ def _distances(positions: Points, point: Points) -> Points:
     return np.asarray(np.linalg.norm(positions - point, axis=1), np.float64)
 
 
-def _note_ranks(relations: NDArray[np.uint8], order: _LandmarkOrder) -> None:
+def _mark_ranks(relations: NDArray[np.uint8], order: _LandmarkOrder) -> None:
     """Mark the objects with the `_RANKS` least and greatest values at a landmark, in place.
 
     Args:
@@ -224,9 +243,9 @@ def _note_ranks(relations: NDArray[np.uint8], order: _LandmarkOrder) -> None:
             `_CODES_PER_LANDMARK` columns: first, second, third; last, last but one, …
         order: objects with their values.
     """
-    sorted_objects = order.objects[np.argsort(order.values, kind="stable")]
-    column = order.landmark * _CODES_PER_LANDMARK
-    for rank_number, least in enumerate(sorted_objects[:_RANKS]):
-        relations[least, column + rank_number] = 1
-    for rank_number, greatest in enumerate(sorted_objects[::-1][:_RANKS]):
-        relations[greatest, column + _RANKS + rank_number] = 1
+    from_least = order.objects[np.argsort(order.values, kind="stable")]
+    first_column = order.landmark * _CODES_PER_LANDMARK
+    for rank, object_number in enumerate(from_least[:_RANKS]):
+        relations[object_number, first_column + rank] = 1
+    for rank, object_number in enumerate(from_least[::-1][:_RANKS]):
+        relations[object_number, first_column + _RANKS + rank] = 1

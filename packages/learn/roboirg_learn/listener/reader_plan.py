@@ -12,7 +12,7 @@ from roboirg.extension.episodes import ENVIRONMENT_VERSION, language_label, plai
 from roboirg_learn.listener.vocabulary import USUAL_ENCODERS, WordPool
 
 WORDLESS = "none"
-"""Words of a reader that is trained without any."""
+"""In the place of a pool of words, for a reader that is trained without any."""
 
 
 class ReaderPlan(NamedTuple):
@@ -21,14 +21,15 @@ class ReaderPlan(NamedTuple):
     Attributes:
         tasks: names of tasks.
         settings: names of settings whose instructions it hears, harder ones where they can express
-            the episode; none for a reader without words.
-        words: the pool of words.
+            the episode; () for a reader without words.
+        words: the pool of words, ``train`` or ``test``.
         scenes: random scenes of each task beyond the train split.
-        goals: goals of each scene with an implicit instruction, which hangs on what is there and on
-            what was said before; in explicit and harder settings only the scene's own is heard.
+        goals: how many goals of each scene are heard in implicit settings, where the meaning
+            depends on the scene and on what was said before; in explicit and harder settings only
+            the scene's own is heard.
         reader_epochs: passes over all instructions.
         seed: of initial weights and order.
-        encoders: the settings of each encoder.
+        encoders: keyword arguments of each encoder, by its name in `ENCODERS`.
     """
 
     tasks: tuple[str, ...]
@@ -42,14 +43,14 @@ class ReaderPlan(NamedTuple):
 
     @property
     def heard(self) -> str:
-        """The settings that it hears as one word for names of files: all, none or a-b."""
+        """The settings that it hears, for names of files: ``all``, ``none`` or ``a-b``."""
         if set(self.settings) == set(plain_settings()):
             return "all"
         return "-".join(self.settings) or WORDLESS
 
     @property
     def about(self) -> dict[str, Any]:
-        """All that a reader depends on besides what it sees, as plain data."""
+        """All that a reader depends on besides what it sees, as plain JSON data."""
         words = self.words if self.settings else WORDLESS
         label = language_label(self.tasks, self.words, self.settings)
         return as_plain({**self._asdict(), "words": words, "language_version": label})

@@ -1,7 +1,7 @@
 """Train the reader: instructions with what is seen, and the goals that they mean.
 
-A lesson is one instruction with what is seen and the goal that is meant. Lessons are held back to
-show how well the training goes.
+A reader is the network that scores goals. An example is one instruction with what is seen and the
+goal that is meant; validation examples show how well the training goes.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from roboirg_learn.listener.listener_net import ListenerNet
 from roboirg_learn.listener.reader_plan import ReaderPlan
 from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary, make_vocabulary
 from roboirg_learn.trainer import (
+    Checkpoint,
     Course,
-    KeptTraining,
     Progress,
     Training,
     batch_count,
@@ -45,8 +45,9 @@ FORGOTTEN_WORDS = 0.05
 def instructions_of(episodes: Sequence[Episode], plan: ReaderPlan) -> Iterator[tuple[Episode, str]]:
     """Yield episodes with instructions that a reader learns from, in the settings of its plan.
 
-    Explicit words and harder settings are spoken for the episode's own goal only; all others for
-    more goals of the same scene, too, because there the meaning hangs on what is in it.
+    Explicit words and harder settings (those built on a plain one) are spoken for the episode's own
+    goal only; all others for more goals of the same scene, too, because there the meaning depends
+    on what is in it. An episode with another goal is a copy with that goal.
     """
     known = all_settings()
     for_own_goal = []
@@ -67,7 +68,7 @@ def with_more_goals(episodes: Iterable[Episode], goals: int, seed: int) -> Itera
     Args:
         episodes: any.
         goals: how many goals each scene has in all, if it allows so many.
-        seed: of the choice.
+        seed: of the choice, which is one sequence over all episodes.
     """
     rng = random.Random(seed)
     for episode in episodes:
@@ -79,7 +80,7 @@ def with_more_goals(episodes: Iterable[Episode], goals: int, seed: int) -> Itera
 
 
 def check_reader(plan: ReaderPlan) -> None:
-    """Check a plan before pictures are drawn for it.
+    """Check a plan before pictures are rendered for it.
 
     Raises:
         InvalidValueError: a task has no words, no task has the settings, or an encoder does not
@@ -100,103 +101,114 @@ def check_reader(plan: ReaderPlan) -> None:
     make_encoders(make_vocabulary(["a"], ["cube"], tasks), plan.encoders)
 
 
-class Lesson(NamedTuple):
-    """An instruction with the number of its goal among those of the task."""
+class Example(NamedTuple):
+    """An instruction with what is seen, and the number of its goal in the task's schema."""
 
     given: ListenerInput
     goal: int
 
 
-def lesson_of(given: ListenerInput, episode: Episode) -> Lesson:
-    """Return an instruction with the number of the goal that it means: the episode's own."""
+def example_of(given: ListenerInput, episode: Episode) -> Example:
+    """Return an example whose goal is the episode's own.
+
+    Args:
+        given: the instruction, and what is seen of the episode.
+        episode: with the goal that is meant.
+    """
     schema = goal_schema(episode.task)
     answers = list(schema.goals)
-    return Lesson(given, answers.index(schema.answers[episode.goal]))
+    return Example(given, answers.index(schema.answers[episode.goal]))
 
 
 def train_reader(
-    lessons: Sequence[Lesson],
+    examples: Sequence[Example],
     vocabulary: Vocabulary,
     plan: ReaderPlan,
     progress: Progress,
-    kept: KeptTraining,
-    held_back: Sequence[Lesson] = (),
+    checkpoint: Checkpoint,
+    validation: Sequence[Example] = (),
 ) -> ListenerNet:
     """Train a reader: a network that scores the goals that an instruction may mean.
 
     Args:
-        lessons: the instructions.
-        vocabulary: what it can name.
-        plan: its passes, seed and encoders.
-        progress: called after each pass.
-        kept: where the training is kept.
-        held_back: what shows how training goes.
+        examples: to learn from.
+        vocabulary: what it can read and name.
+        plan: its epochs, seed and encoders.
+        progress: called after each epoch.
+        checkpoint: from which an interrupted training goes on.
+        validation: examples that show how training goes; may be empty.
     """
-    course = ReaderCourse(lessons, vocabulary, plan, held_back)
-    Training(course).run(partial(progress, "reader"), kept)
+    course = ReaderCourse(examples, vocabulary, plan, validation)
+    Training(course).run(partial(progress, "reader"), checkpoint)
     return course.net
 
 
-class ReaderCourse(Course[Lesson]):
+class ReaderCourse(Course[Example]):
     """A reader learns which goals instructions mean; arguments as of `train_reader`."""
 
     net: ListenerNet
-    rate = READER_RATE
+    learning_rate = READER_RATE
 
     def __init__(
         self,
-        lessons: Sequence[Lesson],
+        examples: Sequence[Example],
         vocabulary: Vocabulary,
         plan: ReaderPlan,
-        held_back: Sequence[Lesson],
+        validation: Sequence[Example],
     ) -> None:
-        self._lessons = lessons
-        self._held_back = held_back
+        self._examples = examples
+        self._validation = validation
         self._seed = plan.seed
         self.net = ListenerNet(vocabulary, plan.encoders)
         self.epochs = plan.reader_epochs
-        self.steps = batch_count(lessons)
+        self.steps_per_epoch = batch_count(examples)
 
-    def batches(self, epoch: int) -> Iterator[list[Lesson]]:
-        """Yield all lessons in batches, with other words unknown in each pass."""
+    def batches(self, epoch: int) -> Iterator[list[Example]]:
+        """Return all examples in batches, with other words unknown in each epoch."""
         rng = random.Random(f"{self._seed}/{epoch}")
-        lessons = [_with_unknown_words(lesson, rng) for lesson in self._lessons]
-        return even_batches(lessons, rng, _length)
+        examples = [_with_unknown_words(example, rng) for example in self._examples]
+        return even_batches(examples, rng, _length)
 
-    def loss(self, batch: Sequence[Lesson]) -> torch.Tensor:
-        """Return the mean cross-entropy; lessons go one by one, as tasks differ in goals."""
+    def loss(self, batch: Sequence[Example]) -> torch.Tensor:
+        """Return the mean cross-entropy of the right goals.
+
+        Examples go one by one, because tasks differ in how many goals they have.
+        """
         losses = []
-        for lesson, scores in self._scored(batch):
-            goal = torch.tensor([lesson.goal])
+        for example, scores in self._scored(batch):
+            goal = torch.tensor([example.goal])
             losses.append(functional.cross_entropy(scores[None], goal))
         return torch.stack(losses).mean()
 
     def score(self) -> dict[str, float]:
-        """Return the share of held-back lessons whose goal scores best; {} without any."""
-        if not self._held_back:
+        """Return the share of validation examples whose goal scores best; {} without any."""
+        if not self._validation:
             return {}
         right = 0
-        for batch in even_batches(self._held_back, random.Random(0), _length):
-            for lesson, scores in self._scored(batch):
-                right += int(scores.argmax()) == lesson.goal
-        return {"held back right": right / len(self._held_back)}
+        for batch in even_batches(self._validation, random.Random(0), _length):
+            for example, scores in self._scored(batch):
+                right += int(scores.argmax()) == example.goal
+        return {"held back right": right / len(self._validation)}
 
-    def _scored(self, batch: Sequence[Lesson]) -> Iterator[tuple[Lesson, torch.Tensor]]:
-        """Yield each lesson with the scores of its task's goals."""
-        scores = self.net([lesson.given for lesson in batch])
+    def _scored(self, batch: Sequence[Example]) -> Iterator[tuple[Example, torch.Tensor]]:
+        """Yield each example with the scores (goals,) of its task's goals."""
+        scores = self.net([example.given for example in batch])
         return zip(batch, scores, strict=True)
 
 
-def _with_unknown_words(lesson: Lesson, rng: random.Random) -> Lesson:
-    """Return a lesson with a random twentieth of its words replaced by the unknown word "…"."""
+def _with_unknown_words(example: Example, rng: random.Random) -> Example:
+    """Return an example with a random twentieth of its words replaced by "…".
+
+    No vocabulary has that word, so it is read as the unknown one.
+    """
     words = []
-    for word in lesson.given.text.split():
+    for word in example.given.text.split():
         is_forgotten = rng.random() < FORGOTTEN_WORDS
         words.append("…" if is_forgotten else word)
-    given = lesson.given._replace(text=" ".join(words))
-    return lesson._replace(given=given)
+    given = example.given._replace(text=" ".join(words))
+    return example._replace(given=given)
 
 
-def _length(lesson: Lesson) -> int:
-    """Return about how many words are said, so that batches are even."""
-    return lesson.given.text.count(" ")
+def _length(example: Example) -> int:
+    """Return about how many words an example has, so that batches are even."""
+    return example.given.text.count(" ")

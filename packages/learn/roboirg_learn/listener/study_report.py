@@ -18,7 +18,14 @@ from roboirg_learn.listener.listener_study import HELD_OUT, RIVAL, VARIANTS, Stu
 
 
 class _Section(NamedTuple):
-    """A table of the page: its title, the pool of words, and whether there is a rival."""
+    """A table of the page.
+
+    Attributes:
+        title: over the table.
+        pool: of words, ``train`` or ``test``.
+        has_rival: whether it shows the setting with a rival, a second object that the words could
+            be mistaken to mean, or all others.
+    """
 
     title: str
     pool: str
@@ -44,7 +51,7 @@ UPPER_END = 0.975
 
 
 class ListenerCell(NamedTuple):
-    """A cell of the study: a listener, a pool of words, and a setting."""
+    """A cell of the study's tables: a listener, a pool of words, and a setting."""
 
     listener: str
     pool: str
@@ -52,7 +59,13 @@ class ListenerCell(NamedTuple):
 
 
 class TrainedRate(NamedTuple):
-    """How often a listener is right, the mean over tasks: of all trainings, and of each."""
+    """How often a listener is right, the mean over tasks; rates are from 0 to 1.
+
+    Attributes:
+        rate: the mean over all trainings.
+        interval: its 95 % interval.
+        by_seed: the rate of each training.
+    """
 
     rate: float
     interval: tuple[float, float]
@@ -72,8 +85,8 @@ def trained_rate(tasks: Sequence[Verdicts]) -> TrainedRate:
     by_seed = np.mean([verdicts.mean(axis=1) for verdicts in tasks], axis=0)
     rate = float(by_seed.mean())
     variance = _variance_of_mean(tasks, by_seed)
-    count = sum(verdicts.shape[1] for verdicts in tasks)
     if not variance.total:
+        count = sum(verdicts.shape[1] for verdicts in tasks)
         interval: tuple[float, float] = without_spread(rate, count)
     else:
         from scipy import special  # SciPy's statistics take a second to import
@@ -85,7 +98,7 @@ def trained_rate(tasks: Sequence[Verdicts]) -> TrainedRate:
 
 
 class _Variance(NamedTuple):
-    """The variance of a mean, with Satterthwaite's degrees of freedom; 0 where it is 0."""
+    """The variance of a mean, with Satterthwaite's degrees of freedom; both 0 without spread."""
 
     total: float
     freedom: float
@@ -135,12 +148,12 @@ def write_study(answers: Iterable[StudyAnswer], about: Mapping[str, Any], folder
 
 
 def study_rates(answers: Iterable[StudyAnswer]) -> dict[ListenerCell, TrainedRate]:
-    """Return how often each listener is right."""
+    """Return how often each listener is right in each cell of the tables."""
     return {cell: trained_rate(tasks) for cell, tasks in _verdicts(answers).items()}
 
 
 def tables_text(found: Mapping[ListenerCell, TrainedRate]) -> str:
-    """Return the tables of a study as Markdown: a row for each listener, a column a setting."""
+    """Return the tables of a study as Markdown: rows of listeners, columns of settings."""
     seeds = max(len(rate.by_seed) for rate in found.values())
     trainings = "1 training seed" if seeds == 1 else f"{seeds} training seeds"
     note = _NOTE.format(trainings)
@@ -168,17 +181,18 @@ def _settings_of(section: _Section, found: Iterable[ListenerCell]) -> list[str]:
 def _verdicts(answers: Iterable[StudyAnswer]) -> dict[ListenerCell, list[Verdicts]]:
     """Return for each cell of the tables one array for each task: 1 where an answer is right.
 
-    An array is (training seeds, episodes); all seeds answered the same episodes in one order.
+    An array is (training seeds, episodes); all seeds answered the same episodes in one order, so
+    that a column is an episode.
     """
-    by_task: dict[tuple[ListenerCell, str], dict[int, list[bool]]] = defaultdict(dict)
+    lists: dict[tuple[ListenerCell, str], dict[int, list[bool]]] = defaultdict(dict)
     for answer in answers:
         cell = ListenerCell(answer.listener, answer.words, answer.setting)
-        by_seed = by_task[cell, answer.task]
+        by_seed = lists[cell, answer.task]
         by_seed.setdefault(answer.seed, []).append(answer.is_right)
-    found: dict[ListenerCell, list[Verdicts]] = defaultdict(list)
-    for (cell, _), by_seed in by_task.items():
-        found[cell].append(np.array(list(by_seed.values()), float))
-    return found
+    verdicts: dict[ListenerCell, list[Verdicts]] = defaultdict(list)
+    for (cell, _), by_seed in lists.items():
+        verdicts[cell].append(np.array(list(by_seed.values()), float))
+    return verdicts
 
 
 def _rows(

@@ -12,7 +12,7 @@ from roboirg_learn.labeled_views import Pixels
 from roboirg_learn.listener.object_relations import ObjectsInView
 
 _WORD = re.compile(r"\d+(?:st|nd|rd|th)?|[a-z']+|[.,]")
-"""A number such as 3 or 3rd, a word, or a stop."""
+"""A number such as 3 or 3rd, a word, or a stop: "Pick it, 2nd." → pick, it, ",", 2nd, "."."""
 _CARDINALS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 _ORDINALS = (
     "zeroth", "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth",
@@ -21,7 +21,7 @@ _ORDINALS = (
 
 
 def _number_words() -> dict[str, str]:
-    """Return the words of digits up to 10: "2" is two; "2nd", and also "2th", is second."""
+    """Return the words of digits up to 10: "2" → two; "2nd", and also "2th", → second."""
     found = {}
     for number, (cardinal, ordinal) in enumerate(zip(_CARDINALS, _ORDINALS, strict=True)):
         found[str(number)] = cardinal
@@ -38,7 +38,9 @@ USUAL_ENCODERS: Mapping[str, dict[str, Any]] = {"words": {}, "objects": {}}
 
 
 class Vocabulary(NamedTuple):
-    """What a listener can name: all plain data, for the checkpoint.
+    """What a listener can read and name, as plain data for the trained file.
+
+    The place of each is its number in trained networks.
 
     Attributes:
         words: known words.
@@ -64,7 +66,7 @@ class ListenerInput(NamedTuple):
     Attributes:
         task: name of the task.
         text: everything that was said.
-        seen: objects of one or two pictures.
+        seen: objects of one or two pictures, with ranks.
         pictures: the pictures themselves; none in training unless an encoder reads pixels.
     """
 
@@ -75,12 +77,15 @@ class ListenerInput(NamedTuple):
 
 
 def split_words(text: str) -> list[str]:
-    """Return the words and stops of a text, in lower case; digits up to 10 become words."""
+    """Return the words and stops of a text, in lower case; digits up to 10 become words.
+
+    "Pick it up 2 times." → pick, it, up, two, times, "."
+    """
     return [_DIGIT_WORDS.get(word, word) for word in _WORD.findall(text.lower())]
 
 
 def words_of(texts: Iterable[str]) -> tuple[str, ...]:
-    """Return the words of texts, each once."""
+    """Return the words of texts, each once, sorted."""
     found: set[str] = set()
     for text in texts:
         found.update(split_words(text))
@@ -96,7 +101,7 @@ def parts_of(answer: str) -> list[str]:
     for name, value in json.loads(answer).items():
         if isinstance(value, list):
             found.append(f"{name}.length={len(value)}")
-            found += [f"{name}.{place}={item}" for place, item in enumerate(value)]
+            found += [f"{name}.{index}={item}" for index, item in enumerate(value)]
         else:
             found.append(f"{name}={value}")
     return found
@@ -114,10 +119,16 @@ def parts_of_tasks(tasks: Iterable[str]) -> tuple[str, ...]:
 def make_vocabulary(
     texts: Iterable[str], classes: Iterable[str], tasks: Sequence[str]
 ) -> Vocabulary:
-    """Return the vocabulary of texts, classes of objects and the answers of tasks."""
+    """Return the vocabulary of texts, classes of objects and the answers of tasks.
+
+    Args:
+        texts: whose words are known.
+        classes: in the order of their numbers.
+        tasks: names of tasks.
+    """
     return Vocabulary(
         words_of(texts),
-        tuple(sorted(set(classes))),
+        tuple(classes),
         tuple(tasks),
         parts_of_tasks(tasks),
     )

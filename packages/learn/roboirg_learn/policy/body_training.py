@@ -1,8 +1,8 @@
-"""Train the body of a policy: decisions of the expert, as a detector would have seen the way.
+"""Train the network of a policy by imitation: the expert's decisions from what a detector sees.
 
-A body is the network that moves: at each decision it chooses a kind of waypoint and the thing at
-whose place it is. A planner is the same network, which chooses subgoals instead of waypoints. The
-expert that was recorded knows the simulator; the body sees only what a detector would find.
+A body's network chooses, at each decision, a move (a type of waypoint) and the object that it is
+at. A planner is the same network, which chooses subgoal templates instead of moves. The expert that
+was recorded knows the simulator; the network sees only what a detector would find.
 """
 
 from __future__ import annotations
@@ -26,267 +26,265 @@ from roboirg_learn.policy.body_net import MOST_DONE, BodyAnswer, BodyNet, Episod
 from roboirg_learn.policy.memories import BLOCKED_SCORE
 from roboirg_learn.policy.moves import LookDecision
 from roboirg_learn.policy.policy_data import (
-    EpisodeNumbers,
+    EpisodeArrays,
+    to_arrays,
     to_batch,
-    to_numbers,
 )
 from roboirg_learn.policy.policy_plan import BodyPlan, Recorded
-from roboirg_learn.policy.sight import Sight
+from roboirg_learn.policy.sight import ObjectClasses
 from roboirg_learn.policy.subgoal_training import with_planner_inputs
-from roboirg_learn.policy.trained_body import GoalLayout, Kind, make_body
-from roboirg_learn.trainer import Course, KeptTraining, Progress, Training, even_batches
+from roboirg_learn.policy.trained_body import Choice, GoalLayout, make_body
+from roboirg_learn.trainer import Checkpoint, Course, Progress, Training, even_batches
 
 MOVES = "moves"
 THINGS = "things"
 DONE = "done"
 MEASURES = (MOVES, THINGS, DONE)
-"""Shares that are right in episodes held back: kinds of waypoints, things, completed stages."""
+"""Shares that are right in validation episodes: moves, objects, numbers of completed stages."""
 RATE = 2e-3
 BATCH = 16
 COUNT_WEIGHT = 0.5
+"""Of the numbers of completed stages in the loss."""
 NEW_NOISE_EVERY = 2
 """Passes after which the noise of the detector is drawn anew."""
-HELD_BACK = 10
-"""Of so many episodes of a task the second is held back: it only measures how training goes."""
+VALIDATION_EVERY = 10
+"""Of so many episodes of a task the second is for validation: nothing is learned from it."""
 
 
-class BodyLesson(NamedTuple):
-    """A recorded episode with its decisions: of the body, or of a planner."""
+class BodyExample(NamedTuple):
+    """A recorded episode with the decisions to learn: of a body, or of a planner."""
 
     recorded: Recorded
     decisions: Sequence[LookDecision]
 
 
 class BodyLayout(NamedTuple):
-    """What a body can see, choose and be given.
+    """What the inputs and outputs of a network stand for.
 
     Attributes:
-        sight: classes of things.
-        goals: which number stands for what.
-        kinds: of waypoints, or forms of subgoals for a planner.
+        object_classes: classes of objects that it can see.
+        goals: which number of a goal stands for what.
+        choices: the moves, or for a planner the subgoal templates, that it chooses among.
     """
 
-    sight: Sight
+    object_classes: ObjectClasses
     goals: GoalLayout
-    kinds: Sequence[Kind]
+    choices: Sequence[Choice]
 
 
 def train_body(
     plan: BodyPlan,
-    lessons: Sequence[BodyLesson],
+    examples: Sequence[BodyExample],
     layout: BodyLayout,
     folder: Path,
     progress: Progress,
 ) -> BodyNet:
-    """Train a body or a planner on recordings; write its learning curve next to its file.
+    """Train a body's network or a planner on recordings; write its learning curve as JSON.
 
     Args:
         plan: memory, seed and number of passes.
-        lessons: recorded episodes with the decisions to learn.
+        examples: recorded episodes with the decisions to learn.
         layout: classes, goals, and what it chooses among.
-        folder: for the training that is kept after each pass, and the curve as JSON.
+        folder: for the checkpoint after each pass, and the curve.
         progress: called after each pass.
     """
-    course = BodyCourse(plan, lessons, layout)
+    course = BodyCourse(plan, examples, layout)
     path = folder / f"body-{plan.memory}-{plan.seed}.pt"
-    kept = KeptTraining(path, course.made_of)
-    curve = Training(course).run(partial(progress, "body"), kept)
+    checkpoint = Checkpoint(path, course.made_of)
+    curve = Training(course).run(partial(progress, "body"), checkpoint)
     rows = [{"epoch": epoch, **measures} for epoch, measures in enumerate(curve, 1)]
     write_atomically(path.with_suffix(".json"), json.dumps(rows))
     return course.net
 
 
-class BodyCourse(Course[EpisodeNumbers]):
-    """A body learns the decisions of the expert; arguments as of `train_body`.
+class BodyCourse(Course[EpisodeArrays]):
+    """A network learns the decisions of the expert; arguments as of `train_body`.
 
     What a detector would have seen is drawn anew after some passes, so that its mistakes are not
     learned by heart.
     """
 
     net: BodyNet
-    rate = RATE
+    learning_rate = RATE
 
-    def __init__(self, plan: BodyPlan, lessons: Sequence[BodyLesson], layout: BodyLayout) -> None:
+    def __init__(self, plan: BodyPlan, examples: Sequence[BodyExample], layout: BodyLayout) -> None:
         torch.manual_seed(plan.seed)
         self._plan = plan
-        self._lessons = lessons
+        self._examples = examples
         self._layout = layout
-        self._is_held_back = held_back([lesson.recorded.episode.task for lesson in lessons])
-        self._learned: list[EpisodeNumbers] = []
-        self._held_back: list[EpisodeNumbers] = []
-        self.net = make_body(layout.sight, layout.goals, layout.kinds, plan.memory)
+        self._is_validation = validation_flags(
+            [example.recorded.episode.task for example in examples]
+        )
+        self._learned: list[EpisodeArrays] = []
+        self._validation: list[EpisodeArrays] = []
+        self.net = make_body(layout.object_classes, layout.goals, layout.choices, plan.memory)
         self.epochs = plan.body_epochs
-        self.steps = math.ceil(self._is_held_back.count(False) / BATCH)
+        self.steps_per_epoch = math.ceil(self._is_validation.count(False) / BATCH)
 
     @property
     def made_of(self) -> list[Any]:
-        """What must be equal for a kept training to go on; its file's name has memory and seed."""
-        sight, goals, kinds = self._layout
+        """What must be equal for a checkpoint to be used; its file's name has memory and seed."""
+        object_classes, goals, choices = self._layout
         return [
-            [lesson.recorded.episode.key for lesson in self._lessons],
-            [list(kind) for kind in kinds],
-            list(sight.classes),
+            [example.recorded.episode.key for example in self._examples],
+            [list(choice) for choice in choices],
+            list(object_classes.names),
             [list(goals.tasks), list(goals.parts)],
-            [self.epochs, HELD_BACK],
+            [self.epochs, VALIDATION_EVERY],
         ]
 
-    def batches(self, epoch: int) -> Iterator[list[EpisodeNumbers]]:
+    def batches(self, epoch: int) -> Iterator[list[EpisodeArrays]]:
         """Yield the episodes to learn from, those of about equal length together."""
         if not self._learned or epoch % NEW_NOISE_EVERY == 0:
             self._draw_noise(epoch // NEW_NOISE_EVERY)
         rng = random.Random(f"{self._plan.seed}/{epoch}")
         return even_batches(self._learned, rng, _length, BATCH)
 
-    def loss(self, batch: Sequence[EpisodeNumbers]) -> Tensor:
+    def loss(self, batch: Sequence[EpisodeArrays]) -> Tensor:
+        """Return `body_loss` of a batch."""
         return body_loss(self.net, to_batch(batch))
 
     def score(self) -> dict[str, float]:
-        """Return the shares of right decisions in the episodes that are held back."""
-        counts: BodyScore = score(self.net, self._held_back)
-        return counts.measures
+        """Return the shares of right decisions in the validation episodes, by `MEASURES`."""
+        shares: dict[str, float] = score(self.net, self._validation)
+        return shares
 
     def _draw_noise(self, times: int) -> None:
         """Turn all episodes into network input with newly drawn mistakes of the detector.
+
+        One generator draws for all of them, in their order.
 
         Args:
             times: how often that was done before; it seeds the noise.
         """
         rng = np.random.default_rng((self._plan.seed, times))
         self._learned = []
-        self._held_back = []
-        for lesson, is_held_back in zip(self._lessons, self._is_held_back, strict=True):
-            episode = self._seen(lesson, rng)
-            group = self._held_back if is_held_back else self._learned
+        self._validation = []
+        for example, is_validation in zip(self._examples, self._is_validation, strict=True):
+            episode = self._network_input(example, rng)
+            group = self._validation if is_validation else self._learned
             group.append(episode)
 
-    def _seen(self, lesson: BodyLesson, rng: np.random.Generator) -> EpisodeNumbers:
+    def _network_input(self, example: BodyExample, rng: np.random.Generator) -> EpisodeArrays:
         """Return an episode as network input, with the subgoals that hands and planners need."""
-        sight = self._layout.sight
-        kinds = self._layout.kinds
-        recorded = lesson.recorded
-        goal = self._layout.goals.of_episode(recorded.episode)
-        numbers = {kind: number for number, kind in enumerate(kinds)}
-        episode = to_numbers(recorded.recording, lesson.decisions, goal, sight, numbers, rng)
-        return with_planner_inputs(self._plan.memory, recorded, episode, len(kinds), sight, rng)
+        object_classes = self._layout.object_classes
+        choices = self._layout.choices
+        recorded = example.recorded
+        goal = self._layout.goals.encode_episode(recorded.episode)
+        numbers = {choice: number for number, choice in enumerate(choices)}
+        episode = to_arrays(
+            recorded.recording, example.decisions, goal, object_classes, numbers, rng
+        )
+        return with_planner_inputs(
+            self._plan.memory, recorded, episode, len(choices), object_classes, rng
+        )
 
 
-def held_back(tasks: Sequence[str]) -> list[bool]:
-    """Return for each episode, given its task, whether it is held back from learning.
+def validation_flags(tasks: Sequence[str]) -> list[bool]:
+    """Return for each episode, given its task, whether it is for validation.
 
     It is the second, twelfth, … episode of each task.
     """
-    seen: Counter[str] = Counter()
-    is_held_back = []
+    counts: Counter[str] = Counter()
+    is_validation = []
     for task in tasks:
-        is_held_back.append(seen[task] % HELD_BACK == 1)
-        seen[task] += 1
-    return is_held_back
+        is_validation.append(counts[task] % VALIDATION_EVERY == 1)
+        counts[task] += 1
+    return is_validation
 
 
-def _length(episode: EpisodeNumbers) -> int:
+def _length(episode: EpisodeArrays) -> int:
     """Return the number of looks, so that batches are even."""
     return len(episode.looks.tool)
 
 
 def body_loss(body: BodyNet, batch: EpisodeBatch) -> Tensor:
-    """Return the loss of a batch: of kinds of waypoints, things, and numbers of completed stages.
+    """Return the loss of a batch: the cross-entropies of moves, tracks and completed stages.
 
-    Things are scored for the right kind. The number of completed stages is never acted on; it
+    Tracks are scored for the right move. The number of completed stages is never acted on; it
     teaches the memory at each decision what to keep, as the moves do only where a count ends. A
     planner that chooses looks to keep learns these, too.
     """
     answer: BodyAnswer = body(batch)
-    has_move = batch.moves >= 0
-    is_decision = batch.done >= 0
-    loss = functional.cross_entropy(answer.moves[has_move], batch.moves[has_move])
-    done = batch.done[is_decision].clamp(max=MOST_DONE)
-    loss = loss + COUNT_WEIGHT * functional.cross_entropy(answer.done[is_decision], done)
-
-    choices = _thing_choices(answer.things, batch)
-    if len(choices.right):
-        loss = loss + functional.cross_entropy(choices.scores, choices.right)
-    if answer.keep_scores is not None and batch.planned is not None:
-        loss = loss + _keep_loss(answer.keep_scores, batch.planned.to_keep)
+    labeled = _labeled_scores(answer, batch)
+    loss = functional.cross_entropy(*labeled[MOVES])
+    loss = loss + COUNT_WEIGHT * functional.cross_entropy(*labeled[DONE])
+    if len(labeled[THINGS].right):
+        loss = loss + functional.cross_entropy(*labeled[THINGS])
+    if answer.keep_scores is not None and batch.subgoal_inputs is not None:
+        loss = loss + _keep_loss(answer.keep_scores, batch.subgoal_inputs.to_keep)
     return loss
 
 
-def _keep_loss(scores: Tensor, wanted: Tensor) -> Tensor:
+def _keep_loss(scores: Tensor, labels: Tensor) -> Tensor:
     """Return the loss of choosing which of the recent looks to keep.
 
     Args:
         scores: (B, D, RECENT) logits.
-        wanted: (B, D, RECENT) 1 to keep, 0 not to; -1 where nothing is learned.
+        labels: (B, D, RECENT) 1 to keep, 0 not to; -1 where nothing is learned.
     """
-    has_label = wanted >= 0
-    labels = wanted[has_label].float()
-    return functional.binary_cross_entropy_with_logits(scores[has_label], labels)
+    has_label = labels >= 0
+    known_labels = labels[has_label].float()
+    return functional.binary_cross_entropy_with_logits(scores[has_label], known_labels)
 
 
-class ThingChoices(NamedTuple):
-    """Choices of things at n decisions.
+class LabeledScores(NamedTuple):
+    """The n decisions of a batch at which a choice is learned.
 
     Attributes:
-        scores: (n, K) of the things, for the right kind of waypoint.
-        right: (n,) numbers of the right things.
+        scores: (n, choices) logits.
+        right: (n,) numbers of the right choices.
     """
 
     scores: Tensor
     right: Tensor
 
 
-def _thing_choices(things: Tensor, batch: EpisodeBatch) -> ThingChoices:
-    """Return the scores of things at those decisions whose right thing can be chosen.
+def _labeled_scores(answer: BodyAnswer, batch: EpisodeBatch) -> dict[str, LabeledScores]:
+    """Return what a network says at the decisions that have labels, by `MEASURES`."""
+    has_move = batch.moves >= 0
+    has_count = batch.stages_done >= 0
+    counts = batch.stages_done[has_count].clamp(max=MOST_DONE)
+    return {
+        MOVES: LabeledScores(answer.moves[has_move], batch.moves[has_move]),
+        THINGS: _labeled_tracks(answer.tracks, batch),
+        DONE: LabeledScores(answer.stages_done[has_count], counts),
+    }
+
+
+def _labeled_tracks(tracks: Tensor, batch: EpisodeBatch) -> LabeledScores:
+    """Return the scores of tracks at those decisions whose right track can be chosen.
 
     Args:
-        things: (B, D, M, K) logits of things for each kind of waypoint; those of the right kind
-            are taken.
-        batch: with the right kinds and things.
+        tracks: (B, D, M, K) logits of tracks for each move; those of the right move are taken.
+        batch: with the right moves and tracks.
     """
-    is_at_thing = (batch.moves >= 0) & (batch.things >= 0)
-    kinds = batch.moves[is_at_thing][:, None, None].expand(-1, 1, things.shape[-1])
-    scores = things[is_at_thing].gather(1, kinds)[:, 0]
-    right = batch.things[is_at_thing]
-    # Without memory a thing out of sight is blocked, and nothing could be learned.
+    is_at_object = (batch.moves >= 0) & (batch.tracks >= 0)
+    right_moves = batch.moves[is_at_object][:, None, None].expand(-1, 1, tracks.shape[-1])
+    scores = tracks[is_at_object].gather(1, right_moves)[:, 0]
+    right = batch.tracks[is_at_object]
+    # Without memory an object out of sight is blocked, and nothing could be learned.
     is_possible = scores.gather(1, right[:, None])[:, 0] > BLOCKED_SCORE / 2
-    return ThingChoices(scores[is_possible], right[is_possible])
-
-
-class BodyScore:
-    """How many kinds of waypoints, things and counts of completed stages are right."""
-
-    def __init__(self) -> None:
-        self._right: Counter[str] = Counter()
-        self._all: Counter[str] = Counter()
-
-    def add(self, measure: str, found: Tensor, wanted: Tensor) -> None:
-        """Count how many of the found numbers (n,) are as wanted (n,); a name of `MEASURES`."""
-        self._right[measure] += int((found == wanted).sum())
-        self._all[measure] += len(wanted)
-
-    @property
-    def measures(self) -> dict[str, float]:
-        """The shares that are right."""
-        return {name: self._right[name] / max(1, self._all[name]) for name in MEASURES}
+    return LabeledScores(scores[is_possible], right[is_possible])
 
 
 @torch.no_grad()
-def score(body: BodyNet, episodes: Sequence[EpisodeNumbers]) -> BodyScore:
-    """Return how often a body is right about the kind of waypoint, the thing, and the stages done.
+def score(body: BodyNet, episodes: Sequence[EpisodeArrays]) -> dict[str, float]:
+    """Return how often a network is right, from 0 to 1, by `MEASURES`; 0 where nothing is labeled.
+
+    The track is judged for the right move, whichever the network chooses.
 
     Args:
         body: the network.
         episodes: with the right decisions.
     """
     body.eval()
-    counts = BodyScore()
+    right: Counter[str] = Counter()
+    total: Counter[str] = Counter()
     for start in range(0, len(episodes), BATCH):
         batch = to_batch(episodes[start : start + BATCH])
-        answer: BodyAnswer = body(batch)
-        has_move = batch.moves >= 0
-        counts.add(MOVES, answer.moves[has_move].argmax(-1), batch.moves[has_move])
-        choices = _thing_choices(answer.things, batch)
-        counts.add(THINGS, choices.scores.argmax(-1), choices.right)
-        is_decision = batch.done >= 0
-        done = batch.done[is_decision].clamp(max=MOST_DONE)
-        counts.add(DONE, answer.done[is_decision].argmax(-1), done)
-    return counts
+        for measure, labeled in _labeled_scores(body(batch), batch).items():
+            is_right = labeled.scores.argmax(-1) == labeled.right
+            right[measure] += int(is_right.sum())
+            total[measure] += len(labeled.right)
+    return {measure: right[measure] / max(1, total[measure]) for measure in MEASURES}

@@ -1,8 +1,9 @@
 """Fast weights: a memory that is itself a small network, trained look by look while it is used.
 
-Each look has tokens. From a token come a key, a value and a query: the fast weights take a step
-towards predicting the value from the key, and are then read with the query. The steps are called
-inner ones, as the training of the whole policy goes on around them.
+This is called test-time training (option ``ttt``). Each look, a moment at which the front picture
+is looked at, has tokens. From a token come a key, a value and a query: the fast weights take a step
+of gradient descent towards predicting the value from the key, and are then read with the query. The
+steps are called inner ones, as the training of the whole policy goes on around them.
 """
 
 from __future__ import annotations
@@ -18,26 +19,27 @@ from roboirg_learn.policy.body_layers import (
     HEADS,
     LAYERS,
     WIDTH,
-    Join,
+    LayerHook,
     join_heads,
     split_heads,
 )
 from roboirg_learn.policy.memories import (
-    Carried,
+    EmbeddedLooks,
     FrameTokens,
     LookMemory,
-    Looks,
     MaskedTokens,
-    Remembered,
-    choose_only_seen,
+    MemoryCache,
+    MemoryOutput,
+    choose_only_visible,
     tokens_at_looks,
 )
 
 FAST_HEADS = 2
 HEAD_WIDTH = WIDTH // FAST_HEADS
 EXPERT_WIDTH = WIDTH // 2
+"""Numbers of a token in the memory's own transformer, the expert."""
 READ_LOOKS = 8
-"""Most recent looks whose tokens the body attends to, the present one included."""
+"""Most recent looks whose tokens the policy's network attends to, the present one included."""
 INITIAL_RATE = 0.01
 """Learning rate of an inner step before anything is learned."""
 MOST_RATE = 0.1
@@ -48,11 +50,13 @@ EPSILON = 1e-8
 
 
 class FastNorm(NamedTuple):
-    """The norm of what fast weights predict; learned, and not changed by inner steps.
+    """The norm of what fast weights predict: values over their root mean square, scaled, shifted.
+
+    Its parameters are learned with the policy, and not changed by inner steps.
 
     Attributes:
-        scale: (heads, 1, size) less 1.
-        shift: (heads, 1, size).
+        scale: (heads, 1, size) the factor less 1.
+        shift: (heads, 1, size) what is added.
     """
 
     scale: Tensor
@@ -63,13 +67,14 @@ class FastNorm(NamedTuple):
         return values / _root_mean_square(values) * (1.0 + self.scale) + self.shift
 
     def pull_back(self, values: Tensor, error: Tensor) -> Tensor:
-        """Return the gradient of the loss at the values, which is backpropagation by hand.
+        """Return the gradient of the loss at the values: the backward pass of `__call__`, by hand.
 
-        Inner steps also run under ``torch.no_grad``, so autograd cannot compute it.
+        Inner steps also run under ``torch.no_grad``, so autograd cannot compute it. A change of
+        `__call__` needs the same change here.
 
         Args:
-            values: (n, heads, m, size) what was normalized.
-            error: the gradient of the loss at the normalized values, of the same shape.
+            values: (n, heads, m, size) what `__call__` was given.
+            error: the gradient of the loss at what it returned, of the same shape.
         """
         size = _root_mean_square(values)
         normalized = values / size
@@ -79,8 +84,8 @@ class FastNorm(NamedTuple):
         return (scaled - through_size) / size
 
 
-class Fast(NamedTuple):
-    """Fast weights of n episodes.
+class FastWeights(NamedTuple):
+    """Fast weights of n episodes: a linear layer for each head, which `FastNorm` follows.
 
     Attributes:
         weights: (n, heads, size, size).
@@ -90,15 +95,16 @@ class Fast(NamedTuple):
     weights: Tensor
     biases: Tensor
 
-    def after(self, keys: Tensor, values: Tensor, rates: Tensor, norm: FastNorm) -> Fast:
+    def updated(self, keys: Tensor, values: Tensor, rates: Tensor, norm: FastNorm) -> FastWeights:
         """Return the fast weights after one step of gradient descent on m tokens.
 
         The loss of a token is half the squared distance between the prediction from its key and
-        ``value - key``: `read` adds its input back, so only the residual is learned.
+        ``value - key``: `read` adds its input back, so only the residual is learned. The steps of
+        all tokens are summed and clipped.
 
         Args:
-            keys: (n, heads, m, size).
-            values: (n, heads, m, size).
+            keys: (n, heads, m, size) from which is predicted.
+            values: (n, heads, m, size) what is to be read at these keys.
             rates: (n, heads, m, 1) learning rate of each token; 0 for padding.
             norm: applied to predictions.
         """
@@ -107,7 +113,7 @@ class Fast(NamedTuple):
         gradient = rates * norm.pull_back(predicted, error)
         weight_step = _clipped(keys.transpose(-1, -2) @ gradient)
         bias_step = _clipped(gradient.sum(-2, keepdim=True))
-        return Fast(self.weights - weight_step, self.biases - bias_step)
+        return FastWeights(self.weights - weight_step, self.biases - bias_step)
 
     def read(self, queries: Tensor, norm: FastNorm) -> Tensor:
         """Return queries (n, heads, m, size) plus the weights' predictions from them."""
@@ -115,14 +121,20 @@ class Fast(NamedTuple):
 
 
 class FastState(NamedTuple):
-    """Fast weights after T looks, and what was read from them at each (B, T, m, WIDTH)."""
+    """Fast weights after T looks, and what was read from them at each (B, T, m, WIDTH).
 
-    fast: Fast
+    `MemoryCache.state` of this memory.
+    """
+
+    fast: FastWeights
     read_values: Tensor
 
 
 class InnerStep(NamedTuple):
-    """What fast weights are updated and read with at one look; arguments of `Fast.after`."""
+    """What fast weights are updated and read with at one look: (B, heads, m, size), rates (…, 1).
+
+    These are the arguments of `FastWeights.updated` and `FastWeights.read`.
+    """
 
     queries: Tensor
     keys: Tensor
@@ -131,7 +143,11 @@ class InnerStep(NamedTuple):
 
 
 class FastWeightMemory(LookMemory):
-    """Fast weights, updated with the tokens of each look; joins the body as an expert."""
+    """Fast weights, updated with the tokens of each look.
+
+    What is read from them goes through a small transformer, the expert, layer by layer; in each
+    layer the policy's network also attends to the expert's tokens.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -145,54 +161,53 @@ class FastWeightMemory(LookMemory):
         self.weights = nn.Parameter(weights)
         self.scale = nn.Parameter(torch.zeros(FAST_HEADS, 1, HEAD_WIDTH))
         self.shift = nn.Parameter(torch.zeros(FAST_HEADS, 1, HEAD_WIDTH))
-        # What is read goes through a small transformer, to which the body attends.
+        # The expert.
         self.norm = nn.LayerNorm(WIDTH)
         self.out = nn.Linear(WIDTH, WIDTH, bias=False)
         self.narrow = nn.Linear(WIDTH, EXPERT_WIDTH)
         self.layers = nn.ModuleList(ExpertLayer() for _ in range(LAYERS))
 
-    def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
-        """Return what the memory adds to each layer of the body at decisions (B, D).
+    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
+        """Return what the memory changes in each layer at decisions (B, D).
 
-        All looks (B, T) update the fast weights in turn; the body attends to the tokens of the
-        `READ_LOOKS` looks up to each decision, as they were read at their own time.
+        All looks (B, T) update the fast weights in turn; the policy's network attends to the tokens
+        of the `READ_LOOKS` looks up to each decision, as they were read at their own time.
         """
         tokens = self.frames(looks)
-        read_values = self._through_time(tokens, looks.carried or Carried())
+        read_values = self._read_in_turn(tokens, looks.cache or MemoryCache())
         values = tokens.values + self.out(self.norm(read_values))
-        recent = decisions[..., None] - torch.arange(READ_LOOKS - 1, -1, -1)
+        recent = decisions[..., None] - torch.arange(READ_LOOKS - 1, -1, -1)  # numbers of looks
         narrow = tokens_at_looks(MaskedTokens(self.narrow(values), tokens.mask), recent)
-        joins: list[Join] = []
+        hooks: list[LayerHook] = []
         for layer in self.layers:
-            values, join = layer(narrow)
+            values, hook = layer(narrow)
             narrow = narrow._replace(values=values)
-            joins.append(join)
-        return choose_only_seen(looks, decisions, joins)
+            hooks.append(hook)
+        return choose_only_visible(looks, decisions, hooks)
 
-    def _through_time(self, tokens: MaskedTokens, carried: Carried) -> Tensor:
+    def _read_in_turn(self, tokens: MaskedTokens, cache: MemoryCache) -> Tensor:
         """Update the fast weights look by look; return what is read at each (B, T, m, WIDTH).
 
         Each look first updates the weights with its m tokens and then reads them. Looks of an
-        earlier call are not repeated: what they read is in `carried`, which is brought up to date.
+        earlier call are not repeated: what they read is in `cache`, which is brought up to date.
         """
-        count = tokens.values.shape[2]
-        new = MaskedTokens(tokens.values[:, carried.looks :], tokens.mask[:, carried.looks :])
-        steps = self._inner_steps(new)
-        fast, read_values = self._first_state(new, carried)
+        new = MaskedTokens(tokens.values[:, cache.looks :], tokens.mask[:, cache.looks :])
+        fast, read_values = self._first_state(new, cache)
         norm = FastNorm(self.scale, self.shift)
         new_reads = []
-        for step in steps:
-            fast = fast.after(step.keys, step.values, step.rates, norm)
+        for step in self._inner_steps(new):
+            fast = fast.updated(step.keys, step.values, step.rates, norm)
             new_reads.append(fast.read(step.queries, norm))
 
-        # New looks may show things that earlier ones had no tokens for.
-        new_tokens = count - read_values.shape[2]
-        read_values = functional.pad(read_values, (0, 0, 0, new_tokens))
+        # New looks may show objects that earlier ones had no tokens for.
+        added_tokens = tokens.values.shape[2] - read_values.shape[2]
+        read_values = functional.pad(read_values, (0, 0, 0, added_tokens))
         if new_reads:
-            joined = torch.stack(new_reads, 1).transpose(2, 3).flatten(3)
+            by_head = torch.stack(new_reads, 1)  # (B, new looks, heads, m, size)
+            joined = by_head.transpose(2, 3).flatten(3)
             read_values = torch.cat([read_values, joined], 1)
-        carried.looks = read_values.shape[1]
-        carried.state = FastState(fast, read_values)
+        cache.looks = read_values.shape[1]
+        cache.state = FastState(fast, read_values)
         return read_values
 
     def _inner_steps(self, tokens: MaskedTokens) -> list[InnerStep]:
@@ -200,28 +215,33 @@ class FastWeightMemory(LookMemory):
         batch, length, count = tokens.mask.shape
         projected = self.projected(tokens.values)
         thirds = projected.reshape(batch, length, count, 3, FAST_HEADS, HEAD_WIDTH).unbind(3)
-        parts_by_look = []  # queries, keys, values: each a (B, heads, m, size) for every look
-        for norm, part in zip(self.norms, thirds, strict=True):
-            parts_by_look.append(norm(part).transpose(2, 3).unbind(1))
-        rates = self._rates(tokens).unbind(1)
-        return [InnerStep(*look) for look in zip(*parts_by_look, rates, strict=True)]
+        parts_by_look = []  # of queries, keys and values, each for every look (B, heads, m, size)
+        for norm, third in zip(self.norms, thirds, strict=True):
+            parts_by_look.append(norm(third).transpose(2, 3).unbind(1))
+        rates_by_look = self._rates(tokens).unbind(1)
+        return [InnerStep(*parts) for parts in zip(*parts_by_look, rates_by_look, strict=True)]
 
     def _rates(self, tokens: MaskedTokens) -> Tensor:
         """Return the learning rate (B, T, heads, m, 1) of each token; 0 for padding."""
         # The inverse of softplus, so that untrained layers give about INITIAL_RATE.
         start = math.log(math.expm1(INITIAL_RATE))
         rates = functional.softplus(self.rate(tokens.values) + start).clamp(0.0, MOST_RATE)
-        return (rates * tokens.mask[..., None]).transpose(2, 3)[..., None]
+        masked_rates = rates * tokens.mask[..., None]  # (B, T, m, heads)
+        return masked_rates.transpose(2, 3)[..., None]
 
-    def _first_state(self, tokens: MaskedTokens, carried: Carried) -> FastState:
-        """Return the fast weights before the new looks: carried ones, or else learned ones."""
-        if carried.state is not None:
-            state: FastState = carried.state
+    def _first_state(self, tokens: MaskedTokens, cache: MemoryCache) -> FastState:
+        """Return the state before the new looks: the cached one, else the learned first weights.
+
+        In a first state nothing has been read yet.
+        """
+        if cache.state is not None:
+            state: FastState = cache.state
             return state
         batch, _, count = tokens.mask.shape
         weights = self.weights.expand(batch, -1, -1, -1)
         biases = tokens.values.new_zeros(batch, FAST_HEADS, 1, HEAD_WIDTH)
-        return FastState(Fast(weights, biases), tokens.values.new_zeros(batch, 0, count, WIDTH))
+        nothing_read = tokens.values.new_zeros(batch, 0, count, WIDTH)
+        return FastState(FastWeights(weights, biases), nothing_read)
 
 
 class ExpertLayer(nn.Module):
@@ -237,11 +257,11 @@ class ExpertLayer(nn.Module):
             nn.Linear(EXPERT_WIDTH, EXPERT_WIDTH), nn.ReLU(), nn.Linear(EXPERT_WIDTH, EXPERT_WIDTH)
         )
 
-    def forward(self, tokens: MaskedTokens) -> tuple[Tensor, ExpertJoin]:
-        """Run self-attention and a feed-forward network on a memory's tokens.
+    def forward(self, tokens: MaskedTokens) -> tuple[Tensor, ExpertHook]:
+        """Run self-attention and a feed-forward network on the memory's tokens.
 
-        Returns the tokens (n, m, EXPERT_WIDTH) after the layer, and their keys and values for the
-        body's own attention in the same layer.
+        Returns the tokens (n, m, EXPERT_WIDTH) after the layer, and the hook by which the policy's
+        network attends to them in its own layer of the same number.
 
         Args:
             tokens: (n, m, EXPERT_WIDTH), with a mask (n, m).
@@ -252,13 +272,18 @@ class ExpertLayer(nn.Module):
         mixed = functional.scaled_dot_product_attention(queries, keys, values, may_attend)
         attended = tokens.values + self.out(join_heads(mixed))
         after = attended + self.feed(self.norm2(attended))
-        return after, ExpertJoin(keys, values, tokens.mask)
+        return after, ExpertHook(keys, values, tokens.mask)
 
 
-class ExpertJoin(Join):
-    """Lets the body's first token, of robot and goal, attend to a memory's tokens as well.
+class ExpertHook(LayerHook):
+    """Lets the first token, of robot and goal, attend to the memory's tokens as well.
 
-    The tokens of things do not attend to them.
+    The tokens of tracks do not attend to them.
+
+    Args:
+        keys: (n, heads, m, size) of the memory's tokens.
+        values: of the same shape.
+        mask: (n, m) False for padding.
     """
 
     def __init__(self, keys: Tensor, values: Tensor, mask: Tensor) -> None:
@@ -266,20 +291,15 @@ class ExpertJoin(Join):
         self._values = values
         self._mask = mask
 
-    def attended(self, keys: Tensor, values: Tensor, seen: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Return keys, values and mask after appending the memory's tokens.
-
-        Args:
-            keys: (n, heads, L, size) of the body's tokens.
-            values: of the same shape.
-            seen: (n, 1, L, L) whether a token may attend to another; returned as (n, 1, L, L + m)
-                with m tokens of the memory.
-        """
+    def extend_attention(
+        self, keys: Tensor, values: Tensor, may_attend: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Return keys, values and mask after appending the memory's m tokens; see `LayerHook`."""
         is_first = torch.arange(keys.shape[2], device=keys.device) == 0
-        sees_memory = is_first[None, None, :, None] & self._mask[:, None, None]
+        may_attend_to_memory = is_first[None, None, :, None] & self._mask[:, None, None]
         every_key = torch.cat([keys, self._keys], 2)
         every_value = torch.cat([values, self._values], 2)
-        return every_key, every_value, torch.cat([seen, sees_memory], -1)
+        return every_key, every_value, torch.cat([may_attend, may_attend_to_memory], -1)
 
 
 def _root_mean_square(values: Tensor) -> Tensor:

@@ -1,4 +1,8 @@
-"""A memory of looks evenly spaced over all that was seen, which modulates the body's layers."""
+"""Memories that attend to some of the looks so far, and modulate the layers of the network.
+
+A look is a moment at which the front picture is looked at. `EvenFrameMemory` takes looks evenly
+spaced over all that was seen, `KeptFrameMemory` those that a planner keeps.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +14,17 @@ from roboirg_learn.policy.body_layers import (
     HEADS,
     LAYERS,
     WIDTH,
-    Join,
+    LayerHook,
     join_heads,
     split_heads,
 )
 from roboirg_learn.policy.memories import (
+    EmbeddedLooks,
     FrameTokens,
     LookMemory,
-    Looks,
     MaskedTokens,
-    Remembered,
-    choose_only_seen,
+    MemoryOutput,
+    choose_only_visible,
     tokens_at_looks,
     values_at_looks,
 )
@@ -39,40 +43,44 @@ def even_frames(now: Tensor) -> Tensor:
         now: (…) number of the present look; the result is (…, FRAME_COUNT).
     """
     last = now[..., None]
-    evenly = (last * torch.linspace(0, 1, FRAME_COUNT)).round().long()
-    first = torch.arange(FRAME_COUNT)
-    all_looks = torch.where(first <= last, first, -1)
-    return torch.where(last < FRAME_COUNT, all_looks, evenly)
+    evenly_spaced = (last * torch.linspace(0, 1, FRAME_COUNT)).round().long()
+    first_numbers = torch.arange(FRAME_COUNT)
+    all_looks = torch.where(first_numbers <= last, first_numbers, -1)
+    return torch.where(last < FRAME_COUNT, all_looks, evenly_spaced)
 
 
 class EvenFrameMemory(LookMemory):
-    """The tokens of `FRAME_COUNT` looks give scale and shift in each layer; no token is added."""
+    """The tokens of `FRAME_COUNT` looks give scale and shift in each layer (FiLM).
+
+    No token is added to those of the network.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self.frames = FrameTokens()
         self.layers = nn.ModuleList(Modulation() for _ in range(LAYERS))
 
-    def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
-        """Return how the chosen looks modulate each layer of the body at decisions (B, D)."""
+    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
+        """Return how the chosen looks modulate each layer at decisions (B, D)."""
         tokens = self.frames(looks)
         chosen = self.chosen(looks, decisions)
-        joins = [layer(tokens, chosen) for layer in self.layers]
-        return choose_only_seen(looks, decisions, joins)
+        hooks = [layer(tokens, chosen) for layer in self.layers]
+        return choose_only_visible(looks, decisions, hooks)
 
-    def chosen(self, looks: Looks, decisions: Tensor) -> Tensor:  # noqa: ARG002
+    def chosen(self, looks: EmbeddedLooks, decisions: Tensor) -> Tensor:  # noqa: ARG002
         """Return the numbers of looks (B, D, frames) that are attended to; -1 for none."""
         return even_frames(decisions)
 
 
 class KeptFrameMemory(EvenFrameMemory):
-    """The same with looks that a planner keeps; it may point at what is out of sight."""
+    """The same with looks that a planner keeps; it may choose objects that are out of sight."""
 
-    def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
-        remembered = super().forward(looks, decisions)
-        return remembered._replace(can_choose=values_at_looks(looks.known, decisions))
+    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
+        """Return the same; any object that was seen often enough may be chosen."""
+        output = super().forward(looks, decisions)
+        return output._replace(can_choose=values_at_looks(looks.confirmed, decisions))
 
-    def chosen(self, looks: Looks, decisions: Tensor) -> Tensor:  # noqa: ARG002
+    def chosen(self, looks: EmbeddedLooks, decisions: Tensor) -> Tensor:  # noqa: ARG002
         """Return the numbers of the looks that are kept (B, D, S); -1 for none."""
         if looks.kept_looks is None:
             raise RuntimeError("KeptFrameMemory needs a planner's looks.")
@@ -80,35 +88,42 @@ class KeptFrameMemory(EvenFrameMemory):
 
 
 class Modulation(nn.Module):
-    """Cross-attention from the body's tokens to those of frames, which gives scale and shift."""
+    """Cross-attention from the network's tokens to those of looks, which gives scale and shift."""
 
     def __init__(self) -> None:
         super().__init__()
-        # Queries are of the body's tokens, keys and values (one head) of those of looks.
+        # Queries are of the network's tokens, keys and values (one head) of those of looks.
         self.norm = nn.RMSNorm(WIDTH)
         self.query = nn.Linear(WIDTH, WIDTH, bias=False)
         self.keyed = nn.Linear(WIDTH, 2 * (WIDTH // HEADS), bias=False)
         self.out = nn.Linear(WIDTH, WIDTH, bias=False)
         self.scale_shift = nn.Linear(WIDTH, 2 * WIDTH)
-        # Almost no change at first, so that the body learns as without memory.
+        # Almost no change at first, so that the network begins as without memory.
         nn.init.normal_(self.scale_shift.weight, std=INITIAL_WEIGHT_STD)
         nn.init.zeros_(self.scale_shift.bias)
 
-    def forward(self, tokens: MaskedTokens, chosen: Tensor) -> ModulationJoin:
+    def forward(self, tokens: MaskedTokens, chosen: Tensor) -> ModulationHook:
         """Return what scales and shifts one layer's input: keys and values of the chosen looks.
 
         Args:
             tokens: (B, T, m, WIDTH) of all looks.
             chosen: (B, D, frames) looks to attend to; -1 for none.
         """
-        keyed = MaskedTokens(self.keyed(self.norm(tokens.values)), tokens.mask)
-        frames = tokens_at_looks(keyed, chosen)
-        keys, values = frames.values[:, None].chunk(2, -1)
-        return ModulationJoin(self, keys, values, frames.mask[:, None, None])
+        keys_and_values = MaskedTokens(self.keyed(self.norm(tokens.values)), tokens.mask)
+        of_chosen = tokens_at_looks(keys_and_values, chosen)
+        keys, values = of_chosen.values[:, None].chunk(2, -1)
+        return ModulationHook(self, keys, values, of_chosen.mask[:, None, None])
 
 
-class ModulationJoin(Join):
-    """Scales and shifts what goes into the feed-forward network; the residual stays as it is."""
+class ModulationHook(LayerHook):
+    """Scales and shifts what goes into the feed-forward network; the residual stays as it is.
+
+    Args:
+        modulation: the layers that do so.
+        keys: (n, 1, tokens, size) of the remembered looks.
+        values: of the same shape.
+        mask: (n, 1, 1, tokens) False for padding.
+    """
 
     def __init__(self, modulation: Modulation, keys: Tensor, values: Tensor, mask: Tensor) -> None:
         self._modulation = modulation
@@ -116,10 +131,13 @@ class ModulationJoin(Join):
         self._values = values
         self._mask = mask
 
-    def modulated(self, normed: Tensor) -> Tensor:
+    def modulate(self, normed: Tensor) -> Tensor:
         """Return the feed-forward input (n, L, WIDTH), scaled and shifted by what is remembered.
 
-        Each of the body's L tokens attends to the tokens of the remembered looks.
+        Each of the network's L tokens attends to the tokens of the remembered looks.
+
+        Args:
+            normed: (n, L, WIDTH) the input after its norm.
         """
         queries = split_heads(self._modulation.query(normed))
         # Queries have four heads, keys and values one, which all of them share.

@@ -21,10 +21,11 @@ NO_ROWS: JointTrajectory = np.empty((0, 8))
 class JointChunks:
     """Plans the waypoints of a learned policy, and returns the plan in chunks of joint angles.
 
-    A chunk ends where the policy looks next, after at most eight rows; all of them must be
-    executed. Joint positions, fingers and pictures of the front camera are all that is read of
-    observations and of the video: the tool's pose is computed, and a history is not needed. While
-    a waypoint cannot be reached the robot keeps still, and the policy is asked again at each look.
+    A chunk ends where the policy looks next, after at most eight rows; all of them must be executed
+    before the next call of `act`. Joint positions, fingers and pictures of the front camera are all
+    that is read of observations and of the video: the tool's pose is computed, and a history is not
+    needed. While a waypoint cannot be reached the robot keeps still, and the policy is asked again
+    at each look.
 
     Args:
         policy: chooses the waypoints.
@@ -41,6 +42,7 @@ class JointChunks:
 
     @property
     def metadata(self) -> dict[str, Any]:
+        """How the policy was trained."""
         return self.policy.metadata
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
@@ -51,6 +53,8 @@ class JointChunks:
         self._robot = ObservedRobot()
         self._steps = 0
         self._gripper = 1.0  # open
+        # The trajectories of the waypoint under way that are left, and the rows left of the present
+        # one.
         self._plan: Iterator[JointTrajectory] = iter(())
         self._rows = NO_ROWS
         video = demonstration
@@ -76,13 +80,15 @@ class JointChunks:
         }
 
     def hear(self, text: str, step: int) -> None:
+        """Hear another utterance."""
         self.policy.hear(text, step)
 
     def act(self, observation: Observation) -> JointTrajectory:
         """Return joint angles with the gripper, rad, until the next look: (n, 8), n <= 8.
 
         Rows of the waypoint under way go first; when there are none the policy is asked for the
-        next waypoint. A waypoint that cannot be reached has no rows: the robot keeps still.
+        next waypoint. A waypoint that cannot be reached has no rows: the robot keeps still until
+        the next look.
         """
         state = self._robot.observe(observation["joint_positions"], observation["gripper"])
         now = cast("Observation", {**observation, **state, "history": ()})

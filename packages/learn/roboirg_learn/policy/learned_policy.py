@@ -19,6 +19,7 @@ class LearnedPolicy:
     """Acts on what it sees, hears and remembers; it has no access to the simulator.
 
     It looks at every eighth control step of the video and of its own time, and at each decision.
+    Each action is a waypoint, which the environment reaches in many control steps.
 
     Args:
         model: what it has learned.
@@ -71,7 +72,7 @@ class LearnedPolicy:
         return seen.decide(self.understand(), tool_of(observation))[None]
 
     def understand(self) -> NDArray[np.float32]:
-        """Return the goal that was heard, as `GoalLayout.numbers` does."""
+        """Return the goal that was heard, as `GoalLayout.encode` does; kept until more is heard."""
         if self._goal is None:
             self._goal = self.seen.understand(" ".join(self._heard))
         return self._goal
@@ -90,11 +91,11 @@ class LearnedPolicy:
 
 
 def tool_of(observation: Mapping[str, Any]) -> NDArray[np.float64]:
-    """Return x, y, z, m, roll, pitch, yaw, rad, of the tool, and a finger's opening, m: (7,)."""
+    """Return x, y, z, m, roll, pitch, yaw, rad, of the tool, and one finger's opening, m: (7,)."""
     return np.append(observation["end_effector"], observation["gripper"][0])
 
 
 def _is_same_moment(first: Mapping[str, Any], second: Mapping[str, Any]) -> bool:
-    """Return whether two observations are of the same moment."""
+    """Return whether two observations are of the same moment: joints and gripper are equal."""
     names = ("joint_positions", "gripper")
     return all(np.array_equal(first[name], second[name]) for name in names)

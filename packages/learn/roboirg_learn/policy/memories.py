@@ -1,8 +1,10 @@
 """What a policy remembers: one class per kind of memory, all with the same inputs and outputs.
 
-A memory takes the embedded looks of an episode and gives, for each decision, a vector for each
-thing and one for the whole, or what it does in the layers of the body. Another memory is one class
-with its name in `body_net.MEMORIES`.
+A look is a moment at which the front picture is looked at; a track is an object that is followed
+from look to look; a decision is a look at which the next waypoint or subgoal is chosen. A memory
+takes the embedded looks of an episode and gives, for each decision, vectors that are added to the
+tokens of tracks and robot, or hooks that change the layers of the network. Another memory is one
+class with its name in `body_net.MEMORIES`.
 """
 
 from __future__ import annotations
@@ -16,201 +18,224 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from roboirg_learn.policy.body_layers import WIDTH, Join
+from roboirg_learn.policy.body_layers import WIDTH, LayerHook
 
 BLOCKED_SCORE = -1e4
-"""Logit of a thing that cannot be chosen."""
-TIME_WAVES = 8
-"""Sines and cosines that encode a look's number in frames."""
-SLOWEST_WAVE = 100.0
+"""Logit of an object that cannot be chosen."""
+TIME_FREQUENCIES = 8
+"""Frequencies of the sines and cosines that encode a look's number."""
+LOOKS_PER_RADIAN = 100.0
 """Looks that the slowest of them takes for one radian."""
 NEARNESS_PER_METER = 25.0
+"""Attention logits fall by so much for each meter between two objects, before anything is learned
+but a factor."""
 NO_NEIGHBOR_SCORE = -3.0
-"""Attention logit of an extra, empty neighbor, which wins where no thing is near."""
-UNKNOWN_THING = -2.0
-"""Value of unknown things in a maximum: below all states, which are from -1 to 1."""
+"""Attention logit of an extra, empty neighbor, which wins where no object is near."""
+UNCONFIRMED_STATE = -2.0
+"""Stands for tracks that are not confirmed in a maximum: below all states, which are from -1 to
+1."""
 
 
-class Carried:
-    """What a memory that steps from look to look goes on from, so that no look is taken twice.
+class MemoryCache:
+    """What a memory that steps from look to look goes on from, so that no look is processed twice.
+
+    The memory that it is given to updates it in place.
 
     Attributes:
-        looks: number of looks taken in.
-        state: what is known after them; None before the first one.
+        looks: number of looks processed.
+        state: the memory's own state after them, of its own type; None before the first one.
     """
 
     looks: int = 0
     state: Any = None
 
 
-class Looks(NamedTuple):
-    """The looks of a batch of episodes; B episodes, T looks, K things.
+class EmbeddedLooks(NamedTuple):
+    """The looks of a batch of episodes as a memory reads them; B episodes, T looks, K tracks.
 
     Attributes:
-        things: (B, T, K, WIDTH) embedded as they are at each look, or were when last seen.
-        whole: (B, T, WIDTH) the robot's own state, and the goal.
+        tracks: (B, T, K, WIDTH) objects as they are at each look, or were when last seen.
+        robot: (B, T, WIDTH) the tool's state, and the goal.
         tool: (B, T, WIDTH) the same without the goal.
-        places: (B, T, K, 2) x and y on the table, m.
-        seen: (B, T, K) whether the look shows the thing.
-        known: (B, T, K) whether it was seen until then, often enough to be no mistake.
-        has_look: (B, T) whether the episode has the look.
-        kept_looks: (B, D, S) looks that a planner keeps at each decision, -1 for none.
-        carried: what a memory knows of the first looks, and updates; None before the first look.
-            Decisions are at looks that are new.
+        positions: (B, T, K, 2) x and y on the table, m.
+        visible: (B, T, K) whether the look shows the object.
+        confirmed: (B, T, K) whether it was seen until then, often enough to be no mistake.
+        has_look: (B, T) False for padding: the episode is shorter.
+        kept_looks: (B, D, S) numbers of the looks that a planner keeps at each decision, -1 for
+            none; None where there is no planner.
+        cache: what the memory knows of the first looks; None if all looks are new, and nothing is
+            to be kept. Decisions are at looks that are new.
     """
 
-    things: Tensor
-    whole: Tensor
+    tracks: Tensor
+    robot: Tensor
     tool: Tensor
-    places: Tensor
-    seen: Tensor
-    known: Tensor
+    positions: Tensor
+    visible: Tensor
+    confirmed: Tensor
     has_look: Tensor
     kept_looks: Tensor | None = None
-    carried: Carried | None = None
+    cache: MemoryCache | None = None
 
 
-class Remembered(NamedTuple):
-    """What a memory says at the looks of decisions; B episodes, D decisions, K things.
+class MemoryOutput(NamedTuple):
+    """What a memory adds to the network at decisions; B episodes, D decisions, K tracks.
 
     Attributes:
-        things: (B, D, K, WIDTH).
-        whole: (B, D, WIDTH).
-        can_choose: (B, D, K) the things that may be chosen.
-        joins: one for each layer of the body, whose attention or input it changes; empty if the
-            memory changes none. Their n is B times D.
+        tracks: (B, D, K, WIDTH) added to the tokens of the tracks.
+        robot: (B, D, WIDTH) added to the robot's token.
+        can_choose: (B, D, K) whether the object of the track may be chosen.
+        hooks: one for each transformer layer, of B * D sequences; empty if no layer is changed.
     """
 
-    things: Tensor
-    whole: Tensor
+    tracks: Tensor
+    robot: Tensor
     can_choose: Tensor
-    joins: Sequence[Join] = ()
+    hooks: Sequence[LayerHook] = ()
 
 
 class LookMemory(nn.Module, ABC):
-    """Remembers looks."""
+    """A memory of looks: one network, trained with the rest of the policy."""
 
     @abstractmethod
-    def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
-        """Return what is remembered at decisions.
+    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
+        """Return what the memory adds to the network at decisions.
+
+        What it says at a look depends on that look and those before it, never on later ones.
 
         Args:
-            looks: of the episodes.
-            decisions: (B, D) the numbers of their looks.
+            looks: of B episodes.
+            decisions: (B, D) the numbers of the looks at which decisions are made.
         """
 
 
-def values_at_looks(values: Tensor, decisions: Tensor) -> Tensor:
-    """Return values (B, T, …) at the looks whose numbers are given (B, D), as (B, D, …)."""
-    rows = torch.arange(len(values), device=values.device)[:, None]
-    return values[rows, decisions]
+def values_at_looks(values: Tensor, looks: Tensor) -> Tensor:
+    """Return values (B, T, …) at the looks whose numbers are given (B, D), as (B, D, …).
+
+    Values [[a, b, c]] at looks [[2, 0]] are [[c, a]].
+    """
+    episodes = torch.arange(len(values), device=values.device)[:, None]
+    return values[episodes, looks]
 
 
 class MaskedTokens(NamedTuple):
-    """Tokens (…, m, width), and a mask (…, m): False for padding."""
+    """Sequences of m tokens (…, m, width), and a mask (…, m): False for padding."""
 
     values: Tensor
     mask: Tensor
 
 
-def tokens_at_looks(tokens: MaskedTokens, frames: Tensor) -> MaskedTokens:
+def tokens_at_looks(tokens: MaskedTokens, looks: Tensor) -> MaskedTokens:
     """Return for each decision one sequence with the tokens of the looks that it may use.
 
     B episodes with D decisions and T looks; a look has m tokens, and F looks belong to a decision.
 
     Args:
-        tokens: (B, T, m, width), and (B, T, m).
-        frames: (B, D, F) numbers of looks; below 0 for none, which is masked.
+        tokens: (B, T, m, width), and a mask (B, T, m).
+        looks: (B, D, F) numbers of looks; below 0 for none, which is masked.
 
     Returns:
         Tokens (B * D, F * m, width), and their mask (B * D, F * m).
     """
-    looks = frames.clamp(min=0).flatten(1)
-    is_look = (frames >= 0).flatten(1)
-    mask = values_at_looks(tokens.mask, looks) & is_look[..., None]
-    batch, decisions, count = frames.shape
+    batch, decisions, count = looks.shape
+    flat_looks = looks.clamp(min=0).flatten(1)
+    is_look = (looks >= 0).flatten(1)
+    mask = values_at_looks(tokens.mask, flat_looks) & is_look[..., None]
     shape = batch * decisions, count * mask.shape[-1]
-    values = values_at_looks(tokens.values, looks).reshape(*shape, -1)
+    values = values_at_looks(tokens.values, flat_looks).reshape(*shape, -1)
     return MaskedTokens(values, mask.reshape(shape))
 
 
 class FrameTokens(nn.Module):
-    """The tokens of looks, for memories of frames: what was seen and when, without the goal."""
+    """Makes the tokens of looks for memories that attend to them.
+
+    They have what was seen and when, without the goal.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self.mixed = nn.Linear(2 * WIDTH, WIDTH)
-        self.time = nn.Linear(2 * TIME_WAVES, WIDTH)
+        self.time = nn.Linear(2 * TIME_FREQUENCIES, WIDTH)
 
-    def forward(self, looks: Looks) -> MaskedTokens:
-        """Return tokens (B, T, 1 + K, WIDTH) of all looks: the robot's, then one for each thing.
+    def forward(self, looks: EmbeddedLooks) -> MaskedTokens:
+        """Return tokens (B, T, 1 + K, WIDTH) of all looks: the robot's, then one for each track.
 
-        Each is mixed with the robot's own, and has its time added; things out of sight are masked.
+        Each is mixed with the robot's, and the time of its look is added; objects out of sight and
+        looks that the episode does not have are masked.
         """
         tool = looks.tool[:, :, None]
-        tokens = torch.cat([tool, looks.things], 2)
-        mask = torch.cat([looks.has_look[..., None], looks.seen], 2)
+        tokens = torch.cat([tool, looks.tracks], 2)
+        mask = torch.cat([looks.has_look[..., None], looks.visible], 2)
         with_tool = torch.cat([tokens, tool.expand_as(tokens)], -1)
         return MaskedTokens(self.mixed(with_tool) + self._times(tokens.shape[1]), mask)
 
     def _times(self, length: int) -> Tensor:
-        """Return the time of each look, its number, as sines and cosines (T, 1, WIDTH)."""
-        speeds = SLOWEST_WAVE ** -torch.linspace(0, 1, TIME_WAVES)
-        angles = torch.arange(length)[:, None] * speeds
+        """Return the encoded numbers of looks, 0 to length - 1, from sines and cosines.
+
+        It is (T, 1, WIDTH), to be added to all tokens of a look.
+        """
+        frequencies = LOOKS_PER_RADIAN ** -torch.linspace(0, 1, TIME_FREQUENCIES)
+        angles = torch.arange(length)[:, None] * frequencies
         times: Tensor = self.time(torch.cat([angles.sin(), angles.cos()], -1))
         return times[:, None]
 
 
-def choose_only_seen(looks: Looks, decisions: Tensor, joins: Sequence[Join] = ()) -> Remembered:
-    """Return an output that adds no vectors and lets only things in sight be chosen.
+def choose_only_visible(
+    looks: EmbeddedLooks, decisions: Tensor, hooks: Sequence[LayerHook] = ()
+) -> MemoryOutput:
+    """Return an output that adds zeros and lets only confirmed objects in sight be chosen.
 
     Args:
-        looks: of the episodes.
+        looks: of B episodes.
         decisions: (B, D) numbers of looks.
-        joins: what a memory does in each layer instead.
+        hooks: what a memory does in each layer instead.
     """
-    things = torch.zeros_like(values_at_looks(looks.things, decisions))
-    whole = torch.zeros_like(values_at_looks(looks.whole, decisions))
-    can_choose = values_at_looks(looks.seen & looks.known, decisions)
-    return Remembered(things, whole, can_choose, joins)
+    tracks = torch.zeros_like(values_at_looks(looks.tracks, decisions))
+    robot = torch.zeros_like(values_at_looks(looks.robot, decisions))
+    can_choose = values_at_looks(looks.visible & looks.confirmed, decisions)
+    return MemoryOutput(tracks, robot, can_choose, hooks)
 
 
 class NoMemory(LookMemory):
-    """Remembers nothing."""
+    """Remembers nothing but the last known positions, which are part of the looks."""
 
-    def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
-        return choose_only_seen(looks, decisions)
+    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
+        """Return zeros; only objects in sight may be chosen."""
+        return choose_only_visible(looks, decisions)
 
 
 class RecurrentState(NamedTuple):
-    """What is known after a look: of each thing (B, K, WIDTH), and of the whole (B, WIDTH)."""
+    """What is known after a look: of each object (B, K, WIDTH), and of the scene (B, WIDTH)."""
 
-    things: Tensor
-    whole: Tensor
+    tracks: Tensor
+    scene: Tensor
 
 
 class _LookInput(NamedTuple):
-    """What changes the state at one look; B episodes, K things.
+    """What changes the recurrent state at one look; B episodes, K tracks.
 
     Attributes:
-        thing: (B, K, 3 * WIDTH) each thing's embedding, projected for the gates of its cell.
-        whole: (B, 3 * WIDTH) the same of the robot and the goal.
-        near: (B, K, K) weights with which a thing averages over others nearby.
-        is_updated: (B, K, 1) whether the look shows the thing.
-        known: (B, K, 1) whether it was seen often enough.
+        tracks: (B, K, 3 * WIDTH) each object's embedding, projected for the gates of its cell.
+        robot: (B, 3 * WIDTH) the same of the robot and the goal, for the scene's cell.
+        near: (B, K, K) weights with which an object averages over others nearby.
+        is_updated: (B, K, 1) whether the look shows the object.
+        confirmed: (B, K, 1) whether it was seen often enough.
         has_look: (B, 1) whether the episode has the look.
     """
 
-    thing: Tensor
-    whole: Tensor
+    tracks: Tensor
+    robot: Tensor
     near: Tensor
     is_updated: Tensor
-    known: Tensor
+    confirmed: Tensor
     has_look: Tensor
 
 
 class RecurrentMemory(LookMemory):
-    """A recurrent state for each thing, and one for the whole; each sees which others are near."""
+    """A recurrent state for each track, and one for the scene; objects see which others are near.
+
+    In trained files the layers of tracks are called ``thing``, those of the scene ``whole``.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -219,101 +244,105 @@ class RecurrentMemory(LookMemory):
         self.nearness = nn.Parameter(torch.tensor(1.0))
         self.pool = nn.Linear(WIDTH, 1)
 
-    def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
+    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
         """Return the states after the looks of decisions (B, D), stepping over new looks only.
 
-        Looks of an earlier call are in ``looks.carried``, which is brought up to date. Any thing
-        that was seen often enough may be chosen, also out of sight.
+        The state after the looks of earlier calls is in ``looks.cache``, which is brought up to
+        date. Any object that was seen often enough may be chosen, also out of sight.
         """
-        carried = looks.carried or Carried()
-        first_new = carried.looks
-        states = [self._first_state(looks, carried)]
+        cache = looks.cache or MemoryCache()
+        first_new = cache.looks
+        states = [self._first_state(looks, cache)]
         for inputs in self._cell_inputs(looks, first_new):
             states.append(self._next_state(states[-1], inputs))
-        carried.looks = looks.things.shape[1]
-        carried.state = states[-1]
+        cache.looks = looks.tracks.shape[1]
+        cache.state = states[-1]
 
         numbers = decisions - first_new + 1  # states[0] is before the new looks
-        return Remembered(
-            values_at_looks(torch.stack([state.things for state in states], 1), numbers),
-            values_at_looks(torch.stack([state.whole for state in states], 1), numbers),
-            values_at_looks(looks.known, decisions),
+        tracks = torch.stack([state.tracks for state in states], 1)
+        scenes = torch.stack([state.scene for state in states], 1)
+        return MemoryOutput(
+            tracks=values_at_looks(tracks, numbers),
+            robot=values_at_looks(scenes, numbers),
+            can_choose=values_at_looks(looks.confirmed, decisions),
         )
 
-    def _first_state(self, looks: Looks, carried: Carried) -> RecurrentState:
-        """Return the state before the new looks: what was carried, with zeros for new things."""
-        batch, _, count, width = looks.things.shape
-        if carried.state is None:
-            whole = looks.things.new_zeros(batch, width)
-            return RecurrentState(looks.things.new_zeros(batch, count, width), whole)
-        things, whole = carried.state
-        added = count - things.shape[1]
-        return RecurrentState(functional.pad(things, (0, 0, 0, added)), whole)
+    def _first_state(self, looks: EmbeddedLooks, cache: MemoryCache) -> RecurrentState:
+        """Return the state before the new looks: the cached one, with zeros for new tracks."""
+        batch, _, count, width = looks.tracks.shape
+        if cache.state is None:
+            scene = looks.tracks.new_zeros(batch, width)
+            return RecurrentState(looks.tracks.new_zeros(batch, count, width), scene)
+        tracks, scene = cache.state
+        added = count - tracks.shape[1]
+        return RecurrentState(functional.pad(tracks, (0, 0, 0, added)), scene)
 
-    def _cell_inputs(self, looks: Looks, first_new: int) -> Iterator[_LookInput]:
+    def _cell_inputs(self, looks: EmbeddedLooks, first_new: int) -> Iterator[_LookInput]:
         """Yield the input of the cells for each look from `first_new` on.
 
         What does not depend on the state is computed for all looks at once, which is faster.
         """
-        parts = [
-            self.thing.first(looks.things[:, first_new:]),
-            self.whole.first(looks.whole[:, first_new:]),
+        parts = [  # each (B, T, …), in the order of the fields of `_LookInput`
+            self.thing.first(looks.tracks[:, first_new:]),
+            self.whole.first(looks.robot[:, first_new:]),
             self._nearness(looks)[:, first_new:],
-            (looks.seen & looks.has_look[..., None])[:, first_new:, :, None],
-            looks.known[:, first_new:, :, None],
+            (looks.visible & looks.has_look[..., None])[:, first_new:, :, None],
+            looks.confirmed[:, first_new:, :, None],
             looks.has_look[:, first_new:, None],
         ]
         for look in zip(*(part.unbind(1) for part in parts), strict=True):
             yield _LookInput(*look)
 
     def _next_state(self, state: RecurrentState, look: _LookInput) -> RecurrentState:
-        """Return the state after a look: things first, then the whole, which sums them up.
+        """Return the state after a look: objects first, then the scene, which sums them up.
 
-        Things out of sight keep their state; so does an episode that has no such look (padding).
+        Objects out of sight keep their state; so does an episode that has no such look (padding).
         """
-        things, whole = state
-        neighbors = look.near @ things
-        updated_things = self.thing(look.thing, neighbors, whole[:, None], things)
-        things = torch.where(look.is_updated, updated_things, things)
-        mean, maximum = self._summary(things, look.known)
-        updated_whole = self.whole(look.whole, mean, maximum, whole)
-        return RecurrentState(things, torch.where(look.has_look, updated_whole, whole))
+        tracks, scene = state
+        neighbors = look.near @ tracks
+        updated_tracks = self.thing(look.tracks, neighbors, scene[:, None], tracks)
+        tracks = torch.where(look.is_updated, updated_tracks, tracks)
+        mean, maximum = self._summary(tracks, look.confirmed)
+        updated_scene = self.whole(look.robot, mean, maximum, scene)
+        return RecurrentState(tracks, torch.where(look.has_look, updated_scene, scene))
 
-    def _nearness(self, looks: Looks) -> Tensor:
-        """Return the weights (B, T, K, K) with which each thing averages over its neighbors.
+    def _nearness(self, looks: EmbeddedLooks) -> Tensor:
+        """Return the weights (B, T, K, K) with which each object averages over its neighbors.
 
-        A softmax over distances on the table, so near things count most. Itself and things that
-        were not known at the look before have weight 0. Rows sum to less than 1.
+        A softmax over distances on the table, so near objects count most. The object itself and
+        those that were not confirmed at the look before have weight 0. Rows sum to less than 1.
         """
-        distances = torch.cdist(looks.places, looks.places)  # m
-        far = distances * NEARNESS_PER_METER * self.nearness.exp()
-        was_known = torch.zeros_like(looks.known)
-        was_known[:, 1:] = looks.known[:, :-1]
-        is_itself = torch.eye(far.shape[-1], dtype=torch.bool)
-        is_excluded = ~was_known[:, :, None, :] | is_itself
-        scores = (-far).masked_fill(is_excluded, -math.inf)
-        # An extra neighbor, dropped at the end, takes the weight of a thing that is alone.
-        nobody = far.new_full((*far.shape[:-1], 1), NO_NEIGHBOR_SCORE)
+        distances = torch.cdist(looks.positions, looks.positions)  # m
+        scores = -(distances * NEARNESS_PER_METER * self.nearness.exp())
+        was_confirmed = torch.zeros_like(looks.confirmed)
+        was_confirmed[:, 1:] = looks.confirmed[:, :-1]
+        is_itself = torch.eye(scores.shape[-1], dtype=torch.bool)
+        is_excluded = ~was_confirmed[:, :, None, :] | is_itself
+        scores = scores.masked_fill(is_excluded, -math.inf)
+        # An extra neighbor, dropped at the end, takes the weight of an object that is alone.
+        nobody = scores.new_full((*scores.shape[:-1], 1), NO_NEIGHBOR_SCORE)
         return torch.cat([scores, nobody], -1).softmax(-1)[..., :-1]
 
-    def _summary(self, things: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
-        """Return a weighted mean and the maximum over the known things, each (B, WIDTH).
+    def _summary(self, tracks: Tensor, confirmed: Tensor) -> tuple[Tensor, Tensor]:
+        """Return a weighted mean and the maximum over the confirmed objects, each (B, WIDTH).
+
+        Without any, they are 0 and `UNCONFIRMED_STATE`.
 
         Args:
-            things: (B, K, WIDTH) states.
-            known: (B, K, 1) which of them count.
+            tracks: (B, K, WIDTH) states.
+            confirmed: (B, K, 1) which of them count.
         """
-        scores = self.pool(things).masked_fill(~known, BLOCKED_SCORE)
-        weights = scores.softmax(1) * known
-        mean = weights.transpose(1, 2) @ things
-        maximum = things.masked_fill(~known, UNKNOWN_THING).amax(1)
+        scores = self.pool(tracks).masked_fill(~confirmed, BLOCKED_SCORE)
+        weights = scores.softmax(1) * confirmed
+        mean = weights.transpose(1, 2) @ tracks
+        maximum = tracks.masked_fill(~confirmed, UNCONFIRMED_STATE).amax(1)
         return mean[:, 0], maximum
 
 
 class _ThreeInputCell(nn.Module):
-    """A gated recurrent unit (GRU) with three inputs.
+    """A gated recurrent unit (GRU) with three inputs instead of one.
 
-    The first does not depend on the state, so callers apply `first` to all looks at once.
+    The first does not depend on the state, so callers apply the layer `first` to all looks at once.
     """
 
     def __init__(self) -> None:
@@ -324,7 +353,7 @@ class _ThreeInputCell(nn.Module):
         self.own = nn.Linear(WIDTH, 3 * WIDTH)
 
     def forward(self, of_first: Tensor, second: Tensor, third: Tensor, state: Tensor) -> Tensor:
-        """Return the next state (…, WIDTH) of a gated recurrent unit.
+        """Return the next state (…, WIDTH), by the equations of PyTorch's ``nn.GRUCell``.
 
         Args:
             of_first: (…, 3 * WIDTH) the first input after the layer `first`.

@@ -48,10 +48,10 @@ class ExperimentPlan(NamedTuple):
     """What is trained and played.
 
     Attributes:
-        memories: names of memories; each is a row. Those that no system has are no part of the
-            paper's experiment, but can be played with the others.
+        memories: names of memories; each is a row of the tables. Those that no system of the paper
+            has are no part of its experiment, but can be played with the others.
         parts: names of `PARTS`.
-        played: settings that are played; none for those of the paper's plans.
+        played: settings that are played; () for those of the paper's plans.
     """
 
     memories: tuple[str, ...] = tuple(SYSTEMS)
@@ -78,15 +78,18 @@ def check_experiment(experiment: ExperimentPlan) -> None:
         )
 
 
-def row_name(memory: str, change: str = "") -> str:
-    """Return what a row's policy is called: by its mechanism, never by a system."""
-    return f"small-{memory}{change}"
+def row_name(memory: str) -> str:
+    """Return what a row's policy is called, by its mechanism, not by the paper's system.
+
+    ``framesamp`` → ``small-framesamp``.
+    """
+    return f"small-{memory}"
 
 
 def train_rows(
     experiment: ExperimentPlan,
     plan: BodyPlan,
-    words: ReaderPlan,
+    reader_plan: ReaderPlan,
     folder: Path,
     workers: int,
     progress: Progress,
@@ -98,9 +101,9 @@ def train_rows(
     Args:
         experiment: the memories, each a row.
         plan: of the bodies; its memory is replaced by the row's.
-        words: how their reader learns.
+        reader_plan: how their reader learns.
         folder: for recordings and files.
-        workers: processes that record and draw.
+        workers: processes that record and render.
         progress: called with the row and a kind of work, what is done of it, and all of it.
     """
     from roboirg_learn.policy.policy_training import trained_files
@@ -110,7 +113,8 @@ def train_rows(
     for memory in experiment.memories:
         row = row_name(memory)
         row_plan = plan._replace(memory=memory)
-        found[row] = trained_files(row_plan, words, folder, workers, part_of(progress, row))
+        show = part_of(progress, row)
+        found[row] = trained_files(row_plan, reader_plan, folder, workers, show)
     return found
 
 
@@ -126,9 +130,10 @@ def part_options(
 
     Args:
         part: a name of `PARTS`.
-        experiment: which rows.
-        files: of each row.
-        changes: options that replace the plan's; parts with tasks of their own keep those.
+        experiment: which rows, and which settings.
+        files: of each row's policy.
+        changes: options that replace the plan's, such as ``{"episodes": "2"}``; parts with tasks of
+            their own keep those.
     """
     options = read_plan_file(PARTS[part])
     options.pop("policies", None)
@@ -152,7 +157,8 @@ def _planner_pairings(experiment: ExperimentPlan, rows: Mapping[str, str]) -> di
     """Return policies that pair planners with hands, by row: its name → its spec.
 
     A planner names subgoals, hands follow them. Each trained policy with a planner plays as it is;
-    with a stronger planner, the interpreter of words; and with stronger, scripted hands.
+    with a stronger planner, the benchmark's listener; and with stronger, scripted hands. At last
+    both stronger ones play together.
 
     Args:
         experiment: the memories of the rows.
@@ -161,10 +167,11 @@ def _planner_pairings(experiment: ExperimentPlan, rows: Mapping[str, str]) -> di
     found = {}
     for memory in experiment.memories:
         if memory in PLANNERS:
-            spec = rows[row_name(memory)]
-            found[row_name(memory)] = spec
+            row = row_name(memory)
+            spec = rows[row]
             hands = quote(spec, safe=":/?=")
-            found[row_name(memory, "-interpreter")] = f"planner:listener?hands={hands}"
-            found[row_name(memory, "-scripted-hands")] = f"{spec}&hands=scripted"
+            found[row] = spec
+            found[f"{row}-interpreter"] = f"planner:listener?hands={hands}"
+            found[f"{row}-scripted-hands"] = f"{spec}&hands=scripted"
     found["interpreter-scripted-hands"] = "planner:listener?hands=scripted"
     return found

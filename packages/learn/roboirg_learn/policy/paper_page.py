@@ -40,12 +40,12 @@ Rates = Mapping[str, Decimal | None]
 
 
 class Difference(NamedTuple):
-    """A difference of two rates, 0 to 1; gaps that were measured have these, too.
+    """A difference of two success rates; gaps that were measured have these fields, too.
 
     Attributes:
-        value: the first less the second.
+        value: the first less the second, from -1 to 1.
         interval: 95 %; None with too few episodes, or if all published rates are 0 or 100.
-        p_value: not corrected.
+        p_value: two-sided, not corrected.
     """
 
     value: float
@@ -54,7 +54,7 @@ class Difference(NamedTuple):
 
 
 Differences = Mapping[str, Mapping[str, Any]]
-"""By row, then by column."""
+"""`Difference`, or a gap that was measured, by row of a table, then by column."""
 
 
 def answers_text(frames: Mapping[str, pd.DataFrame]) -> str:
@@ -91,7 +91,7 @@ class _Published:
         return self._rates[system, setting]
 
     def changes(self, settings: Sequence[str]) -> Differences:
-        """Return how each published system's success differs from its explicit success.
+        """Return how each published system's success differs from its own explicit success.
 
         By system, then by setting.
         """
@@ -120,8 +120,8 @@ def _main_questions(with_words: pd.DataFrame) -> Iterator[str]:
     """Yield the sections that the main experiment answers, each a question with a table.
 
     Args:
-        with_words: episodes of the main part. In the form *implicit* words refer to things; in
-            *resolved* the references are replaced by names.
+        with_words: played episodes of the main part. In the form *implicit* words refer to objects;
+            in *resolved* the references are replaced by names.
     """
     settings = [name for name in plain_settings() if name != EXPLICIT]
     published = _Published()
@@ -194,12 +194,12 @@ def _published_gains(
         tasks_of: the tasks of each group.
         published: the paper's rates; those with explicit words are compared.
     """
-    first = published.rates(WITHOUT_MEMORY_SYSTEM, EXPLICIT)
+    rates = published.rates(system, EXPLICIT)
+    without_memory = published.rates(WITHOUT_MEMORY_SYSTEM, EXPLICIT)
     gains = {}
     for group, tasks in tasks_of.items():
-        rates = published.rates(system, EXPLICIT).items()
-        of_group = {task: rate for task, rate in rates if task in tasks}
-        gains[group] = _published_difference(of_group, first)
+        rates_of_group = {task: rate for task, rate in rates.items() if task in tasks}
+        gains[group] = _published_difference(rates_of_group, without_memory)
     return gains
 
 
@@ -231,18 +231,20 @@ def _gaps(
 ) -> dict[str, dict[str, Any]]:
     """Return differences of success, by policy and then by the value of a column.
 
+    Our rows come first, in the paper's order; policies without any difference are left out.
+
     Args:
         frame: played episodes.
         column: such as ``setting``; each of its values is a column of the table.
         against: what each group is compared with, such as ``{"setting": "explicit"}``.
         form: of the instructions that are compared.
     """
-    found: dict[str, dict[str, Any]] = {row_name(memory): {} for memory in SYSTEMS}
+    gaps_of: dict[str, dict[str, Any]] = {row_name(memory): {} for memory in SYSTEMS}
     for measured in roboirg.measure(frame, ("policy", column, "form"), against):
         policy, name, measured_form = measured.key
         if measured.gap is not None and measured_form == form:
-            found.setdefault(policy, {})[name] = measured.gap
-    return {row: gaps for row, gaps in found.items() if gaps}
+            gaps_of.setdefault(policy, {})[name] = measured.gap
+    return {policy: gaps for policy, gaps in gaps_of.items() if gaps}
 
 
 def _published_difference(first: Rates, second: Rates) -> Difference:
@@ -252,7 +254,7 @@ def _published_difference(first: Rates, second: Rates) -> Difference:
     rollouts of the two are taken as independent, because only their rates are known.
     """
     total = 0.0
-    variance = 0.0
+    variance = 0.0  # of one rollout of each, summed over tasks
     count = 0
     for task, rate in first.items():
         if rate is not None:
@@ -263,12 +265,12 @@ def _published_difference(first: Rates, second: Rates) -> Difference:
             variance += other * (1 - other)
             count += 1
     value = total / count
-    spread = math.sqrt(variance / TRIALS / count**2)
-    if not spread:
+    standard_error = math.sqrt(variance / TRIALS / count**2)
+    if not standard_error:
         return Difference(value, None, 1.0)
-    interval = value - Z_95 * spread, value + Z_95 * spread
-    # The p-value is two-sided.
-    return Difference(value, interval, math.erfc(abs(value) / spread / math.sqrt(2)))
+    margin = Z_95 * standard_error
+    p_value = math.erfc(abs(value) / standard_error / math.sqrt(2))  # two-sided
+    return Difference(value, (value - margin, value + margin), p_value)
 
 
 def _retention(settings: Sequence[str], changes: Differences, published: _Published) -> str:
@@ -276,7 +278,8 @@ def _retention(settings: Sequence[str], changes: Differences, published: _Publis
 
     Args:
         settings: the columns.
-        changes: differences to explicit success, by policy and setting, with the shares.
+        changes: our measured differences to explicit success, by policy and setting; they have the
+            share in their field `retention`, None where there is none.
         published: the paper's rates.
     """
     cells: dict[str, dict[str, str]] = {}
@@ -297,7 +300,10 @@ def _retention(settings: Sequence[str], changes: Differences, published: _Publis
 
 
 def _percent_kept(rates: Rates, explicit: Rates) -> float:
-    """Return what percentage of explicit success is kept: of the sums over the same tasks."""
+    """Return what percentage of explicit success is kept: of the sums over the same tasks.
+
+    Tasks in which the setting is not defined count in neither sum.
+    """
     kept = 0.0
     explicit_sum = 0.0
     for task, rate in rates.items():

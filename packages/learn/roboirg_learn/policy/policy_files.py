@@ -15,10 +15,10 @@ class PolicyFiles(NamedTuple):
 
     @property
     def spec(self) -> str:
-        """Return how `roboirg run` names this policy."""
+        """How `roboirg run` names this policy: ``trained:a.safetensors?reader=b.safetensors``."""
         return f"trained:{self.body}?reader={quote(str(self.reader))}"
 
     @property
     def changed(self) -> tuple[int, ...]:
-        """Return when each that is there was written, in nanoseconds."""
+        """When each that is there was written, in nanoseconds since 1970."""
         return tuple(path.stat().st_mtime_ns for path in self if path.exists())

@@ -1,4 +1,8 @@
-"""A policy that has learned, made of a body and a reader, and an episode as it sees it."""
+"""A policy that has learned, made of a body and a reader, and an episode as it sees it.
+
+A look is a moment at which the front picture is looked at; a track is an object that is followed
+from look to look, known by its number.
+"""
 
 from __future__ import annotations
 
@@ -14,22 +18,23 @@ from roboirg.extension.sight import LOOK_EVERY, points_of
 from roboirg_learn.labeled_views import LATER_STEP
 from roboirg_learn.listener.vocabulary import Vocabulary
 from roboirg_learn.policy.body_net import BodyAnswer, BodyNet
-from roboirg_learn.policy.memories import Carried
+from roboirg_learn.policy.memories import MemoryCache
 from roboirg_learn.policy.moves import waypoint
-from roboirg_learn.policy.planner_history import PlannedNumbers
-from roboirg_learn.policy.policy_data import NO_LABEL, EpisodeNumbers, LookHistory, to_batch
+from roboirg_learn.policy.planner_history import SubgoalInputs
+from roboirg_learn.policy.policy_data import NO_LABEL, EpisodeArrays, LookHistory, to_batch
 from roboirg_learn.policy.policy_files import PolicyFiles
-from roboirg_learn.policy.tracks import LookTokens
+from roboirg_learn.policy.tracks import Detections
 from roboirg_learn.policy.trained_body import Pictures, TrainedBody, load_body
 from roboirg_learn.policy.trained_reader import TrainedReader, load_reader
 
 FIRST_LOOKS = (0, LATER_STEP // LOOK_EVERY)
 """Numbers of the looks at a video that the reader of words sees, two seconds apart."""
 _BATCH = 32
+"""Pictures that go through the detector together."""
 
 
 class PolicyModel(NamedTuple):
-    """A trained policy: a body, and a reader that names its goal."""
+    """A trained policy: a body, which sees and acts, and a reader, which names its goal."""
 
     body: TrainedBody
     reader: TrainedReader
@@ -43,13 +48,15 @@ class PolicyModel(NamedTuple):
 def load_policy(files: PolicyFiles) -> PolicyModel:
     """Return a trained policy; nothing of its files is executed.
 
+    Body and reader fit if they number the same classes, tasks and parts of goals in the same order.
+
     Raises:
         InvalidValueError: a file is none of its kind, or they do not fit.
     """
     body = load_body(files.body)
     reader = load_reader(files.reader)
     words = reader.vocabulary.words
-    fitting = Vocabulary(words, body.sight.classes, body.goals.tasks, body.goals.parts)
+    fitting = Vocabulary(words, body.object_classes.names, body.goals.tasks, body.goals.parts)
     if reader.vocabulary != fitting:
         raise InvalidValueError(
             f"The reader {str(files.reader)!r} does not fit the body {str(files.body)!r}, which "
@@ -63,25 +70,25 @@ class NetworkChoice(NamedTuple):
     """What a network chooses.
 
     Attributes:
-        kind: number of the kind of waypoint, or of the form of a subgoal.
-        thing: track of the thing; None where there is none.
-        to_keep: places among the recent looks of those to be kept.
+        kind: number of the move, or of the subgoal template.
+        track: of the object that it is at; None if nothing has been seen yet.
+        to_keep: indices, among the `RECENT` latest looks, of those that a planner is to keep.
     """
 
-    kind: int
-    thing: int | None
+    number: int
+    track: int | None
     to_keep: tuple[int, ...]
 
 
-class _RememberedLooks(NamedTuple):
-    """What a network knows of an episode's looks, given a goal."""
+class _GoalCache(NamedTuple):
+    """The memory's cache of a network, and the goal with which it was filled."""
 
     goal: NDArray[np.float32]
-    carried: Carried
+    cache: MemoryCache
 
 
 class SeenEpisode:
-    """One episode as a policy sees it.
+    """One episode as a policy sees it: `look` adds looks, the other methods use those so far.
 
     Args:
         model: the policy.
@@ -93,8 +100,8 @@ class SeenEpisode:
     def __init__(self, model: PolicyModel) -> None:
         self._model = model
         self._history = LookHistory()
-        self._first_looks: list[LookTokens] = []
-        self._remembered: dict[BodyNet, _RememberedLooks] = {}
+        self._first_looks: list[Detections] = []
+        self._caches: dict[BodyNet, _GoalCache] = {}
         self.video_looks = 0
 
     def look(
@@ -104,7 +111,7 @@ class SeenEpisode:
         *,
         is_video: bool,
     ) -> None:
-        """Find the things of front pictures and remember them as looks.
+        """Find the objects of front pictures and add them as looks.
 
         Args:
             pictures: uint8 (256, 256, 3) each, in the order of time.
@@ -116,15 +123,15 @@ class SeenEpisode:
         for start in range(0, len(pictures), _BATCH):
             part = slice(start, start + _BATCH)
             found = self._model.body.see(pictures[part])
-            for tokens, tool in zip(found, tools[part], strict=True):
+            for detections, tool in zip(found, tools[part], strict=True):
                 if len(self._history) in first_looks:
-                    self._first_looks.append(tokens)
-                self._history.add(tokens, tool, is_video=is_video)
+                    self._first_looks.append(detections)
+                self._history.add(detections, tool, is_video=is_video)
         if is_video:
             self.video_looks += len(pictures)
 
     def understand(self, text: str) -> NDArray[np.float32]:
-        """Return the goal that an instruction means, as `GoalLayout.numbers` does."""
+        """Return the goal that an instruction means, as `GoalLayout.encode` does: (size,)."""
         return self._model.reader.understand(text, self._first_looks, self._model.body.goals)
 
     @property
@@ -134,70 +141,72 @@ class SeenEpisode:
 
     @torch.no_grad()
     def choose(
-        self, net: BodyNet, goal: NDArray[np.float32], planned: PlannedNumbers | None
+        self, net: BodyNet, goal: NDArray[np.float32], subgoal_inputs: SubgoalInputs | None
     ) -> NetworkChoice:
         """Return what a network chooses after the last look.
 
         Args:
-            net: a body, which chooses a kind of waypoint, or a planner, which chooses a subgoal.
+            net: a body's, which chooses a move, or a planner, which chooses a subgoal template.
             goal: as `understand` returns it.
-            planned: for hands the subgoal, for a planner what it named and keeps; else None.
+            subgoal_inputs: for hands the subgoal, for a planner what it named and keeps; else None.
         """
         no_label = np.array([NO_LABEL])
-        numbers = EpisodeNumbers(
-            looks=self._history.numbers(),
+        arrays = EpisodeArrays(
+            looks=self._history.to_arrays(),
             goal=goal,
             decisions=np.array([self.looks - 1]),
             moves=no_label,
-            things=no_label,
-            done=no_label,
-            planned=planned,
+            tracks=no_label,
+            stages_done=no_label,
+            subgoal_inputs=subgoal_inputs,
         )
-        answer: BodyAnswer = net(to_batch([numbers]), self._carried_for(net, goal))
-        kind = int(answer.moves[0, 0].argmax())
-        thing = int(answer.things[0, 0, kind].argmax())
-        is_there = thing < self._history.tracks.count
+        # A batch of one episode with one decision.
+        answer: BodyAnswer = net(to_batch([arrays]), self._cache_for(net, goal))
+        number = int(answer.moves[0, 0].argmax())
+        track = int(answer.tracks[0, 0, number].argmax())
+        is_there = track < self._history.tracks.count
         to_keep: tuple[int, ...] = ()
         if answer.keep_scores is not None:
             to_keep = tuple(np.flatnonzero(answer.keep_scores[0, 0].numpy() > 0))
-        return NetworkChoice(kind, thing if is_there else None, to_keep)
+        return NetworkChoice(number, track if is_there else None, to_keep)
 
-    def _carried_for(self, net: BodyNet, goal: NDArray[np.float32]) -> Carried:
-        """Return what a network remembers of the looks so far, which its next call goes on from.
+    def _cache_for(self, net: BodyNet, goal: NDArray[np.float32]) -> MemoryCache:
+        """Return the cache of a network's memory, which its next call goes on from and updates.
 
         What is remembered depends on the goal, so with another goal (another utterance was heard)
         it begins anew.
         """
-        remembered = self._remembered.get(net)
-        if remembered is None or not np.array_equal(remembered.goal, goal):
-            remembered = _RememberedLooks(goal, Carried())
-            self._remembered[net] = remembered
-        return remembered.carried
+        found = self._caches.get(net)
+        if found is None or not np.array_equal(found.goal, goal):
+            found = _GoalCache(goal, MemoryCache())
+            self._caches[net] = found
+        return found.cache
 
-    def point(self, thing: int) -> NDArray[np.float64]:
-        """Return where a thing, given by its track, was last seen: column and row, pixels, (2,)."""
+    def point(self, track: int) -> NDArray[np.float64]:
+        """Return the pixel, column and row (2,), where the object of a track was last seen."""
         tracks = self._history.tracks
-        height = self._model.body.sight.heights[tracks.classes[thing]]
-        return points_of(np.append(tracks.places[thing].astype(np.float64), height))
+        height = self._model.body.object_classes.heights[tracks.classes[track]]
+        return points_of(np.append(tracks.positions[track].astype(np.float64), height))
 
     def decide(
         self,
         goal: NDArray[np.float32],
         tool: NDArray[np.floating[Any]],
-        planned: PlannedNumbers | None = None,
+        subgoal_inputs: SubgoalInputs | None = None,
     ) -> NDArray[np.float64]:
         """Return the next waypoint (7,), as `moves.waypoint` does, after the last look.
 
         Args:
             goal: as `understand` returns it.
             tool: (7,) pose and opening now.
-            planned: the subgoal to follow, for hands.
+            subgoal_inputs: the subgoal to follow, for hands.
         """
         body = self._model.body
-        chosen = self.choose(body.net, goal, planned)
-        move = body.moves[chosen.kind]
-        if not move.at_thing or chosen.thing is None:
+        chosen = self.choose(body.net, goal, subgoal_inputs)
+        move = body.moves[chosen.number]
+        if not move.at_object or chosen.track is None:
             here = np.asarray(tool[:2], np.float64)
-            return waypoint(move, tool, here, np.array([1.0, 0.0]))
+            unturned = np.array([1.0, 0.0])  # yaw code of the angle 0
+            return waypoint(move, tool, here, unturned)
         tracks = self._history.tracks
-        return waypoint(move, tool, tracks.places[chosen.thing], tracks.turns[chosen.thing])
+        return waypoint(move, tool, tracks.positions[chosen.track], tracks.yaw_codes[chosen.track])

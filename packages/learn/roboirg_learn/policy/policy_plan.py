@@ -11,12 +11,14 @@ from roboirg.extension.sight import ExpertRecording
 from roboirg_learn.listener.reader_plan import as_plain
 
 MEMORY_NAMES = ("none", "recurrent", "ttt", "framesamp", "subgoal", "keyframes")
-"""The kinds of memory; the last two are a planner's."""
+"""Values of ``--memory``: the kinds of memory; the last two are a planner's."""
 PLANNERS = ("subgoal", "keyframes")
+"""Those with a planner: a network that names subgoals, which another one, the hands, follows."""
 KEYFRAME_PLANNER = "keyframes"
-"""The planner that chooses what it keeps."""
+"""The planner that chooses the looks that it keeps."""
 HANDS = "hands"
-"""The body that follows the subgoals of a planner, and remembers nothing."""
+"""In the place of a memory for the network that follows a planner's subgoals; it remembers
+nothing."""
 
 
 class BodyPlan(NamedTuple):
@@ -25,8 +27,8 @@ class BodyPlan(NamedTuple):
     Attributes:
         tasks: names of tasks.
         memory: what it remembers; a name of `MEMORY_NAMES`.
-        scenes: random scenes of each task in which the disturbed expert is recorded.
-        drawn: those of them of which pictures are drawn, for the detector.
+        scenes: how many random scenes of each task the disturbed expert is recorded in.
+        drawn: of how many of them pictures are rendered, for the detector.
         detector_epochs: passes over all pictures.
         body_epochs: passes over all episodes.
         seed: of initial weights, noise and order.
@@ -42,17 +44,19 @@ class BodyPlan(NamedTuple):
 
     @property
     def about(self) -> dict[str, Any]:
-        """All that a body depends on, as plain data."""
+        """All that a body depends on, as plain JSON data; stands in trained files and records."""
         return as_plain(self._asdict())
 
     @property
     def of_net(self) -> BodyPlan:
-        """How the net that moves is trained: where there is a planner, it follows subgoals."""
-        return self._replace(memory=HANDS) if self.memory in PLANNERS else self
+        """The plan of the network that chooses moves: with a planner it becomes the hands."""
+        if self.memory in PLANNERS:
+            return self._replace(memory=HANDS)
+        return self
 
 
 class Recorded(NamedTuple):
-    """A recorded episode with the words' view of it."""
+    """An episode (scene, goal, stages) and the expert's recording of it."""
 
     episode: Episode
     recording: ExpertRecording

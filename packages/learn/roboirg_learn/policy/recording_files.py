@@ -22,7 +22,7 @@ _PICTURE = "picture_"
 
 
 def save_recording(recorded: ExpertRecording, path: Path) -> None:
-    """Write a recording as a NumPy archive (.npz), whole or not at all.
+    """Write a recording as a NumPy archive (.npz), whole or not at all; `load_recording` reads it.
 
     Each picture is an array of its own with the bytes of a PNG file: ``picture_16`` is of look 16.
     """
@@ -37,7 +37,7 @@ def save_recording(recorded: ExpertRecording, path: Path) -> None:
 
 
 def load_recording(path: Path) -> ExpertRecording:
-    """Return a recording.
+    """Return the recording of a file that `save_recording` wrote.
 
     Raises:
         InvalidValueError: the file is none.

@@ -1,4 +1,7 @@
-"""What the front camera makes of a place, and back: where on the table a point of a picture is."""
+"""Objects in the front picture: their positions on the table, and what a detector would find.
+
+A look is a moment at which the front picture is looked at, every eighth control step.
+"""
 
 from __future__ import annotations
 
@@ -10,214 +13,226 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.extension.sight import ExpertRecording, places_of, points_of
-from roboirg_learn.policy.tracks import LookTokens
+from roboirg_learn.policy.tracks import Detections
 
 ROWS = (32, 160)
 """First and last row + 1 of the part of the picture that shows the table."""
 COLUMNS = 256
 """Of the picture that trained detectors read, so no other size will do."""
 NEAR_TOOL = 0.07
-"""Meters in the plane from the tool within which the hand may hide a thing."""
+"""Meters in the plane from the tool within which the hand may hide an object."""
 HIDDEN_LOOKS = 5
-"""Looks in a block: a thing that is lost, or a ghost, stays so for a whole block."""
-GHOST = -1
-"""In the place of an object's number for a ghost: a thing that is found but is not there."""
-PLACE_NOISE = 0.7
-"""Standard deviation of the places that a detector finds, pixels."""
-TURN_NOISE = 0.2
+"""Looks in a block: an object that is missed, or a false positive, stays so for a whole block."""
+FALSE_POSITIVE = -1
+"""In the place of an object's number for a detection where no object is."""
+POINT_NOISE = 0.7
+"""Standard deviation of the points in the picture that a detector finds, pixels."""
+YAW_NOISE = 0.2
 """Standard deviation of the angles that it finds, rad."""
-LOST_RATE = 0.02
-"""Mean probability that a thing is not found; some things are lost more often."""
-LOST_RATE_NEAR_TOOL = 0.15
+MISS_RATE = 0.02
+"""Mean probability that an object is not found; some objects are missed more often."""
+MISS_RATE_NEAR_TOOL = 0.15
 """The same near the tool."""
-GHOST_RATE = 0.04
-"""Probability that a block of looks has a ghost."""
+FALSE_POSITIVE_RATE = 0.04
+"""Probability that a block of looks has a false positive."""
+UNKNOWN_CLASS = -1
+"""In the place of a class number for a class that was not in the recordings learned from."""
 
 
-class Sight(NamedTuple):
-    """Classes of things, and the height at which each stands on the table.
+class ObjectClasses(NamedTuple):
+    """The classes of objects that a policy can see; a class number is an index into both fields.
 
     Attributes:
-        classes: names.
-        heights: (classes,) of their origins, m.
+        names: such as ``"cube red"``, sorted.
+        heights: (classes,) usual height of their origins above the table, m; a pixel is a position
+            on the table only at a known height.
     """
 
-    classes: tuple[str, ...]
+    names: tuple[str, ...]
     heights: NDArray[np.float64]
 
-    def kinds(self, names: Sequence[str]) -> NDArray[np.int64]:
-        """Return the number of each class name, (n,); -1 for one that is not known."""
-        numbers = {name: number for number, name in enumerate(self.classes)}
-        return np.array([numbers.get(name, -1) for name in names], np.int64)
+    def class_numbers(self, names: Sequence[str]) -> NDArray[np.int64]:
+        """Return the number of each class name, (n,); `UNKNOWN_CLASS` for one not in `names`.
 
-    def places(
+        With the names ``("bin", "cube red")``, ``["cube red", "box"]`` → ``[1, -1]``.
+        """
+        number_of = {name: number for number, name in enumerate(self.names)}
+        return np.array([number_of.get(name, UNKNOWN_CLASS) for name in names], np.int64)
+
+    def table_positions(
         self, classes: NDArray[np.int64], points: NDArray[np.floating]
     ) -> NDArray[np.float32]:
-        """Return where things in a front picture stand on the table: x and y, m, (n, 2).
+        """Return where objects in a front picture stand on the table: x and y, m, (n, 2).
 
         Args:
-            classes: (n,) numbers of their classes, which give their heights.
+            classes: (n,) class numbers, which give their heights.
             points: (n, 2) column and row in the picture, pixels.
         """
         return places_of(points, self.heights[classes])
 
 
-def turns_of(angles: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Return cosine and sine (..., 2) of four times angles, rad.
+def encode_yaws(angles: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Return yaw codes: cosine and sine (..., 2) of four times angles about the vertical, rad.
 
-    A square looks the same after a quarter turn, and so do these numbers.
+    A square looks the same after a quarter turn, and has the same code: 0 and π/2 → (1, 0).
+    `moves.waypoint` decodes them.
     """
     return np.stack([np.cos(4.0 * angles), np.sin(4.0 * angles)], -1).astype(np.float32)
 
 
-def sight_of(recorded: Iterable[ExpertRecording]) -> Sight:
-    """Return the classes of things that episodes show, each with its height on the table.
+def object_classes_of(recorded: Iterable[ExpertRecording]) -> ObjectClasses:
+    """Return the classes of objects that recordings show, each with its height on the table.
 
-    The height is the median, over episodes, of that at the first look that shows a thing: later it
-    may be lifted.
+    The height is the median, over recordings, of that at the first look that shows an object:
+    later it may be lifted.
     """
     heights: dict[str, list[float]] = {}
     for recording in recorded:
         for number, name in enumerate(recording.classes):
             is_visible = recording.visible[:, number]
             if is_visible.any():
-                height = recording.things[is_visible.argmax(), number, 2]
+                first_look = is_visible.argmax()
+                height = recording.things[first_look, number, 2]
                 heights.setdefault(name, []).append(float(height))
-    classes = tuple(sorted(heights))
-    return Sight(classes, np.array([np.median(heights[name]) for name in classes]))
+    names = tuple(sorted(heights))
+    return ObjectClasses(names, np.array([np.median(heights[name]) for name in names]))
 
 
-class LabeledLook(NamedTuple):
-    """What a detector might find at a look.
+class LabeledDetections(NamedTuple):
+    """What a detector might find at one look: n detections, each with the object that it is.
 
     Attributes:
-        tokens: the things.
-        objects: the number of the object that each is; `GHOST` where there is none.
+        detections: class, position and angle of each.
+        objects: (n,) the recording's number of the object that each is; `FALSE_POSITIVE` for none.
     """
 
-    tokens: LookTokens
+    detections: Detections
     objects: NDArray[np.intp]
 
-    def with_ghost(
-        self, kind: int, place: NDArray[np.float32], turn: NDArray[np.float32]
-    ) -> LabeledLook:
-        """Return the look with a thing added that is not there.
+    def with_false_positive(
+        self, class_number: int, position: NDArray[np.float32], yaw_code: NDArray[np.float32]
+    ) -> LabeledDetections:
+        """Return the same with a detection at the end where no object is.
 
         Args:
-            kind: number of its class.
-            place: (2,) x and y, m.
-            turn: (2,) as `turns_of` returns it.
+            class_number: of the detection.
+            position: (2,) x and y, m.
+            yaw_code: (2,) as `encode_yaws` returns it.
         """
-        tokens = LookTokens(
-            np.append(self.tokens.classes, kind),
-            np.vstack([self.tokens.places, place]),
-            np.vstack([self.tokens.turns, turn]),
+        detections = Detections(
+            np.append(self.detections.classes, class_number),
+            np.vstack([self.detections.positions, position]),
+            np.vstack([self.detections.yaw_codes, yaw_code]),
         )
-        return LabeledLook(tokens, np.append(self.objects, GHOST))
+        return LabeledDetections(detections, np.append(self.objects, FALSE_POSITIVE))
 
 
 def labeled_looks(
-    recorded: ExpertRecording, sight: Sight, rng: np.random.Generator
-) -> Iterator[LabeledLook]:
+    recorded: ExpertRecording, object_classes: ObjectClasses, rng: np.random.Generator
+) -> Iterator[LabeledDetections]:
     """Yield what an imperfect detector might find at each look of a recording.
 
-    A detector loses things, mistakes their places and angles a little, and now and then finds a
-    ghost: a thing of any class at the place of another. The body learns from this, so that it
-    bears such mistakes.
+    It misses objects, errs a little about their positions and angles, and now and then has a false
+    positive: a detection of any class at the position of an object. A network that learns from
+    this tolerates such mistakes.
     """
-    things = _draw_noisy_things(recorded, sight, rng)
-    looks, objects = things.is_found.shape
-    ghosts = _draw_ghosts(looks, objects, len(sight.classes), rng)
+    # All numbers are drawn here, in this order; the same generator gives the same mistakes.
+    noisy = _draw_noisy_detections(recorded, object_classes, rng)
+    looks, objects = noisy.is_found.shape
+    false_positives = _draw_false_positives(looks, objects, len(object_classes.names), rng)
     for look in range(looks):
-        labeled = things.at_look(look)
+        labeled = noisy.at_look(look)
         block = look // HIDDEN_LOOKS
-        host = ghosts.hosts[block]
-        if ghosts.is_there[block] and things.is_found[look, host]:
-            place = things.places[look, host]
-            labeled = labeled.with_ghost(ghosts.kinds[block], place, things.turns[look, host])
+        host = false_positives.hosts[block]
+        if false_positives.is_there[block] and noisy.is_found[look, host]:
+            labeled = labeled.with_false_positive(
+                false_positives.classes[block],
+                noisy.positions[look, host],
+                noisy.yaw_codes[look, host],
+            )
         yield labeled
 
 
-class _Ghosts(NamedTuple):
-    """Things that are not there, one for each block of looks, if any.
+class _FalsePositives(NamedTuple):
+    """Detections where no object is: at most one in each of n blocks of looks.
 
     Attributes:
-        is_there: whether there is one.
-        kinds: the number of its class.
-        hosts: the number of the object at whose place it is.
+        is_there: (n,) whether the block has one.
+        classes: (n,) its class number.
+        hosts: (n,) number of the object at whose position it is.
     """
 
     is_there: NDArray[np.bool_]
-    kinds: NDArray[np.int64]
+    classes: NDArray[np.int64]
     hosts: NDArray[np.int64]
 
 
-class _NoisyThings(NamedTuple):
-    """What a detector would find of T looks at K objects.
+class _NoisyDetections(NamedTuple):
+    """What a detector would find at T looks of K objects.
 
     Attributes:
-        kinds: (K,) numbers of classes.
+        classes: (K,) class numbers; meaningless where an object is never found.
         is_found: (T, K) whether it finds an object.
-        places: (T, K, 2) x and y where it finds it, m.
-        turns: (T, K, 2) as `turns_of` returns them.
+        positions: (T, K, 2) x and y where it finds it, m.
+        yaw_codes: (T, K, 2) as `encode_yaws` returns them.
     """
 
-    kinds: NDArray[np.int64]
+    classes: NDArray[np.int64]
     is_found: NDArray[np.bool_]
-    places: NDArray[np.float32]
-    turns: NDArray[np.float32]
+    positions: NDArray[np.float32]
+    yaw_codes: NDArray[np.float32]
 
-    def at_look(self, look: int) -> LabeledLook:
-        """Return what is found at a look."""
+    def at_look(self, look: int) -> LabeledDetections:
+        """Return what is found at a look, in the order of the objects' numbers."""
         objects = np.flatnonzero(self.is_found[look])
-        places = self.places[look, objects]
-        tokens = LookTokens(self.kinds[objects], places, self.turns[look, objects])
-        return LabeledLook(tokens, objects)
+        positions = self.positions[look, objects]
+        detections = Detections(self.classes[objects], positions, self.yaw_codes[look, objects])
+        return LabeledDetections(detections, objects)
 
 
-def _draw_noisy_things(
-    recorded: ExpertRecording, sight: Sight, rng: np.random.Generator
-) -> _NoisyThings:
+def _draw_noisy_detections(
+    recorded: ExpertRecording, object_classes: ObjectClasses, rng: np.random.Generator
+) -> _NoisyDetections:
     """Draw what a detector would find: at which looks each object, and where, with errors.
 
-    It finds what is visible, of a learned class, on the table, and not lost by chance.
+    It finds what is visible, of a known class, on the table, and not missed by chance.
     """
-    kinds = sight.kinds(recorded.classes)  # -1 for a class that is not learned
+    classes = object_classes.class_numbers(recorded.classes)
     positions = recorded.things[..., :3].astype(np.float64)
-    is_found = _draw_is_not_lost(recorded, positions, rng)
+    is_found = _draw_is_not_missed(recorded, positions, rng)
     points = points_of(positions)
-    is_found &= recorded.visible & (kinds >= 0) & _is_on_table(points)
+    is_found &= recorded.visible & (classes != UNKNOWN_CLASS) & _is_on_table(points)
 
-    points += rng.normal(0.0, PLACE_NOISE, points.shape)
-    places = _places_of(points, kinds, sight)
+    noisy_points = points + rng.normal(0.0, POINT_NOISE, points.shape)
+    noisy_positions = _table_positions(noisy_points, classes, object_classes)
     angles = recorded.things[..., 3]
-    turns = turns_of(angles + rng.normal(0.0, TURN_NOISE, angles.shape))
-    return _NoisyThings(kinds, is_found, places, turns)
+    yaw_codes = encode_yaws(angles + rng.normal(0.0, YAW_NOISE, angles.shape))
+    return _NoisyDetections(classes, is_found, noisy_positions, yaw_codes)
 
 
-def _draw_is_not_lost(
+def _draw_is_not_missed(
     recorded: ExpertRecording, positions: NDArray[np.float64], rng: np.random.Generator
 ) -> NDArray[np.bool_]:
-    """Draw at which looks a detector does not lose each object: True, (looks, objects).
+    """Draw at which looks a detector does not miss each object: (looks, objects) bool.
 
     Args:
-        recorded: with the tool's place at each look.
+        recorded: with the tool's position at each look.
         positions: (looks, objects, 3) of the objects, m.
         rng: draws.
     """
     from_tool = positions[..., :2] - recorded.tool[:, None, :2]
     distances = np.hypot(from_tool[..., 0], from_tool[..., 1])
-    probabilities = np.where(distances < NEAR_TOOL, LOST_RATE_NEAR_TOOL, LOST_RATE)
+    miss_rates = np.where(distances < NEAR_TOOL, MISS_RATE_NEAR_TOOL, MISS_RATE)
     looks, objects = distances.shape
-    # A detector has trouble with the same thing again and again.
-    probabilities = probabilities * rng.exponential(1.0, objects)
-    # What hides a thing does so for a while: one draw for each block of looks.
+    # A detector has trouble with the same object again and again.
+    miss_rates = miss_rates * rng.exponential(1.0, objects)
+    # What hides an object does so for a while: one draw for each block of looks.
     drawn = rng.random((_block_count(looks), objects)).repeat(HIDDEN_LOOKS, axis=0)
-    return drawn[:looks] >= probabilities
+    return drawn[:looks] >= miss_rates
 
 
 def _is_on_table(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return whether points of a picture are in the part that shows the table.
+    """Return whether points are in the part of the front picture that shows the table: (...).
 
     Args:
         points: (..., 2) column and row, pixels.
@@ -225,34 +240,44 @@ def _is_on_table(points: NDArray[np.float64]) -> NDArray[np.bool_]:
     low = np.array([0, ROWS[0]])
     high = np.array([COLUMNS, ROWS[1]])
     is_inside = (points >= low) & (points < high)
-    return is_inside[..., 0] & is_inside[..., 1]
+    return np.asarray(is_inside.all(-1))
 
 
-def _places_of(
-    points: NDArray[np.float64], kinds: NDArray[np.int64], sight: Sight
+def _table_positions(
+    points: NDArray[np.float64], classes: NDArray[np.int64], object_classes: ObjectClasses
 ) -> NDArray[np.float32]:
     """Return x and y on the table, m, of objects at all looks: (looks, objects, 2).
 
     Args:
         points: (looks, objects, 2) column and row in the picture, pixels.
-        kinds: (objects,) numbers of classes; the place of one with -1 means nothing.
-        sight: knows the heights.
+        classes: (objects,) class numbers; positions of `UNKNOWN_CLASS` mean nothing.
+        object_classes: with the heights.
     """
-    known_kinds = np.maximum(kinds, 0)  # the others are not found
-    kind_of_each = np.broadcast_to(known_kinds, points.shape[:2]).ravel()
-    return sight.places(kind_of_each, points.reshape(-1, 2)).reshape(points.shape)
+    known_classes = np.maximum(classes, 0)
+    class_of_each = np.broadcast_to(known_classes, points.shape[:2]).ravel()
+    flat_positions = object_classes.table_positions(class_of_each, points.reshape(-1, 2))
+    return flat_positions.reshape(points.shape)
 
 
-def _draw_ghosts(looks: int, objects: int, classes: int, rng: np.random.Generator) -> _Ghosts:
-    """Draw a ghost for each block of looks; most have none."""
+def _draw_false_positives(
+    looks: int, objects: int, classes: int, rng: np.random.Generator
+) -> _FalsePositives:
+    """Draw whether each block of looks has a false positive, of which class, and where.
+
+    Args:
+        looks: how many looks the blocks divide.
+        objects: number of objects; a false positive is at the position of one of them.
+        classes: number of classes.
+        rng: draws.
+    """
     blocks = _block_count(looks)
-    return _Ghosts(
-        is_there=rng.random(blocks) < GHOST_RATE,
-        kinds=rng.integers(0, classes, blocks),
+    return _FalsePositives(
+        is_there=rng.random(blocks) < FALSE_POSITIVE_RATE,
+        classes=rng.integers(0, classes, blocks),
         hosts=rng.integers(0, objects, blocks),
     )
 
 
 def _block_count(looks: int) -> int:
-    """Return how many blocks of `HIDDEN_LOOKS` looks there are, the last one maybe shorter."""
+    """Return how many blocks of `HIDDEN_LOOKS` looks there are: 5 → 1, 6 → 2 (one shorter)."""
     return math.ceil(looks / HIDDEN_LOOKS)

@@ -13,13 +13,12 @@ from roboirg_learn.policy.learned_policy import LearnedPolicy, tool_of
 from roboirg_learn.policy.moves import GRIPPER_UNCHANGED
 from roboirg_learn.policy.planner_history import (
     NO_LOOK,
+    PLANNER_HISTORIES,
     RECENT,
-    PlannedNumbers,
-    PlannerHistory,
+    SubgoalInputs,
     recent_looks,
     requests_for_hands,
 )
-from roboirg_learn.policy.policy_plan import KEYFRAME_PLANNER
 from roboirg_learn.policy.subgoals import encode_request
 
 if TYPE_CHECKING:
@@ -27,68 +26,70 @@ if TYPE_CHECKING:
 
 
 class SubgoalNamer:
-    """Names the next subgoal after each look of one episode.
+    """Names the next subgoal of one episode by a learned planner; call `next` once after each look.
 
     Args:
         model: whose planner names it.
-        seen: the episode.
+        seen: the episode as it is seen; whoever acts adds the looks to it.
     """
 
     def __init__(self, model: PolicyModel, seen: SeenEpisode) -> None:
         self._body = model.body
         self._seen = seen
-        chooses = self._body.plan["memory"] == KEYFRAME_PLANNER
-        self._history = PlannerHistory(len(self._body.forms), chooses=chooses)
-        self._last_kind: int | None = None
-        self._last_thing: int | None = None
+        planner = self._body.plan["memory"]
+        self._history = PLANNER_HISTORIES[planner](len(self._body.templates))
+        self._last_choice: tuple[int, int | None] | None = None  # template and track
         self._subgoal = ""
 
     def next(self, goal: NDArray[np.float32]) -> str:
         """Return the subgoal after the last look, in words with a point.
 
-        While kind and thing stay the same the words do, too: the point does not follow the thing.
+        For example "pick up the red cube at <110, 84>", with row and column in the front picture.
+        While template and track stay the same the words do, too: the point does not follow the
+        object.
 
         Args:
-            goal: as `GoalLayout.numbers` returns it.
+            goal: (size,) as `GoalLayout.encode` returns it.
         """
         if self._body.planner is None:
             raise RuntimeError("This policy has no planner.")
         look = self._seen.looks - 1
-        chosen = self._seen.choose(self._body.planner, goal, self._planned(look))
-        self._history.name(chosen.kind, look)
-        # Chosen are places among the recent looks; before the first look there is none.
-        recent = [recent_looks(look)[place] for place in chosen.to_keep]
-        self._history.choose(number for number in recent if number >= 0)
+        chosen = self._seen.choose(self._body.planner, goal, self._subgoal_inputs(look))
+        self._history.name(chosen.number, look)
+        # `to_keep` has indices into the recent looks; before the first look there is none.
+        to_keep = [recent_looks(look)[index] for index in chosen.to_keep]
+        self._history.choose(number for number in to_keep if number >= 0)
 
-        is_same = chosen.kind == self._last_kind and chosen.thing == self._last_thing
-        if not is_same:
-            self._last_kind = chosen.kind
-            self._last_thing = chosen.thing
+        choice = (chosen.number, chosen.track)
+        if choice != self._last_choice:
+            self._last_choice = choice
             self._subgoal = self._words(chosen)
         return self._subgoal
 
-    def _planned(self, look: int) -> PlannedNumbers:
-        """Return the planner's input at a look: what it named, and the looks that it keeps.
+    def _subgoal_inputs(self, look: int) -> SubgoalInputs:
+        """Return the planner's input at one look: what it named, and the looks that it keeps.
 
-        `to_keep` is a label of training, so it is empty here.
+        `to_keep` is a label of training, so nothing stands in it here.
         """
-        return PlannedNumbers(
+        return SubgoalInputs(
             context=self._history.context(look)[None],
             kept_looks=self._history.kept(self._seen.video_looks, look)[None],
             to_keep=np.full((1, RECENT), NO_LOOK),
         )
 
     def _words(self, chosen: NetworkChoice) -> str:
-        """Return a chosen subgoal in words, with the pixel at which its thing was last seen."""
-        point = None if chosen.thing is None else self._seen.point(chosen.thing)
-        return self._body.forms[chosen.kind].at(point)
+        """Return a chosen subgoal in words, with the pixel at which its object was last seen."""
+        point = None if chosen.track is None else self._seen.point(chosen.track)
+        return self._body.templates[chosen.number].at(point)
 
 
 class LearnedHands(LearnedPolicy):
     """Moves towards subgoals: those of any planner, or else those of its own planner.
 
+    Until `follow` is called in an episode its own planner names the subgoals.
+
     Attributes:
-        subgoal: the one it follows.
+        subgoal: the one that it follows, in words; None before the first.
     """
 
     subgoal: str | None = None
@@ -96,6 +97,7 @@ class LearnedHands(LearnedPolicy):
     _namer: SubgoalNamer | None = None
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Begin an episode as `LearnedPolicy.reset` does, without a subgoal."""
         super().reset(instruction, demonstration)
         self.subgoal = None
         self._request = None
@@ -119,15 +121,16 @@ class LearnedHands(LearnedPolicy):
             return np.append(observation["end_effector"], GRIPPER_UNCHANGED)[None]
         # Hands are trained without goal: the subgoal is all that they are given.
         no_goal = np.zeros(self.model.body.goals.size, np.float32)
-        chosen = seen.decide(no_goal, tool_of(observation), requests_for_hands([self._request]))
-        return chosen[None]
+        inputs = requests_for_hands([self._request])
+        waypoint = seen.decide(no_goal, tool_of(observation), inputs)
+        return waypoint[None]
 
     def _take(self, subgoal: str) -> None:
-        """Set the subgoal if its words have a known form; else keep the one before."""
-        found = encode_request(subgoal, self.model.body.sight)
-        if found is not None:
+        """Set the subgoal if its words are understood; else keep the one before."""
+        request = encode_request(subgoal, self.model.body.object_classes)
+        if request is not None:
             self.subgoal = subgoal
-            self._request = found
+            self._request = request
 
 
 class LearnedPlanner:
@@ -148,16 +151,19 @@ class LearnedPlanner:
 
     @property
     def metadata(self) -> dict[str, Any]:
+        """How its body and its reader were trained."""
         return self._eyes.metadata
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Begin an episode: hear the instruction and look at the video."""
         self._eyes.reset(instruction, demonstration)
         self._namer = SubgoalNamer(self._eyes.model, self._eyes.seen)
 
     def hear(self, text: str, step: int) -> None:
+        """Hear another utterance; the goal is understood anew."""
         self._eyes.hear(text, step)
 
     def plan(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
-        """Return the subgoal from now on."""
+        """Return the subgoal from now on, in words with a point."""
         self._eyes.watch(observation)
         return self._namer.next(self._eyes.understand())

@@ -8,17 +8,17 @@ import torch
 from torch import Tensor, nn
 
 from roboirg_learn.policy.body_layers import WIDTH
-from roboirg_learn.policy.memories import Looks, values_at_looks
+from roboirg_learn.policy.memories import EmbeddedLooks, values_at_looks
 from roboirg_learn.policy.planner_history import RECENT
 
 AWAY_SCALE = 5.0
 """Per meter from the point, so that these numbers are about as great as the others."""
 NEARNESS = 25.0
-"""Per meter: how fast a thing counts less, the farther it is from the point."""
+"""Per meter: how fast an object counts less, the farther it is from the point."""
 
 
-class PlannedBatch(NamedTuple):
-    """What is given at each decision, padded; fields as in `PlannedNumbers`, with B."""
+class SubgoalInputBatch(NamedTuple):
+    """What networks with subgoals are given at decisions; fields as in `SubgoalInputs`, with B."""
 
     context: Tensor
     kept_looks: Tensor
@@ -26,10 +26,12 @@ class PlannedBatch(NamedTuple):
 
 
 class ContextInput(nn.Module):
-    """Adds the context to the tokens of a decision, and to things how far the point is.
+    """Turns the context of a decision into what is added to its tokens.
+
+    The context is, for hands, the subgoal that they follow; for a planner, what it named before.
 
     Args:
-        numbers: of the context.
+        numbers: how many the context has.
     """
 
     def __init__(self, numbers: int) -> None:
@@ -37,20 +39,21 @@ class ContextInput(nn.Module):
         self.every = nn.Linear(numbers, WIDTH)
         self.pointed = nn.Linear(4, WIDTH, bias=False)
 
-    def forward(self, context: Tensor, places: Tensor) -> tuple[Tensor, Tensor]:
-        """Return what is added to tokens: of the robot (B, D, WIDTH), of things (B, D, K, WIDTH).
+    def forward(self, context: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
+        """Return what is added to tokens: of the robot (B, D, WIDTH), of tracks (B, D, K, WIDTH).
 
-        Things also learn how far they are from the point that a subgoal names, so that the one
-        that is meant stands out.
+        Tokens of tracks also get how far their object is from the point that a subgoal names, so
+        that the one that is meant stands out.
 
         Args:
-            context: (B, D, numbers), with the point at the end.
-            places: (B, D, K, 2) of the things on the table, m.
+            context: (B, D, numbers); the last `POINT_NUMBERS` are whether there is a point (1 or
+                0), and its x and y on the table, m.
+            positions: (B, D, K, 2) x and y of the objects on the table, m.
         """
-        # The last three numbers: whether there is a point (1 or 0), its x and its y, m.
         has_point = context[:, :, None, -3:-2]
-        from_point = places - context[:, :, None, -2:]
-        nearness = (-from_point.norm(dim=-1, keepdim=True) * NEARNESS).exp()
+        from_point = positions - context[:, :, None, -2:]
+        distance = from_point.norm(dim=-1, keepdim=True)
+        nearness = (-distance * NEARNESS).exp()  # 1 at the point, 0 far away
         parts = [from_point * AWAY_SCALE, nearness, torch.ones_like(nearness)]
         numbers = torch.cat(parts, -1) * has_point
         to_all = self.every(context)
@@ -58,26 +61,26 @@ class ContextInput(nn.Module):
 
 
 class KeepScore(nn.Module):
-    """Scores the recent looks: which of them is to be kept."""
+    """Scores the recent looks by whether a planner is to keep them for good."""
 
     def __init__(self) -> None:
         super().__init__()
         self.layers = nn.Sequential(nn.Linear(3 * WIDTH + 1, WIDTH), nn.ReLU(), nn.Linear(WIDTH, 1))
 
-    def forward(self, looks: Looks, decisions: Tensor, now: Tensor) -> Tensor:
+    def forward(self, looks: EmbeddedLooks, decisions: Tensor, now: Tensor) -> Tensor:
         """Return logits (B, D, RECENT) of keeping each of the `RECENT` looks up to a decision.
 
-        The present look comes last. Looks before the first repeat it; callers ignore them.
+        The present look comes last. Looks before the first repeat it; callers ignore their scores.
 
         Args:
             looks: of the episodes.
             decisions: (B, D) the numbers of the looks at which decisions are made.
-            now: (B, D, WIDTH) the robot's token after all layers of the body.
+            now: (B, D, WIDTH) the robot's token after all transformer layers.
         """
         present = decisions[..., None]
-        recent = present - torch.arange(RECENT - 1, -1, -1)
-        seen_things = (looks.things * looks.seen[..., None]).mean(2)
-        summaries = torch.cat([looks.tool, seen_things], -1)
+        recent = present - torch.arange(RECENT - 1, -1, -1)  # (B, D, RECENT) numbers of looks
+        visible_tracks = (looks.tracks * looks.visible[..., None]).mean(2)
+        summaries = torch.cat([looks.tool, visible_tracks], -1)
         flat_summaries = values_at_looks(summaries, recent.clamp(min=0).flatten(1))
         recent_summaries = flat_summaries.reshape(*recent.shape, -1)
         robot_token = now[:, :, None].expand(-1, -1, RECENT, -1)

@@ -1,4 +1,7 @@
-"""What hands and planners learn from: recordings with the subgoal that is due at each decision."""
+"""What hands and planners learn from: recordings with the subgoal that is due at each decision.
+
+A planner names subgoals, the hands are a network that follows them.
+"""
 
 from __future__ import annotations
 
@@ -6,61 +9,62 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.extension.commands import InvalidValueError
-from roboirg_learn.policy.planner_history import ideal_planner_inputs, requests_for_hands
-from roboirg_learn.policy.policy_data import EpisodeNumbers
-from roboirg_learn.policy.policy_plan import HANDS, KEYFRAME_PLANNER, PLANNERS, Recorded
-from roboirg_learn.policy.sight import Sight
+from roboirg_learn.policy.planner_history import (
+    PLANNER_HISTORIES,
+    ideal_planner_inputs,
+    requests_for_hands,
+)
+from roboirg_learn.policy.policy_data import EpisodeArrays
+from roboirg_learn.policy.policy_plan import HANDS, PLANNERS, Recorded
+from roboirg_learn.policy.sight import ObjectClasses
 from roboirg_learn.policy.subgoals import encode_request, recorded_subgoals
 
 IS_VIDEO = 6
-"""Column in the numbers of the tool: 1 if the look is one of the video, else 0."""
+"""Column of `LookArrays.tool`: 1 if the look is one of the video, else 0."""
 
 
 def with_planner_inputs(
     memory: str,
     recorded: Recorded,
-    numbers: EpisodeNumbers,
-    forms: int,
-    sight: Sight,
+    arrays: EpisodeArrays,
+    templates: int,
+    object_classes: ObjectClasses,
     rng: np.random.Generator,
-) -> EpisodeNumbers:
+) -> EpisodeArrays:
     """Return an episode with the subgoals that hands or a planner are given.
 
-    Episodes of other bodies are returned as they are.
+    Hands get the subgoal that is due at each decision, and no goal; a planner gets what it would
+    have named and kept. Episodes for other networks are returned as they are.
 
     Args:
-        memory: a name of `MEMORIES`.
+        memory: of the network; a name of `MEMORIES`.
         recorded: the episode and its recording.
-        numbers: the same as network input.
-        forms: number of forms of subgoals, for a planner.
-        sight: classes of things and their heights.
-        rng: moves the points of subgoals.
+        arrays: the same as network input.
+        templates: number of subgoal templates, for a planner.
+        object_classes: classes of objects and their heights.
+        rng: moves the points of subgoals, for hands.
     """
     if memory == HANDS:
-        done = numbers.done.tolist()
-        subgoals = recorded_subgoals(recorded.recording, recorded.episode, done, rng)
-        requests = requests_for_hands(
-            [_encode_known_request(subgoal, sight) for subgoal in subgoals]
-        )
-        # Hands know what they are asked for, and no goal.
-        return numbers._replace(goal=np.zeros_like(numbers.goal), planned=requests)
+        stages_done = arrays.stages_done.tolist()
+        subgoals = recorded_subgoals(recorded.recording, recorded.episode, stages_done, rng)
+        requests = [_encode_known_request(subgoal, object_classes) for subgoal in subgoals]
+        no_goal = np.zeros_like(arrays.goal)
+        return arrays._replace(goal=no_goal, subgoal_inputs=requests_for_hands(requests))
     if memory in PLANNERS:
-        chooses = memory == KEYFRAME_PLANNER
-        video = int(numbers.looks.tool[:, IS_VIDEO].sum())
-        planned = ideal_planner_inputs(
-            numbers.moves, numbers.decisions, video, forms, chooses=chooses
-        )
-        return numbers._replace(planned=planned)
-    return numbers
+        history = PLANNER_HISTORIES[memory](templates)
+        video = int(arrays.looks.tool[:, IS_VIDEO].sum())
+        subgoal_inputs = ideal_planner_inputs(history, arrays.moves, arrays.decisions, video)
+        return arrays._replace(subgoal_inputs=subgoal_inputs)
+    return arrays
 
 
-def _encode_known_request(subgoal: str, sight: Sight) -> NDArray[np.float32]:
-    """Return a subgoal as numbers for hands (REQUEST_SIZE,).
+def _encode_known_request(subgoal: str, object_classes: ObjectClasses) -> NDArray[np.float32]:
+    """Return a subgoal in words as numbers for hands (REQUEST_SIZE,); see `encode_request`.
 
     Raises:
-        InvalidValueError: its words have no known form.
+        InvalidValueError: its words are not understood.
     """
-    found = encode_request(subgoal, sight)
+    found = encode_request(subgoal, object_classes)
     if found is None:
         raise InvalidValueError(f"The subgoal {subgoal!r} has no form that hands know.")
     return found

@@ -25,25 +25,25 @@ class TaskNet(nn.Module):
     def __init__(self, vocabulary: Vocabulary) -> None:
         super().__init__()
         self._words = {word: number for number, word in enumerate(vocabulary.words)}
-        self._classes = len(vocabulary.classes)
-        numbers = len(self._words) + self._classes + 1
+        self._size = len(self._words) + len(vocabulary.classes) + 1
         self.layers = nn.Sequential(
-            nn.Linear(numbers, WIDTH), nn.ReLU(), nn.Linear(WIDTH, len(vocabulary.tasks))
+            nn.Linear(self._size, WIDTH), nn.ReLU(), nn.Linear(WIDTH, len(vocabulary.tasks))
         )
 
     def forward(self, texts: Sequence[str], seen: Sequence[ObjectsInView]) -> Tensor:
         """Return logits (n, tasks) for n instructions, each with what is seen in its scene.
 
-        The input of an instruction has 1 for each known word that it uses, how many objects of each
-        class the first picture shows, and whether there is a video, which has two pictures.
+        The input is a bag of words and objects: 1 for each known word that the instruction uses,
+        `OBJECT_WEIGHT` for each object of each class in the first picture, and 1 if there is a
+        video, which has two pictures.
         """
-        rows = torch.zeros(len(texts), len(self._words) + self._classes + 1)
+        rows = torch.zeros(len(texts), self._size)
         for row, text, objects in zip(rows, texts, seen, strict=True):
             for word in split_words(text):
                 if word in self._words:
                     row[self._words[word]] = 1.0
-            for kind in objects.kinds[objects.views == 0]:
-                row[len(self._words) + int(kind)] += OBJECT_WEIGHT
+            for class_number in objects.classes[objects.views == 0]:
+                row[len(self._words) + int(class_number)] += OBJECT_WEIGHT
             has_video = objects.looks > 1
             row[-1] = float(has_video)
         scores: Tensor = self.layers(rows)

@@ -1,6 +1,6 @@
 """What acts: a body sees, remembers and moves for a goal that it is given, and knows no words.
 
-Its detector finds things in pictures, its net chooses the next waypoint. A body with a planner has
+Its detector finds objects in pictures, its net chooses the next waypoint. A body with a planner has
 a second net, which names subgoals; its first net, the hands, follows them.
 """
 
@@ -20,26 +20,28 @@ from roboirg.extension.episodes import Episode, goal_schema
 from roboirg_learn.listener.vocabulary import parts_of
 from roboirg_learn.policy.body_net import BodyNet
 from roboirg_learn.policy.moves import Move
+from roboirg_learn.policy.object_detector import ObjectDetector
 from roboirg_learn.policy.planner_history import context_size
 from roboirg_learn.policy.policy_plan import HANDS, PLANNERS
-from roboirg_learn.policy.sight import Sight
-from roboirg_learn.policy.subgoals import REQUEST_SIZE, SubgoalForm
-from roboirg_learn.policy.thing_detector import ThingDetector
-from roboirg_learn.policy.tracks import LookTokens
+from roboirg_learn.policy.sight import ObjectClasses
+from roboirg_learn.policy.subgoals import REQUEST_SIZE, SubgoalTemplate
+from roboirg_learn.policy.tracks import Detections
 from roboirg_learn.trained_file import TrainedFile, load_trained, save_trained
 
-Kind = Move | SubgoalForm
-"""What a network chooses among: kinds of waypoints, or forms of subgoals."""
+Choice = Move | SubgoalTemplate
+"""What a network chooses among: types of waypoints, or for planners subgoal templates."""
 Pictures = Sequence[NDArray[np.uint8]]
 
 
 @dataclass(frozen=True)
 class GoalLayout:
-    """Which number of a goal stands for which task, and for which part of an answer.
+    """Which number of an encoded goal stands for which task, and for which part of an answer.
+
+    An answer is a goal in JSON; its parts are such as ``color=red`` (`vocabulary.parts_of`).
 
     Attributes:
         tasks: names of tasks.
-        parts: parts of answers, such as ``color=red``; they come after the tasks.
+        parts: of answers; they come after the tasks.
     """
 
     tasks: tuple[str, ...]
@@ -50,23 +52,25 @@ class GoalLayout:
         """How many numbers a goal has."""
         return len(self.tasks) + len(self.parts)
 
-    def numbers(self, task: str, answer: str) -> NDArray[np.float32]:
+    def encode(self, task: str, answer: str) -> NDArray[np.float32]:
         """Return a goal as network input (size,): 1 for its task and each of its parts, else 0.
+
+        With tasks (A, B) and parts (color=blue, color=red), task B and red → [0, 1, 0, 1].
 
         Args:
             task: name of the task.
             answer: the goal's values as canonical JSON, such as ``{"color": "red"}``.
         """
-        found = np.zeros(self.size, np.float32)
-        found[self.tasks.index(task)] = 1.0
+        encoded = np.zeros(self.size, np.float32)
+        encoded[self.tasks.index(task)] = 1.0
         for part in parts_of(answer):
-            found[len(self.tasks) + self.parts.index(part)] = 1.0
-        return found
+            encoded[len(self.tasks) + self.parts.index(part)] = 1.0
+        return encoded
 
-    def of_episode(self, episode: Episode) -> NDArray[np.float32]:
-        """Return the numbers of an episode's own goal."""
+    def encode_episode(self, episode: Episode) -> NDArray[np.float32]:
+        """Return an episode's own goal, encoded: (size,)."""
         answer = goal_schema(episode.task).answers[episode.goal]
-        return self.numbers(episode.task, answer)
+        return self.encode(episode.task, answer)
 
 
 @dataclass(frozen=True)
@@ -74,24 +78,24 @@ class TrainedBody:
     """A trained body.
 
     Attributes:
-        sight: classes of things, and the heights at which they stand.
+        object_classes: classes of objects, and the heights at which they stand.
         detector: finds them.
-        goals: what it can be given as goals.
-        moves: kinds of waypoints.
-        net: chooses the next waypoint.
+        goals: how goals are encoded.
+        moves: types of waypoints, in the order of the network's outputs.
+        net: chooses the next move; with a planner it is the hands, which follow subgoals.
         plan: how it was trained, for records; as `BodyPlan.about` returns it.
-        forms: of the subgoals that its planner names.
+        templates: of the subgoals that its planner names, in the order of the planner's outputs.
         planner: names the next subgoal; None if it has none, and then its net follows none.
         version: fingerprint of its file; empty if it comes from none.
     """
 
-    sight: Sight
-    detector: ThingDetector
+    object_classes: ObjectClasses
+    detector: ObjectDetector
     goals: GoalLayout
     moves: tuple[Move, ...]
     net: BodyNet
     plan: dict[str, Any]
-    forms: tuple[SubgoalForm, ...] = ()
+    templates: tuple[SubgoalTemplate, ...] = ()
     planner: BodyNet | None = None
     version: str = ""
 
@@ -100,31 +104,33 @@ class TrainedBody:
         """Its networks by the names that they have in its file."""
         return nn.ModuleDict({"detector": self.detector, "body": self.net, "planner": self.planner})
 
-    def see(self, pictures: Pictures) -> list[LookTokens]:
-        """Return for each front picture the things found in it, with places on the table, m."""
+    def see(self, pictures: Pictures) -> list[Detections]:
+        """Return for each front picture the objects found in it, with positions on the table."""
         found = []
-        for things in self.detector.find(pictures):
-            places = self.sight.places(things.classes, things.points)
-            found.append(LookTokens(things.classes, places, things.turns))
+        for picture in self.detector.find(pictures):
+            positions = self.object_classes.table_positions(picture.classes, picture.points)
+            found.append(Detections(picture.classes, positions, picture.yaw_codes))
         return found
 
 
-def make_body(sight: Sight, goals: GoalLayout, moves: Sequence[Kind], memory: str) -> BodyNet:
-    """Return an untrained body or planner.
+def make_body(
+    object_classes: ObjectClasses, goals: GoalLayout, choices: Sequence[Choice], memory: str
+) -> BodyNet:
+    """Return the untrained network of a body or planner.
 
     Args:
-        sight: classes of things.
+        object_classes: classes of objects.
         goals: how many numbers a goal has.
-        moves: what it chooses among: kinds of waypoints, or for a planner forms of subgoals.
+        choices: what it chooses among: moves, or for a planner subgoal templates.
         memory: a name of `MEMORIES`.
     """
     context = 0  # numbers about subgoals that it is given at each decision
     if memory == HANDS:
         context = REQUEST_SIZE
     elif memory in PLANNERS:
-        context = context_size(len(moves))
-    at_things = [move.at_thing for move in moves]
-    return BodyNet(len(sight.classes), goals.size, at_things, memory, context)
+        context = context_size(len(choices))
+    at_objects = [choice.at_object for choice in choices]
+    return BodyNet(len(object_classes.names), goals.size, at_objects, memory, context)
 
 
 def save_body(body: TrainedBody, path: Path) -> None:
@@ -135,12 +141,12 @@ def save_body(body: TrainedBody, path: Path) -> None:
     """
     about = {
         "plan": body.plan,
-        "classes": body.sight.classes,
+        "classes": body.object_classes.names,
         "parts": body.goals.parts,
         "moves": body.moves,
-        "forms": [form.words for form in body.forms],
+        "forms": [template.words for template in body.templates],
     }
-    heights = torch.from_numpy(body.sight.heights)
+    heights = torch.from_numpy(body.object_classes.heights)
     save_trained("body", about, body.nets, {"heights": heights}, path)
 
 
@@ -154,23 +160,30 @@ def load_body(path: Path) -> TrainedBody:
 
 
 def _read(file: TrainedFile) -> TrainedBody:
-    """Return the body of a file: networks made by its description, then given its weights."""
+    """Return the body of a file: networks made by its description, then given its weights.
+
+    `save_body` writes what is read here.
+    """
     about = file.about
     plan = about["plan"]
-    sight = Sight(tuple(about["classes"]), file.tensors["heights"].numpy())
+    object_classes = ObjectClasses(tuple(about["classes"]), file.tensors["heights"].numpy())
     goals = GoalLayout(tuple(plan["tasks"]), tuple(about["parts"]))
     moves = tuple(Move(*values) for values in about["moves"])
-    forms = tuple(SubgoalForm(words) for words in about["forms"])
-    has_planner = plan["memory"] in PLANNERS
+    templates = tuple(SubgoalTemplate(words) for words in about["forms"])
+    planner = None
+    memory = plan["memory"]
+    if memory in PLANNERS:
+        planner = make_body(object_classes, goals, templates, memory)
+        memory = HANDS
     body = TrainedBody(
-        sight=sight,
-        detector=ThingDetector(len(sight.classes)),
+        object_classes=object_classes,
+        detector=ObjectDetector(len(object_classes.names)),
         goals=goals,
         moves=moves,
-        net=make_body(sight, goals, moves, HANDS if has_planner else plan["memory"]),
+        net=make_body(object_classes, goals, moves, memory),
         plan=plan,
-        forms=forms,
-        planner=make_body(sight, goals, forms, plan["memory"]) if has_planner else None,
+        templates=templates,
+        planner=planner,
         version=file.version,
     )
     file.load(body.nets)

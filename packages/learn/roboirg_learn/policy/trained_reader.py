@@ -1,4 +1,7 @@
-"""What understands words: a reader names the task and the goal from words and the first looks."""
+"""What understands words: a reader names the task and the goal from words and the first looks.
+
+A look is a moment at which the front picture is looked at.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ from roboirg_learn.listener.object_relations import ObjectsInView, rank_objects
 from roboirg_learn.listener.reader_plan import WORDLESS
 from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary
 from roboirg_learn.policy.task_net import TaskNet
-from roboirg_learn.policy.tracks import LookTokens
+from roboirg_learn.policy.tracks import Detections
 from roboirg_learn.policy.trained_body import GoalLayout
 from roboirg_learn.trained_file import TrainedFile, load_trained, save_trained
 
@@ -28,10 +31,10 @@ class TrainedReader:
     """A trained reader.
 
     Attributes:
-        vocabulary: of words, classes of things, tasks and parts of goals.
-        corners: (4, 2) of the area where things stand, m.
+        vocabulary: of words, classes of objects, tasks and parts of goals.
+        corners: (4, 2) of the area where objects stand, m.
         task_net: names the task.
-        net: understands the goal.
+        net: scores the goals of a task.
         plan: how it was trained, for records; as `ReaderPlan.about` returns it, and more.
         version: fingerprint of its file; empty if it comes from none.
     """
@@ -49,16 +52,16 @@ class TrainedReader:
         return nn.ModuleDict({"task_net": self.task_net, "reader": self.net})
 
     def understand(
-        self, text: str, looks: Sequence[LookTokens], goals: GoalLayout
+        self, text: str, looks: Sequence[Detections], goals: GoalLayout
     ) -> NDArray[np.float32]:
-        """Return the goal that an instruction means, as `GoalLayout.numbers`: (size,).
+        """Return the goal that an instruction means, as `GoalLayout.encode` does: (size,).
 
-        First the task is named, then the best of that task's goals.
+        First the task is named, then the goal of that task with the best score.
 
         Args:
-            text: everything that was said.
-            looks: things found at the first look, and at a later one of the video if there is one.
-            goals: which numbers stand for which goals.
+            text: everything that was said; ignored by a reader that was trained without words.
+            looks: objects found at the first look, and at a later one of the video if there is one.
+            goals: how goals are encoded.
         """
         heard = "" if self.plan["words"] == WORDLESS else text
         seen = seen_things(looks, self.corners, self.vocabulary.classes)
@@ -67,21 +70,23 @@ class TrainedReader:
             task = self.vocabulary.tasks[int(task_scores.argmax())]
             (goal_scores,) = self.net([ListenerInput(task, heard, seen)])
         answers = list(goal_schema(task).goals)
-        return goals.numbers(task, answers[int(goal_scores.argmax())])
+        return goals.encode(task, answers[int(goal_scores.argmax())])
 
 
 def seen_things(
-    looks: Sequence[LookTokens], corners: NDArray[np.float64], classes: Sequence[str]
+    looks: Sequence[Detections], corners: NDArray[np.float64], class_names: Sequence[str]
 ) -> ObjectsInView:
-    """Return the things of one or two looks with their ranks, as the reader of words needs them.
+    """Return the objects of one or two looks with their ranks, as the reader of words needs them.
+
+    A rank is such as *second closest to the button*; see `object_relations`.
 
     Args:
         looks: what the detector found.
-        corners: (4, 2) of the area where things stand, m.
-        classes: names of classes.
+        corners: (4, 2) x and y of the corners of the area where objects stand, m.
+        class_names: in the order of their numbers.
     """
-    places = np.concatenate([look.places for look in looks]).astype(np.float64)
-    return rank_objects([look.classes for look in looks], places, corners, classes)
+    positions = np.concatenate([look.positions for look in looks]).astype(np.float64)
+    return rank_objects([look.classes for look in looks], positions, corners, class_names)
 
 
 def save_reader(reader: TrainedReader, path: Path) -> None:
@@ -105,7 +110,10 @@ def load_reader(path: Path) -> TrainedReader:
 
 
 def _read(file: TrainedFile) -> TrainedReader:
-    """Return the reader of a file: networks made by its description, then given its weights."""
+    """Return the reader of a file: networks made by its description, then given its weights.
+
+    `save_reader` writes what is read here.
+    """
     plan = file.about["plan"]
     vocabulary = Vocabulary.of(file.about["vocabulary"])
     reader = TrainedReader(

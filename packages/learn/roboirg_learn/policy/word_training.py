@@ -1,4 +1,7 @@
-"""Train the reader of a policy: first looks of scenes, and the instructions that go with them."""
+"""Train the reader of a policy: first looks of scenes, and the instructions that go with them.
+
+A reader names task and goal of an instruction in a scene, which it sees by a body's detector.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +23,10 @@ from roboirg_learn.listener.encoders import ENCODERS
 from roboirg_learn.listener.object_relations import ObjectsInView, corners_of
 from roboirg_learn.listener.reader_plan import ReaderPlan
 from roboirg_learn.listener.reader_training import (
-    Lesson,
+    Example,
     check_reader,
+    example_of,
     instructions_of,
-    lesson_of,
     train_reader,
 )
 from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary, words_of
@@ -31,8 +34,8 @@ from roboirg_learn.policy.task_net import TaskNet
 from roboirg_learn.policy.trained_body import TrainedBody
 from roboirg_learn.policy.trained_reader import TrainedReader, seen_things
 from roboirg_learn.trainer import (
+    Checkpoint,
     Course,
-    KeptTraining,
     Progress,
     Training,
     batch_count,
@@ -46,11 +49,11 @@ FORGOTTEN_WORDS = 0.1
 
 
 class SeenScenes(NamedTuple):
-    """Scenes as a body sees them at first.
+    """Scenes as a body's detector sees them at first.
 
     Attributes:
-        seen: what is seen of each, by the episode's key.
-        corners: (4, 2) of the area where things stand, m.
+        seen: the objects found in each scene, with ranks, by the episode's key.
+        corners: (4, 2) x and y of the corners of the area where objects stand, m.
     """
 
     seen: dict[str, ObjectsInView]
@@ -58,10 +61,10 @@ class SeenScenes(NamedTuple):
 
 
 def check_words(plan: ReaderPlan) -> None:
-    """Raise early what would else be raised after hours.
+    """Check the plan of a policy's reader, before hours are spent on it.
 
     Raises:
-        InvalidValueError: the plan cannot be followed.
+        InvalidValueError: the plan cannot be followed; see also `check_reader`.
     """
     check_reader(plan)
     for name in plan.encoders:
@@ -72,98 +75,104 @@ def check_words(plan: ReaderPlan) -> None:
 def train_policy_reader(
     body: TrainedBody, plan: ReaderPlan, folder: Path, name: str, workers: int, progress: Progress
 ) -> TrainedReader:
-    """Train a reader of words for a body: it names task and goal of an instruction in a scene.
+    """Train a reader of words for a body: two networks, which name the task and then the goal.
 
     Args:
         body: of a file; its detector sees the scenes.
         plan: its tasks, settings, passes and seed.
-        folder: for what is learned on the way, from which an interrupted training goes on.
+        folder: for the checkpoints, from which an interrupted training goes on.
         name: of the reader, among those of the folder.
-        workers: processes that draw; 0 uses this one.
+        workers: processes that render; 0 uses this one.
         progress: called with a kind of work, what is done of it, and all of it.
     """
     train = episodes_of(plan.tasks, "train")
     episodes = (*train, *episodes_of(plan.tasks, "random", plan.scenes))
-    scenes = _view_scenes(body, episodes, workers, progress)
-    lessons = _lessons(plan, episodes, scenes)
-    vocabulary = _vocabulary(lessons, body)
+    scenes = _see_scenes(body, episodes, workers, progress)
+    examples = _examples(plan, episodes, scenes)
+    vocabulary = _vocabulary(examples, body)
     about = {**plan.about, "body": body.version}
 
+    # One seed for both networks, so the first must be trained first.
     torch.manual_seed(plan.seed)
-    course = TaskCourse(plan, lessons, vocabulary)
-    kept_tasks = KeptTraining(folder / f"tasks-{name}.pt", about)
-    Training(course).run(partial(progress, "tasks"), kept_tasks)
-    kept_words = KeptTraining(folder / f"words-{name}.pt", about)
-    net = train_reader(lessons, vocabulary, plan, progress, kept_words)
+    course = TaskCourse(plan, examples, vocabulary)
+    task_checkpoint = Checkpoint(folder / f"tasks-{name}.pt", about)
+    Training(course).run(partial(progress, "tasks"), task_checkpoint)
+    reader_checkpoint = Checkpoint(folder / f"words-{name}.pt", about)
+    net = train_reader(examples, vocabulary, plan, progress, reader_checkpoint)
     return TrainedReader(vocabulary, scenes.corners, course.net, net, about)
 
 
-def _vocabulary(lessons: Sequence[Lesson], body: TrainedBody) -> Vocabulary:
-    """Return the words of lessons, with classes, tasks and parts of goals as the body has them."""
-    words = words_of(lesson.given.text for lesson in lessons)
-    return Vocabulary(words, body.sight.classes, body.goals.tasks, body.goals.parts)
+def _vocabulary(examples: Sequence[Example], body: TrainedBody) -> Vocabulary:
+    """Return the words of examples, with classes, tasks and parts of goals as the body has them.
+
+    So numbers mean the same to both; `load_policy` refuses others.
+    """
+    words = words_of(example.given.text for example in examples)
+    return Vocabulary(words, body.object_classes.names, body.goals.tasks, body.goals.parts)
 
 
-def _lessons(plan: ReaderPlan, episodes: Sequence[Episode], scenes: SeenScenes) -> list[Lesson]:
-    """Return what a reader learns: an instruction, what is seen at first, and the goal meant.
+def _examples(plan: ReaderPlan, episodes: Sequence[Episode], scenes: SeenScenes) -> list[Example]:
+    """Return what a reader learns: instructions, each with what is seen at first and its goal.
 
     A plan without settings makes a reader without words: one empty instruction for each episode.
     """
     instructions = [(episode, "") for episode in episodes]
     if plan.settings:
         instructions = list(instructions_of(episodes, plan))
-    lessons = []
+    examples = []
     for episode, text in instructions:
         given = ListenerInput(episode.task, text, scenes.seen[episode.key])
-        lessons.append(lesson_of(given, episode))
-    return lessons
+        examples.append(example_of(given, episode))
+    return examples
 
 
-def _view_scenes(
+def _see_scenes(
     body: TrainedBody, episodes: Sequence[Episode], workers: int, progress: Progress
 ) -> SeenScenes:
-    """Draw the first pictures of episodes, and return what the body's detector finds in them.
+    """Render the first pictures of episodes, and return what the body's detector finds in them.
 
     No expert plays the episodes.
     """
     looks = {}
-    positions = []
+    positions = []  # of all objects that the simulator shows, for the corners
     for episode, views in parallel_map(views_at_start, episodes, workers):
         looks[episode.key] = body.see([view.picture for view in views])
         positions.append(views[0].positions)
         progress("scenes", len(looks), len(episodes))
     corners = corners_of(np.concatenate(positions))
     seen = {}
-    for key, tokens in looks.items():
-        seen[key] = seen_things(tokens, corners, body.sight.classes)
+    for key, detections in looks.items():
+        seen[key] = seen_things(detections, corners, body.object_classes.names)
     return SeenScenes(seen, corners)
 
 
-class TaskCourse(Course[Lesson]):
+class TaskCourse(Course[Example]):
     """A small network learns which task an instruction is of; some words are left out."""
 
     net: TaskNet
-    rate = TASK_RATE
+    learning_rate = TASK_RATE
     epochs = TASK_EPOCHS
 
-    def __init__(self, plan: ReaderPlan, lessons: Sequence[Lesson], vocabulary: Vocabulary) -> None:
+    def __init__(
+        self, plan: ReaderPlan, examples: Sequence[Example], vocabulary: Vocabulary
+    ) -> None:
         self._seed = plan.seed
         self._rng = random.Random(plan.seed)
-        self._lessons = lessons
+        self._examples = examples
         self._tasks = vocabulary.tasks
         self.net = TaskNet(vocabulary)
-        self.steps = batch_count(lessons)
+        self.steps_per_epoch = batch_count(examples)
 
-    def batches(self, epoch: int) -> Iterator[list[Lesson]]:
-        """Yield the lessons in random batches; the seed also decides which words are left out."""
+    def batches(self, epoch: int) -> Iterator[list[Example]]:
+        """Yield the examples in random batches; the seed also decides which words are left out."""
         self._rng.seed(f"{self._seed}/{epoch}")
-        return batches(self._lessons, self._rng)
+        return batches(self._examples, self._rng)
 
-    def loss(self, batch: Sequence[Lesson]) -> torch.Tensor:
+    def loss(self, batch: Sequence[Example]) -> torch.Tensor:
         """Return the mean cross-entropy of the tasks, named from texts that lack some words."""
-        texts = [_without_some_words(lesson.given.text, self._rng) for lesson in batch]
-        right = [self._tasks.index(lesson.given.task) for lesson in batch]
-        scores = self.net(texts, [lesson.given.seen for lesson in batch])
+        texts = [_without_some_words(example.given.text, self._rng) for example in batch]
+        right = [self._tasks.index(example.given.task) for example in batch]
+        scores = self.net(texts, [example.given.seen for example in batch])
         return functional.cross_entropy(scores, torch.tensor(right))
 
 

@@ -31,16 +31,16 @@ Direction = NDArray[np.float64]
 
 
 def grasp_rotations(name: str, bodies: Mapping[str, Body], tool: Rotation) -> list[Rotation]:
-    """Return rotations of the tool for grasping an object, best first.
+    """Return rotations of the tool for grasping an object, best first: four for a flat cube.
 
     Args:
         name: of the object.
-        bodies: all objects, by name.
+        bodies: all objects, by name; the others are obstacles.
         tool: the tool's current rotation.
     """
     grasped = bodies[name]
     center = grasped.position
-    closing_now = tool.as_matrix()[:2, 1]
+    closing_now = tool.as_matrix()[:2, 1]  # fingers close along the tool's y axis
     obstacles: list[Footprint] = []
     for other, body in bodies.items():
         if other != name:
@@ -55,7 +55,10 @@ def grasp_rotations(name: str, bodies: Mapping[str, Body], tool: Rotation) -> li
 
 
 def _sides(body: Body) -> list[Direction]:
-    """Return the directions in which an object's horizontal axes point, both ways."""
+    """Return the directions in which an object's horizontal axes point, both ways.
+
+    A cube that lies flat has four of them.
+    """
     sides: list[Direction] = []
     for axis in body.entity.pose.to_transformation_matrix()[:3, :3].T:
         if abs(axis[2]) < STEEPEST_SIDE:
@@ -72,7 +75,7 @@ def _is_blocked(fingers: Sequence[Rectangle], obstacles: Sequence[Footprint]) ->
 
 
 def _fingers(center: Point, side: Direction) -> list[Rectangle]:
-    """Return the areas of open fingers around a point that will close along a direction."""
+    """Return the two areas of open fingers around a point that will close along a direction."""
     yaw = math.atan2(side[1], side[0])
     fingers = []
     for sign in (1.0, -1.0):
@@ -83,7 +86,7 @@ def _fingers(center: Point, side: Direction) -> list[Rectangle]:
 
 
 def _footprints(body: Body) -> Iterator[Footprint]:
-    """Yield the areas near the table that an object blocks."""
+    """Yield the area near the table that an object blocks; none for flat objects."""
     x, y, _ = body.position
     half = body.item.half_width
     if body.item.kind == "tape":
@@ -93,7 +96,11 @@ def _footprints(body: Body) -> Iterator[Footprint]:
 
 
 def _rotation(closing: Direction) -> Rotation:
-    """Return the tool's rotation with the fingers down, closing along a direction."""
+    """Return the tool's rotation with the fingers down, closing along a direction.
+
+    The columns of its matrix are the tool's axes: z is where the fingers point, y along which they
+    close.
+    """
     along = np.array([*closing, 0.0])
     approach = np.array([0.0, 0.0, -1.0])
     return Rotation.from_matrix(np.stack([np.cross(along, approach), along, approach], axis=1))

@@ -58,7 +58,7 @@ class ToolPose(NamedTuple):
 
 
 class MotionPlanner:
-    """Motion planner of one robot."""
+    """Motion planner of one robot; it computes, and moves nothing."""
 
     def __init__(self, robot: Panda) -> None:
         self._model = robot.articulation.create_pinocchio_model()
@@ -71,7 +71,7 @@ class MotionPlanner:
         self._other_starts = self._low + shares * (self._high - self._low)
 
     def forward_kinematics(self, arm: Vector) -> ToolPose:
-        """Return the tool pose at arm joint positions (7)."""
+        """Return the tool pose in the world frame at arm joint positions (7), rad."""
         self._model.compute_forward_kinematics(_with_fingers(arm))
         pose = self._model.get_link_pose(self._tool)
         return ToolPose(np.asarray(pose.p, dtype=np.float64) + ROBOT_BASE, rotation_of(pose))
@@ -89,7 +89,11 @@ class MotionPlanner:
         return time_parameterize(self._waypoints(arm, goal))
 
     def plan_move(self, arm: Vector, goal: ToolPose) -> Vector:
-        """Plan as `plan_straight`, but via home if the straight line is not feasible."""
+        """Plan as `plan_straight`, but via home if the straight line is not feasible.
+
+        Raises:
+            MotionPlanningError: it is not feasible from home either.
+        """
         try:
             return self.plan_straight(arm, goal)
         except MotionPlanningError:
@@ -116,7 +120,10 @@ class MotionPlanner:
         raise MotionPlanningError(f"No joint positions reach {_format_position(goal)}.")
 
     def _solve_within_limits(self, start: Vector, goal: ToolPose) -> Vector | None:
-        """Solve for a pose by damped Newton steps within the limits; None if it fails."""
+        """Return joint positions (7) that reach a pose, or None if they are not found.
+
+        Damped Newton steps from a start, clipped to the joint limits.
+        """
         arm = np.clip(start, self._low, self._high)
         error = self._pose_error(arm, goal)
         for _ in range(INVERSE_ITERATIONS):
@@ -134,9 +141,10 @@ class MotionPlanner:
         return arm
 
     def _limited_newton_step(self, arm: Vector, error: Vector) -> Vector:
-        """Return a Newton step of the joints that are not blocked by a limit.
+        """Return a Newton step (7) of the joints that are not blocked by a limit.
 
-        Without the blocked joints the others move farther, which can block some of them as well.
+        A joint is blocked if it is at a limit and the step would leave it. Without the blocked
+        joints the others move farther, which can block some of them as well.
         """
         is_free = np.ones(ARM_JOINTS, dtype=bool)
         step = self._newton_step(arm, error)
@@ -153,7 +161,9 @@ class MotionPlanner:
     def _newton_step(
         self, arm: Vector, error: Vector, is_free: NDArray[np.bool_] | None = None
     ) -> Vector:
-        """Return the smallest change of the joints that corrects a small pose error.
+        """Return the smallest change (7) of the joints, rad, that corrects a small pose error.
+
+        It is Jᵀ (J Jᵀ + damping)⁻¹ error, with the Jacobian J of the tool's pose.
 
         Args:
             arm: joint positions (7), rad.
@@ -169,7 +179,10 @@ class MotionPlanner:
         return np.asarray(jacobian.T @ np.linalg.solve(gain, error))
 
     def _pose_error(self, arm: Vector, goal: ToolPose) -> Vector:
-        """Return the error to a pose (6): meters, then radians, in the tool's frame."""
+        """Return the error to a pose (6) in the tool's frame: position, m, rotation vector, rad.
+
+        It is what the tool still has to move to reach the goal.
+        """
         current = self.forward_kinematics(arm)
         # Clipped, because huge offsets would overflow.
         offset = np.clip(goal.position - current.position, -MAX_TRAVEL, MAX_TRAVEL)
@@ -178,7 +191,11 @@ class MotionPlanner:
         return np.concatenate([to_tool.apply(offset), turn.as_rotvec()])
 
     def _waypoints(self, arm: Vector, goal: ToolPose) -> Vector:
-        """Return joint positions (n, 7) along a straight line of the tool, its ends included."""
+        """Return joint positions (n, 7) along a straight line of the tool, its ends included.
+
+        Position and rotation change by the same share from one to the next, at most by
+        `WAYPOINT_DISTANCE` and `WAYPOINT_ANGLE`.
+        """
         start = self.forward_kinematics(arm)
         offset = goal.position - start.position
         if _largest(offset) > MAX_TRAVEL:
@@ -195,7 +212,11 @@ class MotionPlanner:
         return np.stack(points)
 
     def _solve_near(self, pose: ToolPose, seed: Vector) -> Vector:
-        """Return the joint positions nearest to `seed` that reach `pose` (damped Newton)."""
+        """Return the joint positions (7) near `seed` that reach `pose`, by damped Newton steps.
+
+        Raises:
+            MotionPlanningError: there are none so near, or the way there is not straight.
+        """
         arm = seed.copy()
         for _ in range(MAX_ITERATIONS):
             error = self._pose_error(arm, pose)
@@ -207,7 +228,15 @@ class MotionPlanner:
         )
 
     def _check_step(self, arm: Vector, seed: Vector) -> Vector:
-        """Return the joint positions of a waypoint, given those of the one before it."""
+        """Return the joint positions of a waypoint, if the arm can go there from the one before.
+
+        Args:
+            arm: joint positions (7) of the waypoint.
+            seed: those of the one before it.
+
+        Raises:
+            MotionPlanningError: a joint would exceed its limit, or swing around.
+        """
         if bool(((arm < self._low) | (arm > self._high)).any()):
             raise MotionPlanningError("A straight move would exceed a joint limit.")
         if _largest(arm - seed) > MAX_JOINT_STEP:
@@ -226,5 +255,6 @@ def _with_fingers(arm: Vector) -> Vector:
 
 
 def _format_position(pose: ToolPose) -> str:
+    """Return a position for messages: "(0.100, 0.000, 0.150)"."""
     x, y, z = pose.position
     return f"({x:.3f}, {y:.3f}, {z:.3f})"

@@ -66,7 +66,11 @@ class Approach(NamedTuple):
 
 
 class MotionPrimitives:
-    """Plans the movements of primitives in one world; ``_do_KIND`` is the routine of each kind."""
+    """Plans the movements of motion primitives in one world, such as *pick_cube* or *press*.
+
+    ``_do_KIND`` is the routine of each kind. Each yields joint trajectories (n, 8): one is planned
+    when the one before has been executed, from where robot and objects are then.
+    """
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -84,6 +88,7 @@ class MotionPrimitives:
         yield from routine(primitive)
 
     def _do_pick_cube(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+        """Yield the trajectories that pick a cube; if it fails, again with narrow fingers."""
         for opening in (OPEN, NARROW):
             yield from self._grasp_and_lift(primitive.subject, opening)
             if Fact("picked", primitive.subject) in self._world.facts:
@@ -114,6 +119,7 @@ class MotionPrimitives:
     _do_put_into = _do_place_on
 
     def _do_drop_into(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+        """Yield the trajectories that let an object fall into a bin, and draw the hand back."""
         place = self._place(primitive)
         rotation = self._rotation()
         yield self._move_over(place, BIN_RELEASE, rotation)
@@ -122,16 +128,19 @@ class MotionPrimitives:
         yield self._move_over(back, BIN_RELEASE, rotation)
 
     def _do_move_over(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+        """Yield the trajectory that carries what is held over a place."""
         yield self._move_over(self._place(primitive), OVER_TARGET, self._rotation())
 
     def _do_press(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+        """Yield the trajectories that go over a button and press it."""
         yield self._move_over(self._position(primitive.subject), CUBE_HOVER, STRAIGHT_DOWN)
         yield from self._do_press_below(primitive)
 
     def _do_press_below(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         """Yield the trajectories that press the button below the hand, when its time has come.
 
-        `primitive.steps` is the step at which it shall be pressed.
+        `primitive.steps` is the control step, since the start of the world, at which it shall be
+        pressed; the hand waits above as long as it must. Without waiting, 0 presses at once.
         """
         button = self._position(primitive.subject)
         yield self._grip(CLOSED)
@@ -144,7 +153,7 @@ class MotionPrimitives:
         yield self._move_over(button, CUBE_HOVER, STRAIGHT_DOWN)
 
     def _steps_to_press(self, down: JointTrajectory) -> int:
-        """Return the number of control steps of a descent until the button is pressed."""
+        """Return the number of control steps of a descent (n, 8) until the button is pressed."""
         steps_above = 0
         for arm in down[:, :ARM_JOINTS]:
             tool = self._planner.forward_kinematics(arm)
@@ -153,10 +162,12 @@ class MotionPrimitives:
         return steps_above + ARM_LAG
 
     def _do_hover(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+        """Yield the trajectories that wait over a button, with closed fingers."""
         yield self._move_over(self._position(primitive.subject), CUBE_HOVER, STRAIGHT_DOWN)
         yield self._grip(CLOSED)
 
     def _do_pick_container(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+        """Yield the trajectories that lift a container by its knob."""
         yield self._grip(OPEN)
         container = self._position(primitive.subject)
         approach = self._approach(primitive.subject, CONTAINER_HOVER)
@@ -181,6 +192,7 @@ class MotionPrimitives:
         yield self._move_over(start, CUBE_HOVER, rotation)
 
     def _do_hold(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+        """Yield trajectories at rest with open fingers, for at least `primitive.steps` steps."""
         for _ in range(0, primitive.steps, GRIPPER_STEPS):
             yield self._grip(OPEN)
 
@@ -191,11 +203,13 @@ class MotionPrimitives:
             yield self._grip(CLOSED)[:steps_left]
 
     def _do_retreat(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+        """Yield the trajectories that move the hand aside, open it, and hold."""
         yield self._move(ASIDE, self._rotation())
         yield self._grip(OPEN)
         yield from self._do_hold(primitive)
 
     def _do_go_home(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+        """Yield the trajectories that open the gripper and drive the joints home."""
         del primitive
         yield self._grip(OPEN)
         yield np.tile(HOME_ACTION, (HOMING_STEPS, 1))
@@ -207,7 +221,7 @@ class MotionPrimitives:
         return with_gripper(at_rest, gripper)
 
     def _approach(self, name: str, height: float) -> Approach:
-        """Plan a move to above an object, with the rotation for grasping it."""
+        """Plan a move to a height above the table, m, over an object, turned for grasping it."""
         rotations = grasp_rotations(name, self._world.bodies, self._rotation())
         return self._plan_any(_above(self._position(name), height), rotations)
 
@@ -222,7 +236,11 @@ class MotionPrimitives:
     def _plan_any(self, position: Point, rotations: Sequence[Rotation]) -> Approach:
         """Plan a move with the first of some rotations that the wrist can take.
 
-        At the edge of the workspace the move ends up to 1 cm nearer to the robot.
+        At the edge of the workspace the move ends up to 1 cm nearer to the robot; the full way is
+        tried first, with every rotation.
+
+        Raises:
+            MotionPlanningError: none can be taken, not even nearer to the robot.
         """
         errors = []
         for shortfall, rotation in itertools.product(SHORTFALLS, rotations):
@@ -234,11 +252,13 @@ class MotionPrimitives:
         raise errors[len(rotations) - 1]  # of the place itself, with the last rotation
 
     def _plan(self, position: Point, rotation: Rotation) -> JointTrajectory:
+        """Plan a move from where the arm is now, with the gripper as it is."""
         goal = ToolPose(np.asarray(position, dtype=np.float64), rotation)
         path = self._planner.plan_move(self._world.robot.arm_positions, goal)
         return with_gripper(path, self._gripper)
 
     def _position(self, name: str) -> Point:
+        """Return where an object is now, world frame, m."""
         return self._world.bodies[name].position
 
     def _place(self, primitive: Primitive) -> Point:
@@ -256,7 +276,7 @@ def _above(place: Point, height: float) -> Point:
 
 
 def _towards_robot(place: Point, distance: float) -> Point:
-    """Return the place moved in the plane towards the robot's base."""
+    """Return the place moved in the plane towards the robot's base by a distance, m."""
     x = place.x - ROBOT_BASE[0]
     y = place.y - ROBOT_BASE[1]
     share = distance / math.hypot(x, y)

@@ -33,7 +33,7 @@ class Thing(NamedTuple):
 
 
 def present_things(world: World, kinds: Collection[str]) -> tuple[Thing, ...]:
-    """Return the objects of some kinds that are in the world now."""
+    """Return the objects of some kinds that are in the world now, with their pixels."""
     return tuple(
         Thing(body.item, origin_pixel(body))
         for name, body in world.bodies.items()
@@ -70,9 +70,12 @@ def held_thing(world: World) -> str | None:
 
 
 def origin_pixel(body: Body) -> Point | None:
-    """Return row and column of an object's origin in the front picture; None outside of it."""
+    """Return row and column of an object's origin in the front picture; None outside of it.
+
+    It is a pinhole projection; an object that is hidden has a pixel, too.
+    """
     frame = sapien.Pose(np.asarray(body.position))
-    x, y, z = to_front_camera(frame)[:3, 3]
+    x, y, z = to_front_camera(frame)[:3, 3]  # m: right, down, forward
     if z <= 0:  # behind the camera
         return None
     row = round(PICTURE_SIZE / 2 + FOCAL_LENGTH * float(y / z))

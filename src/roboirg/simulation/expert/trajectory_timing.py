@@ -94,16 +94,19 @@ def _toppra() -> ModuleType:
 
 
 def _resample(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return points on a path a fixed distance apart; the last is closer to the one before it.
+    """Return points on a path `WAYPOINT_SPACING` apart; the last is closer to the one before it.
 
     A path that goes nowhere is one point.
+
+    Args:
+        points: (n, 7) joint positions, rad, between which the path is straight.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     distances = np.concatenate([[0.0], np.cumsum(steps)])  # along the path, from its start
     total = distances[-1]
-    places = np.arange(0.0, total - SMALLEST_JOINT_STEP, WAYPOINT_SPACING)
-    if len(places) == 0:
+    wanted = np.arange(0.0, total - SMALLEST_JOINT_STEP, WAYPOINT_SPACING)
+    if len(wanted) == 0:
         return points[:1]
-    places = np.append(places, total)
-    joints = [np.interp(places, distances, positions) for positions in points.T]
+    wanted = np.append(wanted, total)
+    joints = [np.interp(wanted, distances, positions) for positions in points.T]
     return np.stack(joints, axis=1)

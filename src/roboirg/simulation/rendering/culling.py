@@ -21,7 +21,7 @@ import sapien.render
 from numpy.typing import NDArray
 
 from roboirg.core.observations import CAMERAS
-from roboirg.simulation.rendering.viewpoint import NEAR
+from roboirg.simulation.rendering.viewpoint import NEAR, transformed
 
 MARGIN = 0.002
 """Meters by which boxes grow before the test."""
@@ -35,14 +35,14 @@ LEFT_OUT = 99
 
 PLANE = 0
 POINT = -1
-"""Axes of `_outside`; those between are of bodies."""
+"""First and last axis of what `_outside` returns; an axis between is of bodies."""
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class CullableBody:
-    """Culling data of a body.
+    """What is known of a body for culling: its convex hull, and which cameras may draw it.
 
     Attributes:
         hull: vertices (n, 3) of its convex hull in the frame of its entity, m.
@@ -54,7 +54,12 @@ class CullableBody:
 
 
 class CullableBodies:
-    """All render bodies of a finished scene; those without culling data are tested by boxes."""
+    """All render bodies of a finished scene, numbered; it decides which of them a camera draws.
+
+    Args:
+        scene: with all its bodies.
+        cullable_bodies: culling data of some; the others are tested by their boxes alone.
+    """
 
     def __init__(
         self,
@@ -62,7 +67,9 @@ class CullableBodies:
         cullable_bodies: Mapping[sapien.render.RenderBodyComponent, CullableBody],
     ) -> None:
         self._bodies = _render_bodies(scene)
-        self._hulls: dict[int, Floats] = {}  # by the number of the body
+        # Hulls by the number of the body, as homogeneous columns (4, k).
+        self._hulls: dict[int, Floats] = {}
+        # By camera: whether it may draw each body.
         self._drawn_by = {camera: np.ones(len(self._bodies), dtype=bool) for camera in CAMERAS}
         boxes = []
         for number, body in enumerate(self._bodies):
@@ -75,22 +82,22 @@ class CullableBodies:
                 for camera in CAMERAS:
                     self._drawn_by[camera][number] = camera in cullable.cameras
             boxes.append(_columns(_corners(points, MARGIN)))
-        self._boxes = np.stack(boxes)
+        self._boxes = np.stack(boxes)  # corners of each body's box as columns, (n, 4, 8)
         # Which bodies have the shading mode of drawn ones now, and in each command buffer.
         self._drawn = np.ones(len(self._bodies), dtype=bool)
         self._buffered: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
 
     def poses(self) -> Floats:
-        """Return the current poses of the bodies, (n, 4, 4)."""
+        """Return the current poses of the bodies in the world frame, (n, 4, 4)."""
         return np.stack([body.entity.pose.to_transformation_matrix() for body in self._bodies])
 
     def visible(self, camera: str, poses: Floats, view: Floats) -> NDArray[np.bool_]:
-        """Return for each body whether a camera draws it.
+        """Return for each body whether a camera draws it: (n,).
 
         Args:
             camera: name of the camera.
-            poses: poses of the bodies, (n, 4, 4).
-            view: extrinsic matrix of the camera (3, 4).
+            poses: as of `poses`, (n, 4, 4).
+            view: extrinsic matrix of the camera (3, 4), from the world to the camera (OpenCV).
         """
         to_camera = view @ poses  # (n, 3, 4), from the frame of each body
         outside = _outside(to_camera @ self._boxes)
@@ -106,7 +113,12 @@ class CullableBodies:
     def take_picture(
         self, camera: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]
     ) -> None:
-        """Start drawing these bodies with a camera; the picture is fetched later."""
+        """Start drawing these bodies with a camera; the picture is fetched later.
+
+        Args:
+            camera: of the scene.
+            visible: (n,) as of `visible`; the array is kept, so it must not change.
+        """
         # Set the modes even if the command buffer is kept: another change may invalidate it.
         for number in np.flatnonzero(visible != self._drawn):
             self._bodies[number].shading_mode = DRAWN if visible[number] else LEFT_OUT
@@ -120,18 +132,19 @@ class CullableBodies:
 
 def _render_bodies(scene: sapien.Scene) -> list[sapien.render.RenderBodyComponent]:
     """Return the components of a scene's entities that are drawn."""
-    return [
-        component
-        for entity in scene.entities
-        for component in entity.components
-        if isinstance(component, sapien.render.RenderBodyComponent)
-    ]
+    found: list[sapien.render.RenderBodyComponent] = []
+    for entity in scene.entities:
+        for component in entity.components:
+            if isinstance(component, sapien.render.RenderBodyComponent):
+                found.append(component)
+    return found
 
 
 def _outside(points: Floats, margin: float = 0.0) -> NDArray[np.bool_]:
-    """Return for each plane that bounds a view, (5, ..., k), which points are outside of it.
+    """Return for each plane that bounds a view which points are outside of it: (5, ..., k).
 
-    The half angle of view is 45 degrees, so the planes are z = NEAR, |x| = z and |y| = z.
+    The half angle of view is 45 degrees, so the planes are z = NEAR, |x| = z and |y| = z. A point
+    that is a margin m outside of |x| = z has |x| = z + √2 m.
 
     Args:
         points: (..., 3, k), m, one a column, in the camera's frame: x right, y down, z forward
@@ -147,7 +160,7 @@ def _reach_view(outside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return for each body whether it may be seen: no plane has all its points outside.
 
     Args:
-        outside: as of `_outside`.
+        outside: (5, ..., k) as of `_outside`; the result is (...).
     """
     return np.asarray(~np.any(np.all(outside, axis=POINT), axis=PLANE))
 
@@ -163,12 +176,12 @@ _corners_of_files: dict[tuple[object, ...], Floats] = {}
 
 
 def _columns(points: Floats) -> Floats:
-    """Return points (n, 3) as homogeneous columns (4, n)."""
+    """Return points (n, 3) as homogeneous columns (4, n), to be multiplied by pose matrices."""
     return np.stack([*points.T, np.ones(len(points))])
 
 
 def _corners(points: NDArray[np.floating], margin: float = 0.0) -> Floats:
-    """Return the corners (8, 3) of the box around points (n, 3), grown by a margin."""
+    """Return the corners (8, 3) of the box around points (n, 3), m, grown by a margin, m."""
     low = points.min(axis=0).astype(np.float64) - margin
     high = points.max(axis=0).astype(np.float64) + margin
     return np.array(list(itertools.product(*zip(low, high, strict=True))))
@@ -179,7 +192,7 @@ def _points(body: sapien.render.RenderBodyComponent) -> Floats:
     points = []
     for shape in body.render_shapes:
         matrix = shape.local_pose.to_transformation_matrix()
-        points.append(_shape_corners(shape) @ matrix[:3, :3].T + matrix[:3, 3])
+        points.append(transformed(_shape_corners(shape), matrix))
     return np.concatenate(points)
 
 

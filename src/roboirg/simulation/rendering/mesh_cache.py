@@ -27,7 +27,7 @@ def cached_arrays(name: str, sources: bytes, make: Callable[[], Arrays]) -> Arra
 
     Args:
         name: beginning of the entry's name, for people who look into the cache.
-        sources: everything that determines the arrays.
+        sources: everything that determines the arrays, such as `source_code` of what makes them.
         make: makes them.
     """
     cache = open_cache("meshes")
@@ -44,7 +44,9 @@ def cached_arrays(name: str, sources: bytes, make: Callable[[], Arrays]) -> Arra
 def pack_arrays(arrays: Arrays) -> bytes:
     """Pack arrays into bytes: the header's length, a JSON header, then the arrays' numbers.
 
-    NumPy's own format takes several times as long to read, because it copies.
+    The header is ``{name: [type, shape]}``; each part is padded to a multiple of `_WORD` bytes.
+    `unpack_arrays` reads it. NumPy's own format takes several times as long to read, because it
+    copies.
     """
     formats = {name: (array.dtype.str, array.shape) for name, array in arrays.items()}
     header = json.dumps(formats)
@@ -54,7 +56,7 @@ def pack_arrays(arrays: Arrays) -> bytes:
 
 
 def _padding(length: int) -> bytes:
-    """Return the zeros between a part of some length and the next multiple of `_WORD`."""
+    """Return the zero bytes from a length up to the next multiple of `_WORD`: 13 → 3 of them."""
     return bytes(-length % _WORD)
 
 
@@ -74,5 +76,8 @@ def unpack_arrays(content: memoryview) -> Arrays:
 
 @functools.cache
 def source_code(*modules: str) -> bytes:
-    """Return the source code of modules in this folder, as part of cache keys."""
+    """Return the source code of modules in this folder, as part of cache keys.
+
+    With it a changed module never reads what the old one made.
+    """
     return b"".join((Path(__file__).parent / f"{name}.py").read_bytes() for name in modules)

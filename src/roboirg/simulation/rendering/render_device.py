@@ -108,15 +108,22 @@ def render_system(*, keep_engine: bool = True) -> sapien.render.RenderSystem:
 
 @functools.cache
 def _chosen_device() -> sapien.Device:
+    """Return the device that this process draws on."""
     return find_render_device()
 
 
 @functools.cache
 def _engine_keeper() -> sapien.render.RenderSystem:
+    """Return a render system that lives as long as the process, and no scene uses."""
     return _new_system(_chosen_device())
 
 
 def _new_system(device: sapien.Device) -> sapien.render.RenderSystem:
+    """Return a new render system on a device.
+
+    Raises:
+        RenderDeviceError: the device cannot render.
+    """
     try:
         with DRAWING:
             return _sapien().render.RenderSystem(device)
@@ -140,6 +147,7 @@ def to_unset(*names: str) -> str:
 
 @functools.cache
 def _sapien() -> ModuleType:
+    """Import SAPIEN, which says less than usual from then on."""
     with extra_needed("Playing episodes needs the simulator", "sim"):
         # By name, so that this module loads without SAPIEN.
         sapien = importlib.import_module("sapien")

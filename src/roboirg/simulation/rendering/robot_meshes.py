@@ -1,7 +1,8 @@
 """The robot's meshes in a form that is fast to draw, derived from the installed files.
 
-The installed meshes are flat-shaded, with three vertices for each triangle; the derived ones share
-vertices and are cached between processes.
+A mesh has parts, each with its material. The installed meshes are flat-shaded, with three vertices
+for each triangle; the derived ones share vertices and are cached between processes as arrays with
+the number of their part: ``vertices0``, ``normals0``, ``triangles0``, ``material0``, …
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from roboirg.simulation.rendering.triangles import (
     duplicate_vertices,
     index_triangles,
 )
-from roboirg.simulation.rendering.viewpoint import reach_pixels, to_front_camera
+from roboirg.simulation.rendering.viewpoint import reach_pixels, to_front_camera, transformed
 
 FINGER = "finger.glb"
 """Never simplified, because the wrist camera sees it from very near."""
@@ -58,7 +59,7 @@ class _InstalledPart(NamedTuple):
 
 
 def _material_numbers(material: sapien.render.RenderMaterial) -> Numbers:
-    """Return a material without textures as numbers."""
+    """Return a material without textures as numbers; `_make_material` reads them."""
     return (
         *material.emission,
         *material.base_color,
@@ -88,10 +89,10 @@ def link_shapes(
 
     Args:
         path: the installed mesh.
-        material: material for files without one.
+        material: material for files without one; None for SAPIEN's default.
         rendering: faithful or light.
-        fixed_at: fixed pose of the mesh in the world frame; keeps only what reaches a
-            pixel of the front camera there.
+        fixed_at: pose of a mesh that never moves, in the world frame: only triangles that reach a
+            pixel of the front camera are kept. None keeps all.
     """
     material_numbers: Numbers = ()
     if material is not None:
@@ -125,7 +126,10 @@ def _shapes(
     rendering: RenderSettings,
     fixed_at: Numbers | None,
 ) -> Sequence[sapien.render.RenderShapeTriangleMesh]:
-    """Return the shapes of `link_shapes`, made once and shared by all worlds of the process."""
+    """Return the shapes of `link_shapes`, made once and shared by all worlds of the process.
+
+    Arguments are as there, as numbers, because the cache needs what can be hashed.
+    """
     arrays = _mesh_arrays(path, rendering)
     drawn = arrays
     if fixed_at is not None:
@@ -149,7 +153,7 @@ def _shapes(
 
 
 def _parts(arrays: Arrays) -> list[IndexedTriangles]:
-    """Return the triangles of each part of a mesh, which `_numbered` has written."""
+    """Return the triangles of each part of a mesh; the reverse of `_numbered`."""
     parts: list[IndexedTriangles] = []
     while f"triangles{len(parts)}" in arrays:
         number = len(parts)
@@ -159,7 +163,7 @@ def _parts(arrays: Arrays) -> list[IndexedTriangles]:
 
 
 def _numbered(part: IndexedTriangles, number: int) -> Arrays:
-    """Return a part's arrays under names with its number, such as ``vertices0``."""
+    """Return a part's arrays under names with its number, such as ``vertices0``; see `_parts`."""
     return {f"{field}{number}": array for field, array in part._asdict().items()}
 
 
@@ -167,14 +171,15 @@ def _mesh_arrays(path: Path, rendering: RenderSettings) -> Arrays:
     """Return the derived form of an installed mesh, from the cache if it is there.
 
     Each part has arrays with its number, such as ``vertices0``, ``normals0``, ``triangles0`` and
-    ``material0``. The entry ``hull`` has the vertices of the convex hull of all parts.
+    ``material0`` (empty where the file has none). The entry ``hull`` has the vertices (n, 3) of the
+    convex hull of all parts, m.
     """
     derive = partial(_derive_arrays, path, is_light=_is_light(path, rendering))
     return cached_arrays(_cache_name(path, rendering), _source_bytes(), derive)
 
 
 def _derive_arrays(path: Path, *, is_light: bool) -> Arrays:
-    """Make the arrays of `_mesh_arrays` from the installed file."""
+    """Make the arrays of `_mesh_arrays` from the installed file; light meshes are simplified."""
     arrays: Arrays = {}
     for number, part in enumerate(_read_installed_mesh(path)):
         triangles = part.triangles
@@ -194,7 +199,12 @@ def _derive_arrays(path: Path, *, is_light: bool) -> Arrays:
 def _front_mesh_arrays(path: Path, rendering: RenderSettings, fixed_at: Numbers) -> Arrays:
     """Return the arrays of `_mesh_arrays`, with only what reaches a pixel of the front camera.
 
-    The mesh is opaque and never moves.
+    The mesh is opaque and never moves. Materials and hull are left out.
+
+    Args:
+        path: the installed mesh.
+        rendering: faithful or light.
+        fixed_at: its pose in the world frame, as numbers.
     """
     name = f"{_cache_name(path, rendering)}-front"
     sources = _source_bytes() + source_code("viewpoint") + repr(fixed_at).encode()
@@ -208,14 +218,14 @@ def _derive_front_arrays(path: Path, rendering: RenderSettings, fixed_at: Number
     arrays: Arrays = {}
     for number, part in enumerate(_parts(_mesh_arrays(path, rendering))):
         whole = part.to_triangles()
-        is_shown = reach_pixels(whole.corners @ to_camera[:3, :3].T + to_camera[:3, 3])
+        is_shown = reach_pixels(transformed(whole.corners, to_camera))
         shown = Triangles(whole.corners[is_shown], whole.normals[is_shown])
         arrays |= _numbered(index_triangles(shown), number)
     return arrays
 
 
 def _is_light(path: Path, rendering: RenderSettings) -> bool:
-    """Return whether a mesh is drawn with fewer triangles than it shows."""
+    """Return whether a mesh is drawn with fewer triangles than are visible."""
     return rendering.meshes == "light" and path.name != FINGER
 
 
@@ -245,11 +255,11 @@ def _read_installed_mesh(path: Path) -> list[_InstalledPart]:
 
 
 def simplify(corners: NDArray[np.float32], *, share: float) -> Triangles:
-    """Return nearly the same shape with fewer triangles.
+    """Return nearly the same shape with fewer triangles; those without area are left out.
 
     Args:
         corners: corners of the triangles, (n, 3, 3), meters.
-        share: share of triangles to keep.
+        share: share of triangles to keep, 0 to 1.
     """
     with extra_needed("Light meshes need fast-simplification", "light"):
         import fast_simplification

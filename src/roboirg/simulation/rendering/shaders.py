@@ -45,7 +45,7 @@ FIRST_CORNER = 2
 
 
 class _Patch(NamedTuple):
-    """A change of a shader file.
+    """A change of a shader file: the text from `start` to just before `end` is replaced.
 
     Attributes:
         file: name of the file.
@@ -120,7 +120,11 @@ _log = logging.getLogger(__name__)
 
 @functools.cache
 def slim_shader() -> str:
-    """Return the folder of the patched shader."""
+    """Return the folder of the patched shader, as SAPIEN takes it.
+
+    Raises:
+        InvalidValueError: the installed shader is not the one that the patches are for.
+    """
     texts = _read_installed_shader()
     if _digest(texts) != _STOCK_SHA256:
         raise InvalidValueError(
@@ -155,10 +159,12 @@ def _read_installed_shader() -> dict[str, str]:
 
 
 def _shader_folder() -> Path:
+    """Return the folder of the shaders that come with SAPIEN."""
     return Path(sapien.__file__).parent / "vulkan_shader"
 
 
 def _digest(texts: dict[str, str]) -> str:
+    """Return one hash of all names and texts, which depends on their order."""
     digest = hashlib.sha256()
     for name, text in texts.items():
         digest.update(f"{name} {len(text)} {text}".encode())
@@ -166,7 +172,7 @@ def _digest(texts: dict[str, str]) -> str:
 
 
 def _apply(patch: _Patch, text: str) -> str:
-    """Return a file's text with a patch applied."""
+    """Return a file's text with a patch applied: "a START b END c" → "a REPLACEMENT END c"."""
     first = text.index(patch.start)
     last = text.index(patch.end, first + len(patch.start))
     return text[:first] + patch.replacement + text[last:]

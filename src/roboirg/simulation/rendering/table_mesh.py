@@ -100,8 +100,9 @@ def _load_shape(content: bytes) -> sapien.render.RenderShapeTriangleMesh:
 def strip_textures(content: bytes) -> bytes:
     """Return a binary glTF file without its textures.
 
-    The file is a JSON description, then a buffer of binary data. The description divides the buffer
-    into numbered views, and each image or array (an "accessor") names its view.
+    The file is a header, a JSON description, then a buffer of binary data; both have a chunk
+    header. The description divides the buffer into numbered views, and each image or array (an
+    "accessor") names its view.
     """
     size, _ = _CHUNK.unpack_from(content, _HEADER.size)
     start = _HEADER.size + _CHUNK.size
@@ -120,7 +121,12 @@ def strip_textures(content: bytes) -> bytes:
 
 
 def _keep_arrays(gltf: dict[str, Any], buffer: bytes) -> bytes:
-    """Return the buffer without its images, and renumber the views in the description."""
+    """Return the buffer without its images, and renumber the views in the description, in place.
+
+    Args:
+        gltf: the description; its views and accessors change.
+        buffer: the binary data that it describes.
+    """
     image_views = {image["bufferView"] for image in gltf["images"]}
     kept_buffer = b""
     kept_views: list[dict[str, Any]] = []
@@ -139,7 +145,7 @@ def _keep_arrays(gltf: dict[str, Any], buffer: bytes) -> bytes:
 
 
 def _write_glb(gltf: bytes, data: bytes) -> bytes:
-    """Assemble a binary glTF file from its JSON and its word-aligned data."""
+    """Assemble a binary glTF file from its JSON and its binary data, a multiple of `_WORD`."""
     gltf += b" " * (-len(gltf) % _WORD)  # up to the next word
     chunks = _CHUNK.pack(len(gltf), b"JSON") + gltf + _CHUNK.pack(len(data), b"BIN\0") + data
     return _HEADER.pack(b"glTF", 2, _HEADER.size + len(chunks)) + chunks

@@ -1,8 +1,9 @@
 """Flat-shaded triangles, with separate or shared vertices.
 
-Computing vertices is most of the cost of drawing a mesh on a CPU. If a triangle's normal is that of
-its first vertex (`roboirg.simulation.rendering.shaders`), the other two can be any vertices at
-their positions.
+A vertex is a position with a normal; a corner is one of the three points of a triangle. Computing
+vertices is most of the cost of drawing a mesh on a CPU. If a triangle's normal is that of its first
+vertex (`roboirg.simulation.rendering.shaders`), the other two can be any vertices at their
+positions, so triangles with different normals can share them.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ from numpy.typing import NDArray
 
 
 class Triangles(NamedTuple):
-    """Flat-shaded triangles with separate corners.
+    """n flat-shaded triangles with separate corners.
 
     Attributes:
-        corners: (n, 3, 3), meters.
-        normals: (n, 3).
+        corners: (n, 3, 3) three points each, meters.
+        normals: (n, 3) unit vectors.
     """
 
     corners: NDArray[np.float32]
@@ -27,12 +28,12 @@ class Triangles(NamedTuple):
 
 
 class IndexedTriangles(NamedTuple):
-    """Triangles that share vertices; the normal of each is that of its first vertex.
+    """n triangles that share m vertices; the normal of a triangle is that of its first vertex.
 
     Attributes:
-        vertices: (m, 3), meters.
-        normals: (m, 3).
-        triangles: (n, 3), vertex indices.
+        vertices: (m, 3) positions, meters.
+        normals: (m, 3) unit vectors.
+        triangles: (n, 3) indices into both.
     """
 
     vertices: NDArray[np.float32]
@@ -48,29 +49,27 @@ def index_triangles(flat: Triangles) -> IndexedTriangles:
     """Let triangles share vertices, as few as possible; the triangles keep their order.
 
     Only the first vertex of a triangle needs its normal, so each of the others can be any vertex
-    at the right position.
+    at the right position. A triangle may begin at another corner than before.
     """
     positions = _row_ids(flat.corners.reshape(-1, 3)).reshape(-1, 3).tolist()
     normals = _row_ids(flat.normals).tolist()
     vertices = _VertexList()
-    first_corners = []
+    # First the vertices that have the normals of triangles, then those that are still missing.
+    firsts = []
     for number, (corners, normal) in enumerate(zip(positions, normals, strict=True)):
-        first_corners.append(vertices.begin_triangle(number, corners, normal))
+        firsts.append(vertices.begin_triangle(number, corners, normal))
     for number, corners in enumerate(positions):
         for corner, position in enumerate(corners):
             if position not in vertices.at:
                 vertices.add(position, _TriangleCorner(number, corner))
 
     triangles = []
-    for corners, normal, first in zip(positions, normals, first_corners, strict=True):
-        vertex = vertices.with_normal[corners[first], normal]
-        second = vertices.nearest(corners[(first + 1) % 3], vertex)
-        third = vertices.nearest(corners[(first + 2) % 3], vertex)
-        triangles.append([vertex, second, third])
-    owners, corners_of_owners = np.array(vertices.sources, dtype=np.intp).reshape(-1, 2).T
+    for corners, normal, first in zip(positions, normals, firsts, strict=True):
+        triangles.append(vertices.vertices_of(corners, normal, first))
+    sources = np.array(vertices.sources, dtype=np.intp).reshape(-1, 2)
     return IndexedTriangles(
-        flat.corners[owners, corners_of_owners],
-        flat.normals[owners],
+        flat.corners[sources[:, 0], sources[:, 1]],
+        flat.normals[sources[:, 0]],
         np.array(triangles, dtype=np.uint32).reshape(-1, 3),
     )
 
@@ -83,12 +82,14 @@ class _TriangleCorner(NamedTuple):
 
 
 class _VertexList:
-    """The vertices that triangles share; positions and normals are ids of equal rows.
+    """The vertices that triangles share, numbered in the order in which they are added.
+
+    Positions and normals are given as ids; equal ones have the same id (`_row_ids`).
 
     Attributes:
-        sources: the corner that each vertex is copied from, normal included.
+        sources: of each vertex, the corner that position and normal are copied from.
         at: the vertices at each position.
-        with_normal: a vertex for a position and a normal.
+        with_normal: the vertex for a position and a normal.
     """
 
     def __init__(self) -> None:
@@ -102,13 +103,13 @@ class _VertexList:
         self.sources.append(source)
 
     def begin_triangle(self, number: int, corners: Sequence[int], normal: int) -> int:
-        """Return the corner that a triangle begins with, where a vertex has its normal.
+        """Return the corner (0 to 2) that a triangle begins with, where a vertex has its normal.
 
         If there is none, one is added at the corner with the fewest vertices.
 
         Args:
             number: of the triangle.
-            corners: positions of its corners.
+            corners: (3,) positions of its corners.
             normal: of the triangle.
         """
         for corner, position in enumerate(corners):
@@ -120,12 +121,23 @@ class _VertexList:
         self.add(corners[fewest], _TriangleCorner(number, fewest))
         return fewest
 
-    def nearest(self, position: int, vertex: int) -> int:
-        """Return the vertex at a position whose number is nearest to that of another vertex.
+    def vertices_of(self, corners: Sequence[int], normal: int, first: int) -> list[int]:
+        """Return the three vertices of a triangle, in the same sense of rotation.
 
-        It is likely to be in the graphics processor's vertex cache as well.
+        The second and third are those with the nearest numbers to the first, which are likely to be
+        in the graphics processor's vertex cache as well.
+
+        Args:
+            corners: (3,) positions of its corners.
+            normal: of the triangle.
+            first: the corner that it begins with, as `begin_triangle` returned it.
         """
-        return min(self.at[position], key=lambda candidate: abs(candidate - vertex))
+        first_vertex = self.with_normal[corners[first], normal]
+        found = [first_vertex]
+        for corner in (first + 1, first + 2):
+            candidates = self.at[corners[corner % 3]]
+            found.append(min(candidates, key=lambda vertex: abs(vertex - first_vertex)))
+        return found
 
 
 def duplicate_vertices(indexed: IndexedTriangles) -> IndexedTriangles:
@@ -140,5 +152,5 @@ def duplicate_vertices(indexed: IndexedTriangles) -> IndexedTriangles:
 
 
 def _row_ids(rows: NDArray[np.float32]) -> NDArray[np.intp]:
-    """Return an id for each row, equal for equal rows."""
+    """Return an id for each row, equal for equal rows: [[0, 1], [5, 2], [0, 1]] → [0, 1, 0]."""
     return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1)

@@ -17,11 +17,11 @@ SEGMENTS = 48
 
 
 class _Band(NamedTuple):
-    """A band between two circles around the axis.
+    """A band between two circles around the vertical axis, one of the four surfaces of a tube.
 
     Attributes:
         circles: radius and height of both, m.
-        outward: the part of the band's normal that points away from the axis.
+        outward: the part of the band's unit normal that points away from the axis.
         upward: the vertical part.
     """
 
@@ -42,7 +42,7 @@ def tube_mesh(
         half: half the height, m.
         rgba: color, 0 to 1 each.
     """
-    # Bands share no vertices, so that the edges between them are sharp.
+    # Outer wall, top, inner wall, bottom. They share no vertices, so that edges are sharp.
     bands = (
         _Band(((outer, -half), (outer, half)), outward=1.0, upward=0.0),
         _Band(((outer, half), (inner, half)), outward=0.0, upward=1.0),
@@ -68,7 +68,10 @@ def tube_mesh(
 
 
 def _ring(radius: float, height: float) -> NDArray[np.float64]:
-    """Return the corners of a circle around the vertical axis, (SEGMENTS, 3)."""
+    """Return `SEGMENTS` points of a circle around the vertical axis, (SEGMENTS, 3), m.
+
+    With a unit normal's parts for radius and height it returns normals.
+    """
     angles = 2.0 * np.pi * np.arange(SEGMENTS) / SEGMENTS
     heights = np.full(SEGMENTS, height)
     return np.stack([radius * np.cos(angles), radius * np.sin(angles), heights], axis=1)
@@ -76,6 +79,8 @@ def _ring(radius: float, height: float) -> NDArray[np.float64]:
 
 def _band_triangles(first: int) -> NDArray[np.intp]:
     """Return the triangles of a band, as vertex numbers, (2 * SEGMENTS, 3).
+
+    Each segment is a quadrilateral of two triangles.
 
     Args:
         first: number of the first vertex; those of the second circle follow those of the first.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from typing import Any
 
 import numpy as np
 import sapien
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.observations import PICTURE_SIZE
 
+Array = NDArray[Any]
 FIELD_OF_VIEW = math.pi / 2
 FOCAL_LENGTH = PICTURE_SIZE / 2 / math.tan(FIELD_OF_VIEW / 2)
 """Pixels."""
@@ -29,7 +31,7 @@ FRONT_TARGET = (0.0, 0.0, -0.2)
 
 
 def front_camera_pose() -> sapien.Pose:
-    """Return the pose of the front camera: x forward, z up, as in SAPIEN."""
+    """Return the pose of the front camera in the world: x forward, y left, z up, as in SAPIEN."""
     forward = np.subtract(FRONT_TARGET, FRONT_EYE)
     forward /= np.linalg.norm(forward)
     left = np.cross([0.0, 0.0, 1.0], forward)
@@ -40,8 +42,17 @@ def front_camera_pose() -> sapien.Pose:
     return sapien.Pose(matrix)
 
 
+def transformed(points: Array, matrix: Array) -> Array:
+    """Return points (..., 3) after a transform (4, 4), such as from a mesh's frame to a link's."""
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
 def to_front_camera(pose: sapien.Pose) -> NDArray[np.float64]:
-    """Return the transform (4, 4) from a frame in the world to the front camera (OpenCV)."""
+    """Return the transform (4, 4) from a frame to the front camera (OpenCV).
+
+    Args:
+        pose: of the frame in the world.
+    """
     frame = front_camera_pose().inv() * pose
     # x right, y down, z forward of x forward, y left, z up
     axes = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
@@ -55,7 +66,7 @@ def front_camera_matrix() -> NDArray[np.float64]:
 
 
 def reach_pixels(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return for each triangle whether the box around it holds the center of a pixel.
+    """Return for each triangle whether its bounding box in the picture holds a pixel's center.
 
     All others are never drawn: of the robot's base, five of six in the front camera's view.
 
@@ -64,13 +75,14 @@ def reach_pixels(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
             forward (OpenCV).
 
     Returns:
-        (n); always true for triangles with a corner in front of the near plane.
+        (n,); always true for triangles with a corner in front of the near plane, whose projection
+        means nothing.
     """
     depths = corners[..., 2:]
-    places = FOCAL_LENGTH * corners[..., :2] / depths + PICTURE_SIZE / 2
+    points = FOCAL_LENGTH * corners[..., :2] / depths + PICTURE_SIZE / 2  # pixels
     # The first and last pixels of the picture whose centers lie in the box, across and down.
-    first = np.ceil(places.min(axis=1) - EDGE_TOLERANCE - PIXEL_CENTER).clip(min=0)
-    last = np.floor(places.max(axis=1) + EDGE_TOLERANCE - PIXEL_CENTER).clip(max=PICTURE_SIZE - 1)
+    first = np.ceil(points.min(axis=1) - EDGE_TOLERANCE - PIXEL_CENTER).clip(min=0)
+    last = np.floor(points.max(axis=1) + EDGE_TOLERANCE - PIXEL_CENTER).clip(max=PICTURE_SIZE - 1)
     has_pixel = (first <= last).all(axis=1)
     is_too_near = depths[..., 0].min(axis=1) < NEAR
     return np.asarray(has_pixel | is_too_near)

@@ -37,6 +37,9 @@ def replay_or_plan(
 ) -> Recording:
     """Play a demonstration: replay it if it is shipped or cached, otherwise plan it and cache it.
 
+    A demonstration is what the expert does before the policy's turn; an episode without one is
+    only started.
+
     Args:
         episode: the episode.
         play: plays the demonstration; called again if a replay ends in another state.
@@ -97,7 +100,7 @@ def _platform_fingerprint() -> str:
 
 
 def _source_hash() -> str:
-    """Return one hash of the names and contents of all files in `_SOURCES`."""
+    """Return one hash of the names and contents of all Python files in `_SOURCES`."""
     root = Path(__file__).parents[2]
     digest = hashlib.sha256()
     for folder in _SOURCES:

@@ -69,7 +69,14 @@ def make_video(
     spec: ObservationSpec,
     proprioception: Sequence[dict[str, Any]],
 ) -> DemonstrationVideo:
-    """Return the video of a demonstration that has been played."""
+    """Return the video of a demonstration that has been played.
+
+    Args:
+        episode: whose demonstration it is.
+        recording: its actions, from which pictures are drawn later.
+        spec: which fields the video has, and every how many steps a picture.
+        proprioception: readings of `ObservationBuilder.read_proprioception`, one a step.
+    """
     frames = spec.demonstration_frames
     every = frames if isinstance(frames, int) else 1
     sequences: dict[str, FrameSequence] = {}

@@ -104,7 +104,10 @@ class _Pictures(NamedTuple):
 
 
 def _draw(missing: Sequence[_Pictures]) -> None:
-    """Replay a demonstration and draw pictures of all its sequences into their arrays."""
+    """Replay a demonstration and draw the pictures of some sequences into their arrays, in place.
+
+    All are of one demonstration, with the same `every` and `rendering`.
+    """
     first = missing[0].sequence
     session = EpisodeSession(first.episode, visible=True, rendering=first.rendering)
     drawing = _Drawing(session.world, missing)
@@ -132,7 +135,7 @@ class _Drawing:
         self._begun = 0
 
     def after_step(self, stage: Stage) -> None:
-        """Begin pictures if they are due."""
+        """Begin pictures if they are due, after those that were begun before have been read."""
         del stage
         if self._steps % self._every == 0:
             if self._begun:
@@ -175,7 +178,7 @@ def _driver_libraries() -> list[str]:
 
 
 def _compress(frames: NDArray[Any]) -> bytes:
-    """Compress frames in chunks, each preceded by its length."""
+    """Compress frames in chunks, each preceded by its length; `_decompress` reads them."""
     compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
     parts: list[bytes] = []
     for start in range(0, len(frames), CHUNK):
@@ -185,7 +188,7 @@ def _compress(frames: NDArray[Any]) -> bytes:
 
 
 def _decompress(content: memoryview, frames: NDArray[Any]) -> None:
-    """Decompress the output of `_compress` into an array, with all cores."""
+    """Decompress the output of `_compress` into an array of the same shape, with all cores."""
     tasks = []
     offset = 0
     with ThreadPoolExecutor(os.cpu_count()) as threads:
