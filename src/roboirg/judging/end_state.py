@@ -31,6 +31,8 @@ after which it lingers, to count as stopped. A hand five times slower than the o
 _SOON_STEPS = SETTLED_STEPS // 4
 """Control steps within which an object that moves by itself must come near its place, after a press
 that may have been meant for that moment."""
+APPROACH_STEPS = 60
+"""Control steps for which the hand is above an object to which it went, and not past it."""
 _PAUSE_FACTOR = 1.5
 """How many times as long as any pause before it a rest must be to count as stopping."""
 
@@ -69,7 +71,7 @@ explain it |
     unmet = replay.unmet()
     unexpected = _unexpected_act(replay, unmet)
     # An object that fell where it lies was not put there: then the drop, a slip, decides below.
-    if unexpected is not None and drop_before(slips, unexpected.act) is None:
+    if unexpected is not None and drop_before(replay, slips, unexpected.act) is None:
         explained = explain_early_act(replay, slips, unexpected.act.fact)
         return explained or _describe_act(replay, unexpected.failure, unexpected.act)
 
@@ -435,6 +437,8 @@ def _stopped_since(replay: EpisodeReplay) -> int | None:
     min_rest_steps = max(STOPPED_STEPS, _PAUSE_FACTOR * longest_pause)
     if replay.judge.violation is not None:
         min_rest_steps = 0  # a deadline ended the episode, which leaves no time for a long rest
+        if Fact("still", "robot") not in replay.facts[-1]:
+            return None
     start = rests[-1].start
     return start if replay.last_step - start >= min_rest_steps else None
 
@@ -445,6 +449,9 @@ def _at_rest(replay: EpisodeReplay) -> FailureAttribution:
     The hand did nothing of what the task needs, ``no_attempt``; it stopped, ``stopped``; or it was
     still moving, ``out_of_time``.
     """
+    approach = _approach_to_wrong(replay)
+    if approach is not None:
+        return describe_slip(replay, approach, "wrong_object")
     stopped_at = _stopped_since(replay)
     step = replay.last_step
     failure: FailureName = "out_of_time"
@@ -454,6 +461,22 @@ def _at_rest(replay: EpisodeReplay) -> FailureAttribution:
     if not _has_begun(replay):
         failure = "no_attempt"
     return _describe(replay, failure, None, step, _FAILURE_WORDS[failure])
+
+
+def _approach_to_wrong(replay: EpisodeReplay) -> Slip | None:
+    """Return when the hand came to the wrong object above which it stays at the end; else None.
+
+    An object is to be picked up then, and none that any stage means is as near.
+    """
+    at_end = [above for above in replay.tried("above") if above.end is None]
+    is_pick = FactRole.RAISE in _expected_roles(replay.stages[replay.expected_stage])
+    if not is_pick or not at_end:
+        return None
+    names = frozenset(str(above.fact.place) for above in at_end)
+    meant = _objects_meant_by_any(replay, range(len(replay.stages)))
+    came = at_end[0].start
+    stays = came <= replay.last_step - APPROACH_STEPS
+    return Slip(came, "missed_grasp", names) if stays and names.isdisjoint(meant) else None
 
 
 def _has_begun(replay: EpisodeReplay) -> bool:
