@@ -271,12 +271,12 @@ def judge_moment(replay: EpisodeReplay, step: int) -> FailureName | None:
     if not moving_objects or press.kind != "press_below":
         return None
     (moving_object,) = moving_objects
-    if abs(step - press.steps) <= moving_object.interval / 2:
+    # The pass is judged at the end of its last step.
+    if abs(step - press.steps) <= moving_object.interval / 2 + 1:
         return "mistimed"
     for facts in replay.facts[step : step + _SOON_STEPS]:
         for fact in facts:
-            is_at_place = fact.subject == moving_object.subject and fact.place is not None
-            if is_at_place:
+            if fact.subject == moving_object.subject and fact.place is not None:
                 return "wrong_time"
     return "ambiguous_act"
 
@@ -469,8 +469,8 @@ def _approach_to_wrong(replay: EpisodeReplay) -> Slip | None:
     An object is to be picked up then, and none that any stage means is as near.
     """
     at_end = [above for above in replay.tried("above") if above.end is None]
-    is_pick = FactRole.RAISE in _expected_roles(replay.stages[replay.expected_stage])
-    if not is_pick or not at_end:
+    expected_roles = _expected_roles(replay.stages[replay.expected_stage])
+    if not at_end or FactRole.RAISE not in expected_roles:
         return None
     names = frozenset(str(above.fact.place) for above in at_end)
     meant = _objects_meant_by_any(replay, range(len(replay.stages)))

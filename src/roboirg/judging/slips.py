@@ -94,14 +94,13 @@ def unsteady_visit(
     It wobbled: the object was over this place within the last `WOBBLE_STEPS`. Or it had missed the
     place that was due, and went on. None if neither explains the visit.
     """
-    for facts in replay.facts[visit.start - WOBBLE_STEPS : visit.start]:
+    for facts in replay.facts[max(visit.start - WOBBLE_STEPS, 0) : visit.start]:
         if visit.fact in facts:
             return Slip(visit.start, "misplaced", frozenset({visit.subject}))
     due_stage = replay.expected_stages[visit.start]
     for slip in slips:
-        is_same_stage = replay.expected_stages[slip.step] == due_stage
         is_pass = slip.failure == "misplaced" and visit.subject in slip.subjects
-        if is_pass and is_same_stage and slip.step < visit.start:
+        if is_pass and slip.step < visit.start and replay.expected_stages[slip.step] == due_stage:
             return slip
     return None
 
@@ -334,11 +333,10 @@ def _failure_of_loss(replay: EpisodeReplay, release: _Release) -> FailureName:
 
 
 def _stands_on_another(replay: EpisodeReplay, release: _Release) -> bool:
-    """Return whether an object that was put down stands on another one: it does not lie."""
+    """Return whether an object that was put down stands on another: it is not held, nor lies."""
     settled = min(release.step + SETTLED_STEPS, replay.last_step)
-    if release.is_in_air:
-        return False
-    return all(fact.subject != release.name for fact in replay.facts[settled])
+    is_lying = Fact("lying", release.name) in replay.facts[settled]
+    return not (release.is_in_air or is_lying or FactRole.GRIP in replay.roles_at(settled))
 
 
 def _missed_passes(replay: EpisodeReplay) -> Iterator[Slip]:
