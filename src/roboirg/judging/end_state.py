@@ -31,7 +31,7 @@ after which it lingers, to count as stopped. A hand five times slower than the o
 _SOON_STEPS = SETTLED_STEPS // 4
 """Control steps within which an object that moves by itself must come near its place, after a press
 that may have been meant for that moment."""
-APPROACH_STEPS = 60
+_APPROACH_STEPS = 60
 """Control steps for which the hand is above an object to which it went, and not past it."""
 _PAUSE_FACTOR = 1.5
 """How many times as long as any pause before it a rest must be to count as stopping."""
@@ -63,6 +63,7 @@ explain it |
     | the current stage was tried, and its object is not in the hand | as `judge_tries` says |
     | the hand stopped where a shorter task would have ended | ``wrong_count``, or the slips that \
 explain it |
+    | the hand stays above wrong objects only, where one is to be picked up | ``wrong_object`` |
     | the hand had stopped, or did nothing from the beginning | ``stopped``, ``no_attempt`` |
     | the hand still moved, and had been at something that is expected | ``out_of_time`` |
     | it moved elsewhere | ``no_attempt`` |
@@ -475,7 +476,7 @@ def _approach_to_wrong(replay: EpisodeReplay) -> Slip | None:
     names = frozenset(str(above.fact.place) for above in at_end)
     meant = _objects_meant_by_any(replay, range(len(replay.stages)))
     came = at_end[0].start
-    stays = came <= replay.last_step - APPROACH_STEPS
+    stays = came <= replay.last_step - _APPROACH_STEPS
     return Slip(came, "missed_grasp", names) if stays and names.isdisjoint(meant) else None
 
 
