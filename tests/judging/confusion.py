@@ -18,10 +18,15 @@ from cause_making import Course, read_courses
 from roboirg.core.failures import FAILURE_KINDS, FAILURES
 from roboirg.judging import DeclaredIntent, FailureAttribution, attribute_failure
 from roboirg.stats.intervals import without_spread
+from roboirg.tasks import get_task
 
 HERE = Path(__file__).parent
 DOCUMENT = HERE.parents[1] / "docs" / "attribution.md"
-HALVES = {"development": HERE / "made_failures.jsonl.xz", "held back": HERE / "held_back.jsonl.xz"}
+HALVES = {
+    "development": HERE / "made_failures.jsonl.xz",
+    "held back": HERE / "held_back.jsonl.xz",
+    "held back later": HERE / "held_back_later.jsonl.xz",
+}
 UNSCORED = "unscored"
 
 
@@ -183,8 +188,20 @@ def summary(courses: Sequence[Course]) -> str:
         f"the decided (95 % interval over causes {100 * low:.0f} to {100 * high:.0f}), "
         f"{percent(share.of_causes)} as the mean over causes. Not decided, though acts show "
         f"it: {percent(share.undecided)}. Idle, trembling and stopped hands that stay "
-        f"undecided: {percent(share.kept_undecided)}."
+        f"undecided: {percent(share.kept_undecided)}. Found grounding and made so, in counting "
+        f"tasks: {precisions(found)}."
     )
+
+
+def precisions(found: Iterable[Pair]) -> str:
+    """Return the share of what is found grounding that was made so, in each counting task."""
+    rights = defaultdict(list)
+    for pair in found:
+        task = pair.course.where[0]
+        is_known = pair.kind == "grounding" and pair.course.kind != UNSCORED
+        if is_known and get_task(task).suite == "counting":
+            rights[task].append(pair.is_right)
+    return ", ".join(f"{task} {percent(np.mean(right))}" for task, right in rights.items())
 
 
 def failures_table() -> str:

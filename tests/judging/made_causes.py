@@ -154,6 +154,23 @@ def back_where_it_lay(hands: Hands) -> None:
     hands.do(Primitive("place_on", pick.primitive.subject, "site"))
 
 
+@cause("grounding", "wrong_place", "VideoPlaceOrder", "VideoPlaceButton", "PickXtimes", "BinFill")
+def sets_it_on_another_cube(hands: Hands) -> None:
+    hands.do(hands.stages[0])
+    x, y, _ = hands.at(wrong_thing(hands, hands.stages[0].primitive.subject))
+    hands.go((x, y, 0.15))
+    hands.go((x, y, 0.062))
+    hands.grip(OPEN)
+    hands.go((x, y, 0.12))
+
+
+@cause("grounding", "wrong_object", *PICKING, "VideoUnmask", "PickByCount")
+def stays_above_a_wrong_thing(hands: Hands) -> None:
+    index = first_pick(hands)
+    x, y, _ = hands.at(wrong_thing(hands, hands.stages[index].primitive.subject))
+    hands.go((x, y, 0.2))
+
+
 # Wrong and clumsy
 
 
@@ -259,6 +276,23 @@ beside(
     0.05,
     lambda hands, _: [n for n, stage in enumerate(hands.stages) if stage.primitive.kind == "press"],
 )
+
+
+beside(
+    "misses_one_in_the_middle",
+    "missed_grasp",
+    SEVERAL,
+    MISS,
+    lambda _, picks: picks[1:-1][:1],
+)
+beside(
+    "a_swing_in_the_middle_passes_beside",
+    "misplaced",
+    ("SwingXtimes",),
+    0.055,
+    lambda hands, _: [3] if len(hands.stages) > 6 else [],
+)
+beside("the_first_visit_passes_beside", "misplaced", ("SwingXtimes",), 0.055, lambda *_: [1])
 
 
 @cause("execution", "missed_grasp", "PickXtimes")

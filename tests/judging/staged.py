@@ -162,8 +162,9 @@ class Staged:
         return self.set(Fact("binned", name, place))
 
     def carry(self, name: str, place: str) -> Staged:
+        """Bring it over a place from afar, and away again."""
         over = Fact("over", name, place)
-        return self.set(over).tick(3).set(off=(over,))
+        return self.tick(20).set(over).tick(3).set(off=(over,))
 
     def press(self, name: str = "button") -> Staged:
         hover = Fact("hovering", "robot", name)

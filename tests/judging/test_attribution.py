@@ -139,6 +139,63 @@ def test_reaching_for_a_wrong_cube_without_grasping_is_no_attempt():
     )
 
 
+def test_a_round_whose_grasp_failed_unseen_in_the_middle_is_not_a_wrong_count():
+    """Three rounds are meant and done, the second with an empty hand, then the button pressed."""
+    play = played_without_simulator("PickXtimes", 0)  # the green cube, three times
+    first = play.play(play.episode.stages[:2]).miss("cube_green").tick(150)
+    check_failure(first.play(play.episode.stages[2:4]).press(), "missed_grasp")
+
+
+def test_a_swing_that_wobbles_over_a_disc_is_not_a_wrong_count():
+    play = played_without_simulator("SwingXtimes", 14)  # the red cube, once
+    play.play(play.episode.stages[:2])
+    check_failure(play.set(Fact("over", "cube_red", "target_right")).rest(), "misplaced")
+
+
+def test_a_first_visit_beside_the_disc_is_not_a_wrong_order():
+    """The right disc is due; the cube passes next to it, and then over the left one."""
+    play = played_without_simulator("SwingXtimes", 14).lift("cube_red")
+    play.attempt(Fact("beside", "cube_red", "target_right"))
+    check_failure(play.carry("cube_red", "target_left").rest(), "misplaced")
+
+
+def test_a_cube_let_go_by_a_hand_at_rest_over_a_wrong_disc_has_not_been_dropped():
+    play = played_without_simulator("VideoPlaceOrder", 14).lift("cube_red")
+    play.set(Fact("over", "cube_red", "target_0"), Fact("still", "robot")).tick(5)
+    gone = (Fact("held", "cube_red"), Fact("picked", "cube_red"))
+    play.set(off=gone).set(Fact("lying", "cube_red"), Fact("placed", "cube_red", "target_0"))
+    check_failure(play, "wrong_place")
+
+
+def test_a_cube_set_on_another_cube_has_not_been_misplaced():
+    """It lies nowhere afterwards."""
+    play = played_without_simulator("VideoPlaceOrder", 14).lift("cube_red")
+    play.set(off=(Fact("picked", "cube_red"),))
+    gone = (Fact("held", "cube_red"), Fact("reached", "cube_red"))
+    check_failure(play.set(off=gone).rest(), "wrong_place")
+
+
+def test_a_hand_that_stays_above_a_wrong_cube_has_made_its_choice():
+    play = played_without_simulator("PickXtimes", 2)  # the blue cube is meant
+    play.tried.add(Fact("above", "robot", "cube_red"))
+    check_failure(play.tick(100), "wrong_object")
+
+
+def test_a_hand_on_its_way_down_when_the_visit_is_over_has_not_stopped():
+    """Hands above the button linger there; this one is no longer still."""
+    play = played_without_simulator("StopCube", 0).hover()
+    play.tried.add(Fact("lingering", "robot"))
+    check_failure(play.tick(1000), "out_of_time")
+
+
+@pytest.mark.parametrize(
+    "held", [(), (Fact("held", "cube_blue"), Fact("hovering", "robot", "button"))]
+)
+def test_a_button_touched_by_the_arm_or_by_what_is_in_the_hand_is_no_wrong_count(held):
+    play = played_without_simulator("PickXtimes", 2)
+    check_failure(play.set(*held).set(Fact("pressed", "button")), "touched_button")
+
+
 @pytest.mark.parametrize(
     ("late", "failure"), [(0.3, "mistimed"), (-0.7, "ambiguous_act"), (-1.0, "wrong_time")]
 )

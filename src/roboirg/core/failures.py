@@ -31,6 +31,7 @@ FailureName = Literal[
     "dropped",
     "misplaced",
     "mistimed",
+    "touched_button",
     "out_of_time",
     "not_followed",
     "unreachable",
@@ -127,6 +128,12 @@ FAILURES: Mapping[FailureName, FailureMeaning] = {
         "pressed off the target, at most half a pass before or after the middle of the right visit",
         "the moving cube stops just in front of its target",
     ),
+    "touched_button": FailureMeaning(
+        "execution",
+        "pressed a button that was not due with something else than the fingertips of an empty "
+        "hand",
+        "the forearm on the button; a button touched by the cube in the hand",
+    ),
     "out_of_time": FailureMeaning(
         "execution",
         "ran out of time on the way: the hand still moved, and nothing was wrong",
@@ -155,8 +162,8 @@ FAILURES: Mapping[FailureName, FailureMeaning] = {
     "ambiguous_act": FailureMeaning(
         "undecided",
         "did what can be a slip or a choice",
-        "fingers that close between the right cube and another one; a button touched by what "
-        "is in the hand; a press more than half a pass off the right visit",
+        "fingers that close between the right cube and another one; a press more than half a pass "
+        "off the right visit",
     ),
     "no_answer": FailureMeaning(
         "undecided",

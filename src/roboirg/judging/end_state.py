@@ -31,6 +31,8 @@ after which it lingers, to count as stopped. A hand five times slower than the o
 _SOON_STEPS = SETTLED_STEPS // 4
 """Control steps within which an object that moves by itself must come near its place, after a press
 that may have been meant for that moment."""
+_APPROACH_STEPS = 60
+"""Control steps for which the hand is above an object to which it went, and not past it."""
 _PAUSE_FACTOR = 1.5
 """How many times as long as any pause before it a rest must be to count as stopping."""
 
@@ -61,6 +63,7 @@ explain it |
     | the current stage was tried, and its object is not in the hand | as `judge_tries` says |
     | the hand stopped where a shorter task would have ended | ``wrong_count``, or the slips that \
 explain it |
+    | the hand stays above wrong objects only, where one is to be picked up | ``wrong_object`` |
     | the hand had stopped, or did nothing from the beginning | ``stopped``, ``no_attempt`` |
     | the hand still moved, and had been at something that is expected | ``out_of_time`` |
     | it moved elsewhere | ``no_attempt`` |
@@ -69,7 +72,7 @@ explain it |
     unmet = replay.unmet()
     unexpected = _unexpected_act(replay, unmet)
     # An object that fell where it lies was not put there: then the drop, a slip, decides below.
-    if unexpected is not None and drop_before(slips, unexpected.act) is None:
+    if unexpected is not None and drop_before(replay, slips, unexpected.act) is None:
         explained = explain_early_act(replay, slips, unexpected.act.fact)
         return explained or _describe_act(replay, unexpected.failure, unexpected.act)
 
@@ -269,12 +272,12 @@ def judge_moment(replay: EpisodeReplay, step: int) -> FailureName | None:
     if not moving_objects or press.kind != "press_below":
         return None
     (moving_object,) = moving_objects
-    if abs(step - press.steps) <= moving_object.interval / 2:
+    # The pass is judged at the end of its last step.
+    if abs(step - press.steps) <= moving_object.interval / 2 + 1:
         return "mistimed"
     for facts in replay.facts[step : step + _SOON_STEPS]:
         for fact in facts:
-            is_at_place = fact.subject == moving_object.subject and fact.place is not None
-            if is_at_place:
+            if fact.subject == moving_object.subject and fact.place is not None:
                 return "wrong_time"
     return "ambiguous_act"
 
@@ -435,6 +438,8 @@ def _stopped_since(replay: EpisodeReplay) -> int | None:
     min_rest_steps = max(STOPPED_STEPS, _PAUSE_FACTOR * longest_pause)
     if replay.judge.violation is not None:
         min_rest_steps = 0  # a deadline ended the episode, which leaves no time for a long rest
+        if Fact("still", "robot") not in replay.facts[-1]:
+            return None
     start = rests[-1].start
     return start if replay.last_step - start >= min_rest_steps else None
 
@@ -445,6 +450,9 @@ def _at_rest(replay: EpisodeReplay) -> FailureAttribution:
     The hand did nothing of what the task needs, ``no_attempt``; it stopped, ``stopped``; or it was
     still moving, ``out_of_time``.
     """
+    approach = _approach_to_wrong(replay)
+    if approach is not None:
+        return describe_slip(replay, approach, "wrong_object")
     stopped_at = _stopped_since(replay)
     step = replay.last_step
     failure: FailureName = "out_of_time"
@@ -454,6 +462,22 @@ def _at_rest(replay: EpisodeReplay) -> FailureAttribution:
     if not _has_begun(replay):
         failure = "no_attempt"
     return _describe(replay, failure, None, step, _FAILURE_WORDS[failure])
+
+
+def _approach_to_wrong(replay: EpisodeReplay) -> Slip | None:
+    """Return when the hand came to the wrong object above which it stays at the end; else None.
+
+    An object is to be picked up then, and none that any stage means is as near.
+    """
+    at_end = [above for above in replay.tried("above") if above.end is None]
+    expected_roles = _expected_roles(replay.stages[replay.expected_stage])
+    if not at_end or FactRole.RAISE not in expected_roles:
+        return None
+    names = frozenset(str(above.fact.place) for above in at_end)
+    meant = _objects_meant_by_any(replay, range(len(replay.stages)))
+    came = at_end[0].start
+    stays = came <= replay.last_step - _APPROACH_STEPS
+    return Slip(came, "missed_grasp", names) if stays and names.isdisjoint(meant) else None
 
 
 def _has_begun(replay: EpisodeReplay) -> bool:

@@ -153,6 +153,10 @@ class EpisodeReplay:
         index = max(self.expected_stages[step], 0)
         return self.stages[min(index, len(self.stages) - 1)]
 
+    def roles_at(self, step: int) -> set[FactRole]:
+        """Return the roles of all facts that hold at a step."""
+        return {fact.traits.role for fact in self.facts[step]}
+
     def unmet(self) -> tuple[Fact, ...]:
         """Return the facts that the current stage expects and that do not hold at the end.
 

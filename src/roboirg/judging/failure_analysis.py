@@ -36,7 +36,7 @@ from roboirg.judging.fact_history import FactHistory
 from roboirg.judging.failure_attribution import FailureAttribution
 from roboirg.judging.grounding_errors import classify_grounding_error
 from roboirg.judging.judge import Status, describe_violation
-from roboirg.judging.slips import drop_before, find_slips
+from roboirg.judging.slips import drop_before, find_slips, unsteady_visit
 
 MirroredObjects = Mapping[str, Collection[str]]
 """For each object that an instruction means, those that it would mean with left and right
@@ -147,15 +147,20 @@ def _attribute_act(replay: EpisodeReplay, deviation: _Deviation, act: Fact) -> F
     """
     step = deviation.step
     slips = find_slips(replay)
-    dropped = drop_before(slips, FactInterval(act, step, None))
+    dropped = drop_before(replay, slips, FactInterval(act, step, None))
     if act.traits.role is FactRole.PLACING and dropped is not None:
         return describe_slip(replay, dropped)
+
+    if act.traits.role is FactRole.CARRY:
+        unsteady = unsteady_visit(replay, slips, FactInterval(act, step, None))
+        if unsteady is not None:
+            return describe_slip(replay, unsteady)
 
     failure = deviation.failure
     if failure == "mistimed":
         failure = judge_moment(replay, step)
-    if act.traits.role is FactRole.PRESS and _is_pressed_by_held(replay, step):
-        failure = "ambiguous_act"
+    if act.traits.role is FactRole.PRESS and _is_touched(replay, step):
+        failure = "touched_button"
 
     # Explanations look at the end of the replay, so they fit an act that ended it.
     if failure is None and step == replay.last_step:
@@ -169,10 +174,13 @@ def _attribute_act(replay: EpisodeReplay, deviation: _Deviation, act: Fact) -> F
     return FailureAttribution.of(failure, act.subject, step, words)
 
 
-def _is_pressed_by_held(replay: EpisodeReplay, step: int) -> bool:
-    """Return whether a held object, not the hand, pressed the button: the hand is not at it."""
-    roles = {fact.traits.role for fact in replay.facts[step]}
-    return FactRole.GRIP in roles and FactRole.APPROACH not in roles
+def _is_touched(replay: EpisodeReplay, step: int) -> bool:
+    """Return whether something else pressed a button than the fingertips of an empty hand.
+
+    The hand holds something, or is not at the button: then it was its side, or the arm.
+    """
+    roles = replay.roles_at(step)
+    return FactRole.GRIP in roles or FactRole.APPROACH not in roles
 
 
 def _deviations(replay: EpisodeReplay) -> Iterator[_Deviation]:

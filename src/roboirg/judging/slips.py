@@ -25,6 +25,11 @@ SETTLED_STEPS = 40
 TREMOR_STEPS = 10
 """Control steps within which what the fingers hold again was not let go."""
 
+RETRY_STEPS = 120
+"""Control steps within which a hand that has missed an object holds it up, if it tries again."""
+
+WOBBLE_STEPS = 18
+"""Control steps within which an object that is over a place again has not been carried away."""
 
 MISSES = ("missed_grasp", "missed_press")
 """Slips at which the hand did not reach its object; at all others it lost it, or passed a place."""
@@ -61,11 +66,41 @@ def find_slips(replay: EpisodeReplay) -> tuple[Slip, ...]:
     return tuple(slips)
 
 
-def drop_before(slips: Sequence[Slip], act: FactInterval) -> Slip | None:
-    """Return the drop by which an object came to lie at a place; None if it was put there."""
+def drop_before(replay: EpisodeReplay, slips: Sequence[Slip], act: FactInterval) -> Slip | None:
+    """Return the drop by which an object came to lie at a place; None if it was put there.
+
+    A hand at rest that opens low over the place has aimed at it.
+    """
     for slip in slips:
         is_recent = act.start - SETTLED_STEPS <= slip.step <= act.start
         if slip.failure == "dropped" and act.subject in slip.subjects and is_recent:
+            facts_before = replay.facts[slip.step - 1]
+            is_at_rest = Fact("still", "robot") in facts_before
+            is_over = any(_is_carry_over(fact, act.fact) for fact in facts_before)
+            return None if is_at_rest and is_over else slip
+    return None
+
+
+def _is_carry_over(fact: Fact, act: Fact) -> bool:
+    """Return whether a fact is that an object is over the place that an act with it is about."""
+    return fact.traits.role is FactRole.CARRY and act._replace(kind=fact.kind) == fact
+
+
+def unsteady_visit(
+    replay: EpisodeReplay, slips: Sequence[Slip], visit: FactInterval
+) -> Slip | None:
+    """Return how an unsteady hand came to carry an object over a place that was not due.
+
+    It wobbled: the object was over this place within the last `WOBBLE_STEPS`. Or it had missed the
+    place that was due, and went on. None if neither explains the visit.
+    """
+    for facts in replay.facts[max(visit.start - WOBBLE_STEPS, 0) : visit.start]:
+        if visit.fact in facts:
+            return Slip(visit.start, "misplaced", frozenset({visit.subject}))
+    due_stage = replay.expected_stages[visit.start]
+    for slip in slips:
+        is_pass = slip.failure == "misplaced" and visit.subject in slip.subjects
+        if is_pass and slip.step < visit.start and replay.expected_stages[slip.step] == due_stage:
             return slip
     return None
 
@@ -74,16 +109,20 @@ def is_noticed(replay: EpisodeReplay, slip: Slip, slips: Sequence[Slip]) -> bool
     """Return whether the hands, after they missed something, next tried the same again.
 
     Missed the red cube, then took it: noticed. Missed it, then opened an empty hand at the bin,
-    pressed, or took another object: not noticed. The loss of an object never counts as noticed:
-    where one is handled several times, a new pick may be the next one that is due.
+    pressed, or took another object: not noticed. If it took the cube only after `RETRY_STEPS`, it
+    did the rest of the round before. The loss of an object never counts as noticed: where one is
+    handled several times, a new pick may be the next one that is due.
     """
     if slip.failure not in MISSES:
         return False
     later_acts = [act for act in _acts_and_tries(replay, slips) if act.step > slip.step]
-    if not later_acts:
+    next_act = min(later_acts, key=lambda act: act.step, default=None)
+    if next_act is None or next_act.subjects.isdisjoint(slip.subjects):
         return False
-    next_act = min(later_acts, key=lambda act: act.step)
-    return not next_act.subjects.isdisjoint(slip.subjects)
+    for lift in replay.started(FactRole.RAISE, after=slip.step):
+        if lift.subject in slip.subjects:
+            return lift.start - slip.step <= RETRY_STEPS
+    return True
 
 
 class _Act(NamedTuple):
@@ -140,9 +179,7 @@ def _idle_touches(replay: EpisodeReplay, closing_steps: Sequence[int]) -> Iterat
     which they closed, on an object or on nothing.
     """
     for touch in replay.started(FactRole.TOUCH):
-        end = replay.last_step
-        if touch.end is not None:
-            end = touch.end + SETTLED_STEPS
+        end = replay.end_of(touch) + SETTLED_STEPS
         has_closed = any(touch.start <= step <= end for step in closing_steps)
         expected = facts_of(replay.stage_at(touch.start).expects)
         is_expected = any(fact.subject == touch.subject for fact in expected)
@@ -278,8 +315,8 @@ def _has_landed(replay: EpisodeReplay, release: _Release) -> bool:
 def _failure_of_loss(replay: EpisodeReplay, release: _Release) -> FailureName:
     """Return which failure the loss of an object is, by the places next to which it was let go.
 
-    Next to the place where it is expected -> ``misplaced``; next to another place ->
-    ``wrong_place``; next to none -> ``dropped`` from the air, ``misplaced`` on the table.
+    Next to the place where it is expected -> ``misplaced``; next to another place, or on another
+    object -> ``wrong_place``; else ``dropped`` from the air, ``misplaced`` on the table.
     """
     places_nearby: set[str | None] = set()
     for carried in replay.tried("beside", release.name):
@@ -288,35 +325,38 @@ def _failure_of_loss(replay: EpisodeReplay, release: _Release) -> FailureName:
         is_now = carried.start <= release.step and carried.lasts_until(release.step - 1)
         if is_now and kind in release.places:
             places_nearby.add(place)
-    if not places_nearby:
-        return "dropped" if release.is_in_air else "misplaced"
-    is_at_right_place = any(fact.place in places_nearby for fact in release.expected)
-    return "misplaced" if is_at_right_place else "wrong_place"
+    if any(fact.place in places_nearby for fact in release.expected):
+        return "misplaced"
+    if places_nearby or _stands_on_another(replay, release):
+        return "wrong_place"
+    return "dropped" if release.is_in_air else "misplaced"
+
+
+def _stands_on_another(replay: EpisodeReplay, release: _Release) -> bool:
+    """Return whether an object that was put down stands on another: it is not held, nor lies."""
+    settled = min(release.step + SETTLED_STEPS, replay.last_step)
+    is_lying = Fact("lying", release.name) in replay.facts[settled]
+    return not (release.is_in_air or is_lying or FactRole.GRIP in replay.roles_at(settled))
 
 
 def _missed_passes(replay: EpisodeReplay) -> Iterator[Slip]:
     """Yield each try to carry an object over a place that only came next to it.
 
-    It was expected over the place, and did not get over it before it was away again.
+    It is due there, now or later; it was up, and not over the place before it was away again.
     """
-    carries = list(replay.started(FactRole.CARRY))
     for attempt in replay.tried("beside"):
-        end = replay.end_of(attempt)
-        reached = {carry.fact for carry in carries if attempt.start <= carry.start <= end}
-        expected = _expected_carries(replay, attempt)
-        if expected and expected.isdisjoint(reached):
+        carry = _carry_due(replay, attempt)
+        is_up = FactRole.RAISE in replay.roles_at(attempt.start)
+        meanwhile = replay.facts[attempt.start : replay.end_of(attempt) + 1]
+        if carry is not None and is_up and not any(carry in facts for facts in meanwhile):
             yield Slip(attempt.start, "misplaced", frozenset({attempt.subject}))
 
 
-def _expected_carries(replay: EpisodeReplay, attempt: FactInterval) -> set[Fact]:
-    """Return the facts that the stage expected when an object was next to a place: it gets over it.
-
-    Empty if it was not expected over this place.
-    """
-    expected: set[Fact] = set()
-    for fact in facts_of(replay.stage_at(attempt.start).expects):
-        is_same_object = fact.subject == attempt.subject
-        is_same_place = fact.place == attempt.fact.place
-        if is_same_object and is_same_place and fact.traits.role is FactRole.CARRY:
-            expected.add(fact)
-    return expected
+def _carry_due(replay: EpisodeReplay, attempt: FactInterval) -> Fact | None:
+    """Return the fact, due now or later, that an object gets over the place next to which it is."""
+    due_stage = max(replay.expected_stages[attempt.start], 0)
+    for stage in replay.stages[due_stage:]:
+        for fact in facts_of(stage.expects):
+            if _is_carry_over(fact, attempt.fact):
+                return fact
+    return None
