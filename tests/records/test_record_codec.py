@@ -7,12 +7,12 @@ from pathlib import Path
 import msgspec
 import pytest
 from msgspec.structs import replace
-from run_fakes import fake_run, small_plan
+from run_fakes import fake_record, fake_run, small_plan
 
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.policy_ref import unknown_policy
-from roboirg.records.record import Job, Summary
-from roboirg.records.record_codec import StoreError, identity_key, read_summary
+from roboirg.records.record import Job, Record, Summary
+from roboirg.records.record_codec import StoreError, identity_key, read_record, read_summary
 from roboirg.records.store import (
     RECORDS_FILE,
     RecordStore,
@@ -76,6 +76,28 @@ def test_results_have_the_fields_of_records_without_what_happened_in_the_episode
         named = {name: getattr(record, name) for name in Summary.__struct_fields__}
         assert msgspec.structs.asdict(result) == named
         assert (result.slug, result.options) == (record.slug, record.options)
+
+
+def test_records_with_the_same_policy_and_options_share_them_and_others_keep_their_own(tmp_path):
+    """They are decoded apart; would find one that is lost, or given to another record."""
+    fake_run(tmp_path, small_plan(policies=("random", "oracle")))
+    lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines()
+    whole = [msgspec.json.decode(line, type=Record) for line in lines]
+
+    records = read_records(tmp_path)
+
+    assert list(records) == whole
+    assert len({id(record.ref) for record in records}) == 2
+    assert len({id(record.options) for record in records}) == 2
+
+
+def test_a_record_without_its_environment_has_the_default_one(tmp_path):
+    """Would find that a shared field is required, which old records may lack."""
+    record = fake_record(small_plan().jobs()[0])
+    fields = msgspec.to_builtins(record)
+    del fields["environment"]
+
+    assert read_record(msgspec.json.encode(fields), tmp_path, 1) == record
 
 
 def test_episodes_are_the_same_only_if_all_options_agree_wherever_policy_and_words_lie():

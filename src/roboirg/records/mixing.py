@@ -123,10 +123,10 @@ def differing(
         of_whom: stands behind the property in a sentence, such as `` of mine``.
     """
     for trait in traits:
-        value_of = operator.attrgetter(trait.path)
-        values = {(trait.owner(result), value_of(result)) for result in results}
+        values = map(operator.attrgetter(trait.path), results)
+        owned_values = set(zip(map(trait.owner, results), values, strict=True))
         texts: dict[str, set[str]] = {}  # values in words, by owner
-        for owner, value in values:
+        for owner, value in owned_values:
             text = trait.text(value)
             if text is not None:
                 texts.setdefault(owner, set()).add(str(text))

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 import operator
 from pathlib import Path
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 import msgspec
 
+from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.field_types import LABEL, LABEL_RULE, MOST_NAME_LETTERS, NAME
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.policy_ref import PolicyRef
 from roboirg.records.record import IDENTITY, SCHEMA_VERSION, Record, Summary
 from roboirg.records.run_files import RELATIVE_PATH
 
@@ -41,9 +45,41 @@ class _Version(msgspec.Struct):
     schema_version: int
 
 
+_SHARED = {"options": InstructionOptions, "environment": EnvironmentOptions, "ref": PolicyRef}
+"""Fields that have few values in a run and take long to decode, each with its type."""
+
+
+class _SharingDecoder(Generic[Stored]):
+    """Decodes lines to records; those with the same options or policy share one object for it."""
+
+    def __init__(self, kind: type[Stored]) -> None:
+        self._kind = kind
+        # Like the kind of record, but with the shared fields as they are in the line.
+        fields = [(name, msgspec.Raw, msgspec.Raw()) for name in _SHARED]
+        line = msgspec.defstruct("_Line", fields, bases=(kind,), kw_only=True, gc=False)
+        self._decode = msgspec.json.Decoder(line).decode
+
+    def decode(self, line: bytes) -> Stored:
+        """Return the record in a line of JSON; raises like the decoders of msgspec."""
+        try:
+            fields = msgspec.structs.asdict(self._decode(line))
+            for name in _SHARED:
+                fields[name] = _shared_value(name, bytes(fields[name]))
+        except msgspec.MsgspecError:
+            # A field is wrong, or a shared one is missing: it may have a default.
+            return msgspec.json.decode(line, type=self._kind)
+        return self._kind(**fields)
+
+
+@functools.lru_cache(maxsize=4096)
+def _shared_value(name: str, text: bytes) -> object:
+    """Return the value of one of the shared fields, decoded from JSON."""
+    return msgspec.json.decode(text, type=_SHARED[name])
+
+
 _encoder = msgspec.json.Encoder()
-_record_decoder = msgspec.json.Decoder(Record)
-_summary_decoder = msgspec.json.Decoder(Summary)
+_record_decoder = _SharingDecoder(Record)
+_summary_decoder = _SharingDecoder(Summary)
 _version_decoder = msgspec.json.Decoder(_Version)
 identity_key: operator.attrgetter[RecordKey] = operator.attrgetter(*IDENTITY)
 """Returns the identity of a job, a summary or a record."""
@@ -79,7 +115,7 @@ def read_summary(line: bytes, path: Path, number: int) -> Summary:
     return _read(_summary_decoder, line, path, number)
 
 
-def _read(decoder: msgspec.json.Decoder[Stored], line: bytes, path: Path, number: int) -> Stored:
+def _read(decoder: _SharingDecoder[Stored], line: bytes, path: Path, number: int) -> Stored:
     """Return the record or summary in a line of JSON; raises like `read_record`.
 
     Args:

@@ -184,21 +184,18 @@ class StoredRun(Generic[Stored]):
     def __init__(self, folder: Path, parse_line: Callable[[bytes, Path, int], Stored]) -> None:
         self._path = folder / RECORDS_FILE
         self.file = LineFile(self._path)
-        results: dict[RecordKey, Stored] = {}
-        places: dict[RecordKey, LinePlace] = {}
+        placed: dict[RecordKey, tuple[Stored, LinePlace]] = {}
         for result in self.file.parse(parse_line):
-            key = identity_key(result)
-            results[key] = result
-            places[key] = self.file.place
+            placed[identity_key(result)] = (result, self.file.place)
         if self.file.torn:
             warn_once(self.file.damage)
-        if not results:
+        if not placed:
             self.file.refuse_damage()
             raise StoreError(
                 f"There are no records in {folder}; give the --out folder of a `roboirg run`."
             )
-        self.newest: tuple[Stored, ...] = _with_server_versions(results.values())
-        self._places_in_order = list(places.values())
+        results, self._places_in_order = zip(*placed.values(), strict=True)
+        self.newest: tuple[Stored, ...] = _with_server_versions(results)
 
     @cached_property
     def _places(self) -> dict[RecordKey, LinePlace]:

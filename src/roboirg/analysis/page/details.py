@@ -259,18 +259,25 @@ class _PlayedScene:
         episode: None for another environment version, or a task that is no longer installed.
         names: words for the objects.
         facts: those that stages depend on, as stages have them.
+        acts: events in words, as `act` returns them, which it has made so far.
     """
 
     episode: Episode | None
     names: Mapping[str, str]
     facts: Mapping[Fact, Fact]
+    acts: dict[tuple[object, ...], str | None] = field(default_factory=dict)
 
     def act(self, event: EventRecord) -> str | None:
-        """Return an event in words; None if timelines do not show it."""
-        shown = fact_traits(event.kind).timeline
-        if shown == "both" or (shown == "start" and event.holds):
-            return event_text(event, self.names)
-        return None
+        """Return an event in words: ``picked up the red cube``; None if timelines do not show it.
+
+        The same events occur whenever the scene is played, so their words are made once.
+        """
+        key = (event.kind, event.subject, event.place, event.holds)
+        if key not in self.acts:
+            shown = fact_traits(event.kind).timeline
+            is_shown = shown == "both" or (shown == "start" and event.holds)
+            self.acts[key] = event_text(event, self.names) if is_shown else None
+        return self.acts[key]
 
     def stages(self, record: Record) -> list[_PlayedStage]:
         """Return the stages of the task, each with the control step at which it was completed.

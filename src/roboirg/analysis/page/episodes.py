@@ -109,8 +109,9 @@ def _episodes(runs: SourceByName, frame: Frame, *, videos: bool) -> Iterator[Pag
     logs = {name: logged_slugs(source.folder) for name, source in sources.items()}
     for policy_run, record in _played_by_scene(frame):
         folder = sources[policy_run.run].folder
-        # The slug's last part is a hash of all that identifies the episode in its run.
-        key = record.slug.rpartition("-")[2]
+        slug = record.slug
+        # Its last part is a hash of all that identifies the episode in its run.
+        key = slug.rpartition("-")[2]
         number = names.index(policy_run.run)
         if number > 0:
             key += f"-{number + 1}"  # as the other run may have the same episode
@@ -121,8 +122,8 @@ def _episodes(runs: SourceByName, frame: Frame, *, videos: bool) -> Iterator[Pag
             if film is not None:
                 poster = _existing(folder, poster_name(record.video))
         log = None
-        if record.slug in logs[policy_run.run]:
-            log = log_path(folder, record.slug)
+        if slug in logs[policy_run.run]:
+            log = log_path(folder, slug)
         yield PageEpisode(key, record, policy_run, film, poster, log)
 
 

@@ -141,8 +141,9 @@ def with_columns(
         if rows is None:
             continue  # played again since, or of another policy
         for name, read in reads.items():
-            # As a column, because numpy would spread a tuple over the rows.
-            columns[name][rows] = as_column([read(record)])
+            value = read(record)
+            for row in rows:
+                columns[name][row] = value
     return frame.extended(columns)
 
 
