@@ -135,6 +135,7 @@ def run_doctor(render_s: int = 0) -> int:
 
 
 def _check_python() -> Check:
+    """Check that this Python is new enough."""
     wanted = ".".join(map(str, OLDEST_PYTHON))
     return Check(
         "Python",
@@ -203,6 +204,7 @@ def _try(name: str, find: Callable[[], str], without: str = "") -> Check:
         find: returns what was found, empty if it is switched off; raises if it is missing or set to
             a wrong value.
         without: what happens without it, such as that runs are slower; empty if all runs need it.
+            Then what is missing is a failure, else a remark.
     """
     can_do_without = bool(without)
     try:
@@ -231,7 +233,7 @@ def _check_rendering(render_s: int = 0) -> tuple[Check, Check]:
     """Return two checks of the renderer: that there is a device, and that it draws.
 
     A child process draws, as a driver may crash or hang. It prints the device in its first line,
-    and in the next ones what it drew.
+    and in the next ones what it drew; see `_draw_test_frame`.
 
     Args:
         render_s: seconds for which to go on drawing.
@@ -259,6 +261,7 @@ def _run_python(*arguments: str, limit_s: int = FRAME_TIMEOUT) -> _Child:
     """Run Python with some arguments in a child process; return its output and its fault.
 
     The fault says in words why it did not end well: too slow, a signal, or its last line of stderr.
+    Nothing is raised.
     """
     try:
         child = subprocess.run(  # noqa: S603 - constant words in our own interpreter
@@ -308,7 +311,10 @@ def _write_to(folder: str) -> str:
 
 
 def _name_proxies() -> str:
-    """Name the proxies of addresses outside; models use them, and the fetch of model files."""
+    """Return the proxies of addresses outside, in words, or ``"none"``.
+
+    Models use them, and so does the fetch of model files.
+    """
     used = {proxy_of(f"{scheme}://example.org").words for scheme in ("http", "https")}
     return ", ".join(sorted(used)).strip(" ,") or "none"
 

@@ -37,7 +37,18 @@ def known_settings(given: object) -> tuple[str, ...]:
 
 
 def known_names(kind: str, given: object, known: Sequence[Name]) -> tuple[Name, ...]:
-    """Return the names that were typed, separated by commas; ``all`` means all that are known."""
+    """Return the names that were typed, separated by commas; ``all`` means all that are known.
+
+    ``"floor", "chance, oracle"`` -> ``("chance", "oracle")``.
+
+    Args:
+        kind: what they name, for errors.
+        given: text as typed, or a list of a plan.
+        known: every valid name.
+
+    Raises:
+        UnknownNameError: a name is none of them.
+    """
     from roboirg.runs.plan.option_parsing import means_all, parse_names
 
     if means_all(given):

@@ -69,7 +69,12 @@ class PlanWords:
         self.fields = {} if plan is None else read_plan_file(plan, section)
 
     def given(self, name: str, value: str) -> Any:  # noqa: ANN401 - as in the file
-        """Return the value of an option of the command; if it was not typed, as in the plan."""
+        """Return the value of an option of the command; if it was not typed, as in the plan.
+
+        Args:
+            name: of the option, and of the plan's field.
+            value: of the option, its default if it was not typed.
+        """
         source = self._context.get_parameter_source(name)
         is_typed = source is not None and source.name != "DEFAULT"
         return value if is_typed else self.fields.get(name, value)

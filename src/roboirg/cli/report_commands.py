@@ -349,7 +349,15 @@ class _TableChoice(NamedTuple):
 
 
 def _breakdown_tables(data: RunData, by: str) -> list[Table]:
-    """Make the tables of gaps by kind of words that the runs have results for."""
+    """Return the tables of gaps by kind of words that the runs have results for.
+
+    Args:
+        data: of the runs.
+        by: names of breakdowns, such as ``"pattern,slots"``, or ``"all"``.
+
+    Raises:
+        InvalidValueError: there are none.
+    """
     from roboirg.analysis.tables.diagnostic_tables import make_breakdown_table
 
     made: list[Table] = []
@@ -365,7 +373,7 @@ def _breakdown_tables(data: RunData, by: str) -> list[Table]:
 
 
 def _breakdowns(by: str | None) -> tuple[Breakdown, ...]:
-    """Return the breakdowns with the names in a text such as ``pattern,stage``; none without it."""
+    """Return the breakdowns with the names in a text such as ``pattern,slots``; none for None."""
     from roboirg.analysis.measures.breakdowns import BREAKDOWNS
 
     if by is None:

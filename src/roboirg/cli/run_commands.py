@@ -114,7 +114,16 @@ def run(
 
 
 def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummary:
-    """Play a plan with a progress bar; exits the process when it is interrupted."""
+    """Play a plan with a progress bar, and return what came of it.
+
+    Ends this process when it is interrupted; finished episodes are stored by then.
+
+    Args:
+        plan: what to play.
+        out: folder of the run.
+        executor: plays the episodes.
+        retry: whether to play again what is stored as an error.
+    """
     from roboirg.runs.episode_errors import Terminated
     from roboirg.runs.run.progress import ConsoleReporter
     from roboirg.runs.run.runner import episode_runner, run_plan
@@ -196,8 +205,11 @@ def _plan(name: str | None, typed: dict[str, Any], usual: Sequence[str]) -> Plan
 
     Args:
         name: of the plan or its file; None for a plan of typed options alone.
-        typed: options by name.
+        typed: options by name; typed ones count before those of the file.
         usual: the policies of a plan that names none; empty to refuse such a plan.
+
+    Raises:
+        InvalidValueError: there is no policy, or an option is wrong.
     """
     from roboirg.runs.plan.plan_fields import FLAT
     from roboirg.runs.plan.plan_file import read_plan_file
@@ -349,8 +361,8 @@ def _print_prompt_shares(
 ) -> None:
     """Print how many instructions are too long for the policies that declare a limit of tokens.
 
-    Policies that declare no limit are named below the table, but for the built-in ones, which
-    read every instruction.
+    A row for each such policy, a column for each of `settings`. Policies that declare no limit are
+    named below the table, but for the built-in ones, which read every instruction.
     """
     from roboirg.core.policy_ref import BUILT_IN
     from roboirg.runs.play.prompt_shares import prompt_shares, share_text

@@ -286,7 +286,7 @@ FACT_TRAITS: Mapping[FactKind, FactTraits] = MappingProxyType(_TRAITS)
 
 
 def register_fact_kind(kind: FactKind, traits: FactTraits) -> None:
-    """Add a kind of fact. Adding the same one again changes nothing.
+    """Add a kind of fact, which `fact_traits` then knows; adding the same one twice does no harm.
 
     Raises:
         InvalidValueError: the kind exists with other traits.
@@ -313,7 +313,10 @@ def fact_traits(kind: FactKind) -> FactTraits:
 
 
 def raised_kind(object_kind: str) -> FactKind | None:
-    """Return the kind of fact that says that an object of a kind is in the hand and up."""
+    """Return the kind of fact that says that an object of a kind is in the hand and up.
+
+    ``"cube"`` -> ``"picked"``, ``"container"`` -> ``"lifted"``, ``"button"`` -> None.
+    """
     for kind, traits in FACT_TRAITS.items():
         if traits.role is FactRole.RAISE and object_kind in traits.subjects:
             return kind

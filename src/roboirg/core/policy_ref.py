@@ -93,7 +93,11 @@ class PolicyRef:
 
     @property
     def hosted_part(self) -> PolicyRef:
-        """What runs in the process of its own: all of it, or its planner without hands."""
+        """What runs in the process of its own: all of it, or its planner without hands.
+
+        For a planner whose scripted hands are in the simulator's process, option `HANDS` becomes
+        `ELSEWHERE`, so that the other process makes none.
+        """
         if self.place != "split":
             return self
         options = {**dict(self.options), HANDS: ELSEWHERE}

@@ -80,7 +80,7 @@ class EpisodeLog:
         self._thread = threading.Thread(target=self._watch, name="episode log", daemon=True)
 
     def trim(self) -> None:
-        """Shorten the file if it is too long: its begin and end stay, with a note between them."""
+        """Shorten the file if it is too long: beginning and end stay, with a note between them."""
         size = os.fstat(self.descriptor).st_size
         if size <= self._limit:
             return
@@ -127,7 +127,8 @@ def logged_output(path: Path, limit: int = MAX_LOG_BYTES) -> Iterator[None]:
     """Write to a file what this process and its new children print while the block runs.
 
     Covers `print`, `logging`, warnings, and native code: the descriptors of stdout and stderr lead
-    to the file. They are those of the whole process, so only one log can be open this way.
+    to the file. They are those of the whole process, so only one log can be open this way. At the
+    end everything is undone in reverse order, after Python has written what it still holds.
 
     Args:
         path: of the file; an earlier one is replaced.
@@ -160,6 +161,7 @@ def _flush() -> None:
 
 
 def _set_line_buffering(stream: io.TextIOWrapper, wanted: bool) -> None:
+    """Let a stream be written line by line, or in blocks; nothing if it is closed."""
     with contextlib.suppress(ValueError):  # closed
         stream.reconfigure(line_buffering=wanted)
 

@@ -63,7 +63,9 @@ class LineFile:
         """Yield what `parse_line` makes of each line; nothing if there is no file.
 
         Damaged lines are skipped; a warning at the end names the first. An unfinished last line,
-        which a process may be writing, is kept in `torn`.
+        which a process may be writing, is kept in `torn`. While a result is yielded, `place` says
+        where its line is; `torn`, `damaged` and `damage` are known when the last one has been
+        taken.
 
         Args:
             parse_line: gets the bytes of a line without its newline, the path, and the number of
@@ -183,7 +185,7 @@ class AppendFile:
         """Append lines to the file, given without newlines; when this returns, all are on disk.
 
         If one cannot be written, the file is cut to its earlier size: all lines are written or
-        none.
+        none. An interrupt (Ctrl-C) leaves those that are written.
 
         Raises:
             StoreError: they cannot be written, or `lines` raises it; the file is unchanged.

@@ -121,6 +121,7 @@ def _unpack(archive: zipfile.ZipFile, path: Path, folder: Path, folders: Collect
     """Unpack the wanted files of a pack, which may be a stranger's, so it is checked first.
 
     It must hold exactly the files of its manifest, not too many bytes, and only files of a run.
+    Names are checked before anything is written under them, contents while they are written.
 
     Args:
         archive: the pack.

@@ -76,7 +76,7 @@ class RecordStore:
     def extend(self, lines: Iterable[bytes]) -> None:
         """Append records, each a line of JSON without its newline; all are stored or none.
 
-        When this returns, they are on disk.
+        When this returns, they are on disk. Until then `stored` does not change.
 
         Raises:
             StoreError: a record cannot be written, a line is not one, or a policy or its server is
@@ -204,7 +204,11 @@ class StoredRun(Generic[Stored]):
         return dict(zip(keys, self._places_in_order, strict=True))
 
     def lines(self, wanted: Iterable[Stored]) -> Iterator[bytes]:
-        """Yield the lines of some records from the file, as bytes without newlines."""
+        """Yield the lines of some records from the file, as bytes without newlines.
+
+        They come in the order of `wanted`, all of which must be among `newest`. Their places in the
+        file stay true, as it is only appended to.
+        """
         with self._path.open("rb", buffering=_BUFFER) as file:
             for result in wanted:
                 place = self._places[identity_key(result)]

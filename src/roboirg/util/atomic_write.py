@@ -70,7 +70,14 @@ def locked(path: Path, taken: str) -> Iterator[None]:
 
 
 def take_lock(descriptor: int, path: Path, *, shared: bool = False) -> bool:
-    """Lock an open file if no other process holds its lock. Returns whether it is locked now.
+    """Lock an open file if no other process holds its lock; return whether it is locked now.
+
+    Does not wait. The lock ends when the file is closed or the process ends.
+
+    Args:
+        descriptor: of the open file.
+        path: of the file, for the error.
+        shared: whether others that also share may hold it at the same time.
 
     Raises:
         InvalidValueError: its file system has no locks, as some network file systems.

@@ -91,7 +91,11 @@ class Cache:
         return content
 
     def write(self, key: str, content: bytes) -> None:
-        """Store an entry; a failure is logged, not raised."""
+        """Store an entry; a failure is logged, not raised.
+
+        Nothing is stored if the cache is off or the entry alone exceeds the limit. Other entries
+        are removed to make room.
+        """
         size = _HEAD_SIZE + len(content)
         if self._folder is None or size > self._limit:
             return
@@ -128,7 +132,10 @@ class Cache:
 
 
 def open_cache(kind: Kind) -> Cache:
-    """Return the cache of one kind of entries, as the environment variables configure it."""
+    """Return the cache of one kind of entries, as the environment variables configure it.
+
+    It may be switched off; reading then finds nothing, and writing does nothing.
+    """
     folder = cache_folder()
     if folder is None:
         return Cache(None, 0)

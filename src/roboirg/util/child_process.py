@@ -123,7 +123,7 @@ class ChildProcess:
         self._end_group()
 
     def close(self) -> ChildExit:
-        """Let the child exit by closing its channel; kill it after `GRACE_S`.
+        """Let the child exit by closing its channel; kill it after `GRACE_S`; return how it ended.
 
         One that not even that ends, as a call of a driver may hang in the kernel, is left behind.
         """

@@ -61,14 +61,17 @@ class Clip:
 
 
 def sample_evenly(frames: Pixels, most: int) -> Pixels:
-    """Return at most `most` frames, evenly spaced, including the first and the last."""
+    """Return at most `most` of frames (T, …), evenly spaced, including the first and the last."""
     if len(frames) <= most:
         return frames
     return frames[evenly_spaced(len(frames), most)]
 
 
 def evenly_spaced(count: int, most: int) -> NDArray[np.intp]:
-    """Return at most `most` of `count` places, evenly spaced, including the first and the last."""
+    """Return at most `most` of `count` indices, evenly spaced, including the first and the last.
+
+    7 and 3 -> ``[0, 3, 6]``; 2 and 3 -> ``[0, 1]``.
+    """
     return np.linspace(0, count - 1, min(count, most)).round().astype(np.intp)
 
 
@@ -85,11 +88,13 @@ def scaled_square(picture: NDArray[Any], size: int) -> NDArray[Any]:
 
 
 def contact_sheets(frames: Pixels, labels: Sequence[str]) -> Iterator[Pixels]:
-    """Yield sheets of frames at half their size, in reading order, each with its label.
+    """Yield sheets, each a picture of up to `SHEET_SIDE` ** 2 frames in reading order, with labels.
+
+    Frames have half their size.
 
     Args:
         frames: uint8 (T, height, width, 3).
-        labels: T short texts.
+        labels: T short texts, such as times.
     """
     small = np.ascontiguousarray(frames[:, ::2, ::2])  # every second row and column, as a copy
     for frame, label in zip(small, labels, strict=True):
@@ -149,7 +154,7 @@ def encode_jpeg(pixels: Pixels) -> bytes:
 
 
 def encode_mp4(clip: Clip) -> bytes:
-    """Return a clip as an MP4 file, H.264."""
+    """Return a clip as an MP4 file, H.264; the same frames give the same bytes on one machine."""
     _check_pyav()
     import av
 

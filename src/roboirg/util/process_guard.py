@@ -120,7 +120,8 @@ def _reap(child: int) -> int | None:
 def _end_descendants(child: int) -> None:
     """End all that a dead child has started, until nothing is left.
 
-    It gets SIGTERM at first, and SIGKILL after `_TERM_S`.
+    Its processes get SIGTERM at first, and SIGKILL after `_TERM_S`. They become children of this
+    process, as it is their subreaper: no children left means done.
     """
     # Python's resource trackers are among them, and have to clean up, which SIGKILL prevents.
     number = signal.SIGTERM

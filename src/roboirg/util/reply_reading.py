@@ -101,8 +101,9 @@ def with_thoughts(answer: str, thoughts: Sequence[Any]) -> str:
 def answer_of(text: str) -> str:
     """Return a reply without the thoughts in it, and without the tokens at its end.
 
-    What follows the last end of thoughts is the answer, up to thoughts that break off. The tag at
-    their beginning may be missing, as some services put it into the prompt.
+    ``"<think>red or blue?</think> red <|im_end|>"`` -> ``"red"``. What follows the last end of
+    thoughts is the answer, up to thoughts that break off. The tag at their beginning may be
+    missing, as some services put it into the prompt.
     """
     after_thoughts = _THOUGHTS_END.split(text)[-1]
     return _ANSWER_ENDS.split(after_thoughts)[0].strip()
@@ -127,7 +128,7 @@ def json_object(text: str) -> dict[str, Any]:
 def last_json(text: str) -> Any:  # noqa: ANN401 - JSON
     """Return the last JSON object in a reply, or the last list of objects; None without any.
 
-    ``Not {"a": 1}, but {"a": 2}.`` gives ``{"a": 2}``.
+    ``Not {"a": 1}, but {"a": 2}.`` -> ``{"a": 2}``. Thoughts are left out first.
 
     Raises:
         UnparsableReplyError: a brace belongs to no well-formed object, so that none is sure to be
@@ -156,11 +157,15 @@ def _distinct_fields(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def chosen_letter(text: str, letters: str) -> str:
-    """Return the letter that a reply chooses, in upper case: ``The answer is b.`` chooses ``B``.
+    """Return the letter that a reply chooses, in upper case: ``The answer is b.`` -> ``B``.
 
     If the reply has a JSON object with the field ``choice`` or ``answer``, only that is read.
     Letters alone on a line, after *answer* and in boxes decide; only without any do those that
     begin a line or are set in bold.
+
+    Args:
+        text: the reply.
+        letters: those that may be chosen, such as ``"ABC"``.
 
     Raises:
         UnparsableReplyError: it names none of the letters from A to D, several different ones, one

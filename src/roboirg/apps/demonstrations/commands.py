@@ -104,6 +104,7 @@ def _print_size(plan: ExportPlan) -> None:
     """Print how many trajectories the plan records, and how many episodes it exports.
 
     Warn if episodes or words of the test split are exported, on which a policy must not be trained.
+    All goes to the error stream.
     """
     from roboirg.apps.demonstrations.export_plan import recording_jobs
 

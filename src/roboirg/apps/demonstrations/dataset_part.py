@@ -72,9 +72,10 @@ class RecordedTexts(NamedTuple):
 def place_texts(recorded: Sequence[RecordedTexts]) -> list[RecordedEpisode]:
     """Give every instruction of a trajectory the numbers that LeRobot has for an episode.
 
-    An episode is a trajectory with one of its instructions, so a trajectory of 90 frames with two
-    makes the episodes 0 and 1, whose first frames have the numbers 0 and 90. Equal texts have the
-    same task index. Trajectories without frames are left out.
+    An episode of the dataset is a trajectory with one of its instructions. So a trajectory of 90
+    frames with two instructions makes the episodes 0 and 1, whose first frames have the numbers 0
+    and 90. Equal texts have the same task index. Trajectories without frames are left out. Numbers
+    follow the order of `recorded`, and no number is left out.
     """
     task_indices: dict[str, int] = {}
     episode_index = 0
@@ -95,7 +96,10 @@ def place_texts(recorded: Sequence[RecordedTexts]) -> list[RecordedEpisode]:
 
 
 def all_texts(parts: Sequence[DatasetPart]) -> list[str]:
-    """Return the distinct texts of all instructions, in the order of their indices from 0."""
+    """Return the distinct texts of all instructions, in the order of their task indices from 0.
+
+    The indices are those of `place_texts`, which have no gaps.
+    """
     text_by_index = {}
     for part in parts:
         for episode in part.episodes:

@@ -65,7 +65,10 @@ def export_formats() -> Mapping[str, ExportFormat]:
 
 
 def names_where(has: Callable[[ExportFormat], bool]) -> str:
-    """Return the names of the formats that have a trait: ``'robomme-hdf5'``, or ``'a' or 'b'``."""
+    """Return the names of the formats for which `has` is true: ``"'robomme-hdf5'"``.
+
+    Several are joined: ``"'lerobot-v2.1' or 'lerobot-v3'"``.
+    """
     return " or ".join(repr(known.name) for known in export_formats().values() if has(known))
 
 

@@ -94,12 +94,14 @@ class ExportPlan:
         return self
 
     def _check_disturbed(self) -> None:
-        """Check that the format has room for disturbed demonstrations, and for waypoints.
+        """Check what disturbed demonstrations need, and what waypoints need.
 
-        Of a disturbed demonstration both the executed and the right action are stored.
+        Of a disturbed demonstration, in which the expert is pushed off its way and corrects it,
+        both the executed and the right action are stored, for which the format must have room.
 
         Raises:
-            InvalidValueError: it has not, or the policy is not the oracle.
+            InvalidValueError: it has not; the policy of a disturbed one is not the oracle; or
+                waypoints are to include the video.
         """
         if self.disturbed and (self.policy != ORACLE or not self.file_format.has_labels):
             unlabeled = names_where(lambda known: not known.has_labels)
@@ -117,6 +119,8 @@ class ExportPlan:
 
     def _check_pictures(self) -> None:
         """Check the cameras and the size of pictures, also against what the format needs.
+
+        RoboMME's format and openpi need both cameras in full size; what has depth needs PNG.
 
         Raises:
             InvalidValueError: a value or a combination is not possible.
@@ -173,7 +177,10 @@ class ExportPlan:
         return language_label(self.tasks, self.pool, self.settings, self.options.wordings)
 
     def fingerprint(self) -> str:
-        """Return a hash of everything that determines the dataset."""
+        """Return a hash (SHA-256, hexadecimal) of everything that determines the dataset.
+
+        A stopped export is only continued with the same one.
+        """
         versions = [self.language_label, ENVIRONMENT_VERSION, TRAJECTORY_VERSION]
         return hashlib.sha256(json.dumps([asdict(self), versions]).encode()).hexdigest()
 
@@ -219,7 +226,11 @@ class RecordingJob:
         return get_episode(self.task, self.split, self.number)
 
     def path(self, folder: Path) -> Path:
-        """Return the path of the trajectory's file, whose name has all that it depends on."""
+        """Return the path of the trajectory's file, whose name has all that it depends on.
+
+        For example ``PickXtimes-train-00003-000-png.zip``. Exports that keep trajectories in one
+        folder share the files of equal names.
+        """
         name = f"{self.task}-{self.split}-{self.number:05d}-{self.variation:03d}"
         if self.options is not None:
             name += f"-{short_hash(self.policy)}-{self.options.setting}-{self.options.form}"
@@ -228,7 +239,8 @@ class RecordingJob:
     def _spec_words(self) -> list[str]:
         """Return the words of the file's name for what it holds: ``["png", "video", "front"]``.
 
-        What is usual, such as all cameras, is left out.
+        What is usual, such as all cameras, is left out. The order is fixed: kept files are found by
+        it.
         """
         spec = self.spec
         words: list[str] = [spec.coding]
@@ -255,7 +267,11 @@ class SpokenJob(NamedTuple):
 
 
 def training_words(split: str, options: InstructionOptions) -> InstructionOptions:
-    """Return options with words of the pool for training, unless they name their words."""
+    """Return options whose words are for training, unless they name their words.
+
+    Options without `wordings`, split ``"test"`` -> the same with ``wordings="train"``. For train
+    and val, these are the words of the split anyway.
+    """
     if options.wordings is None and pool_of(split) != "train":
         return replace(options, wordings="train")
     return options
@@ -276,10 +292,11 @@ def recording_jobs(plan: ExportPlan) -> list[SpokenJob]:
 
 
 def _jobs_of(plan: ExportPlan, episode: Episode) -> list[SpokenJob]:
-    """Return the trajectories to record of an episode, each with the instructions that it fits.
+    """Return the trajectories to record of an episode, each with the instructions that it serves.
 
-    The oracle, which knows the goal, moves in the same way whatever is said, so its trajectory
-    serves all instructions; any other policy is recorded once for each.
+    The oracle, which knows the goal, moves in the same way whatever is said: one trajectory serves
+    all instructions, or each of several variations does. Any other policy is recorded once for each
+    instruction, and does not vary. No instruction -> no trajectory.
     """
     texts = _texts_of(plan, episode)
     if not texts:
@@ -302,8 +319,8 @@ def _jobs_of(plan: ExportPlan, episode: Episode) -> list[SpokenJob]:
 def _texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
     """Return the instructions of an episode in all settings and forms of the plan.
 
-    Settings that cannot express the episode have none. The implicit form of an explicit instruction
-    is also its resolved form, so it is not given twice.
+    Settings that cannot express the episode have none. An explicit instruction points back at
+    nothing, so its implicit form is also its resolved form and is not given twice.
     """
     words = InstructionOptions(wordings=plan.options.wordings)
     explicit = instruct_with(episode, words).text

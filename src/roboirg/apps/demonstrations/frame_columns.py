@@ -108,6 +108,7 @@ class FrameColumns:
         return {name: feature for name, feature in features if feature["dtype"] != "video"}
 
     def _picture_feature(self) -> dict[str, Any]:
+        """Return what ``info.json`` says of a column of pictures: type, shape, coding of videos."""
         feature: dict[str, Any] = {
             "dtype": "video" if self.has_videos else "image",
             "shape": [self.plan.size, self.plan.size, 3],
@@ -131,10 +132,11 @@ class FrameColumns:
         """Return the columns of numbers that do not depend on the instruction.
 
         Row 0 of a trajectory is before its first action. A frame has the state of one row and the
-        action that leads to the next, so there is one frame less than rows.
+        action that leads to the next (``[:-1]`` and ``[1:]``), so there is one frame less than
+        rows.
 
         Returns:
-            Each of shape (frames, size).
+            By column, arrays of shape (frames, size); size is 1 for flags and times.
         """
         facts = trajectory.facts
         frames = np.arange(facts.frames, dtype=np.int64)

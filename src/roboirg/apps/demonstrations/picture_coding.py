@@ -61,7 +61,7 @@ def _png(image: NDArray[Any]) -> bytes:
 
 
 class VideoEncoder:
-    """Encodes one video in memory.
+    """Encodes one video in memory: `add` each picture in order, then `finish` once.
 
     Args:
         coding: ``lossless-video`` or ``lossy-video``.
@@ -96,7 +96,7 @@ class VideoEncoder:
         self._container.mux(self._stream.encode(frame))
 
     def finish(self) -> bytes:
-        """Return the video as MP4."""
+        """Return the video as MP4; no picture can be added after this."""
         self._container.mux(self._stream.encode(None))
         self._container.close()
         return self._file.getvalue()

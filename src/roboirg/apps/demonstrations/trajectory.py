@@ -147,6 +147,10 @@ class Trajectory:
 def load_trajectory(path: Path) -> Trajectory:
     """Read a trajectory from its file: facts, states and actions, but no pictures.
 
+    The file has an array for each field of `Trajectory` that is one, and for each camera's
+    histogram; with depth, also for each matrix of the calibration. `write_arrays` is the other
+    half.
+
     Raises:
         InvalidValueError: the file is missing or damaged, or of another version.
     """
@@ -190,6 +194,11 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
 
 
 def _read_facts(archive: zipfile.ZipFile, path: Path) -> TrajectoryFacts:
+    """Read the facts of an open trajectory's file; `path` is for the message.
+
+    Raises:
+        InvalidValueError: the file is of another version of the format.
+    """
     fields = json.loads(archive.read(_FACTS))
     if fields.get("version") != TRAJECTORY_VERSION:
         raise InvalidValueError(
@@ -200,6 +209,7 @@ def _read_facts(archive: zipfile.ZipFile, path: Path) -> TrajectoryFacts:
 
 
 def _read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    """Read one array of an open trajectory's file, given its name there, ``actions.npy``."""
     array: NDArray[Any] = np.load(io.BytesIO(archive.read(name)), allow_pickle=False)
     return array
 
@@ -244,7 +254,10 @@ def read_depth(archive: zipfile.ZipFile, camera: str, row: int) -> NDArray[np.in
 
 
 def drop_pictures(path: Path) -> None:
-    """Remove the pictures from a trajectory's file, to save space; keep its facts and arrays."""
+    """Remove the pictures from a trajectory's file, to save space; keep its facts and arrays.
+
+    The file is replaced at once, so a reader finds either the old or the new one.
+    """
     if not has_pictures(path):
         return
     with (

@@ -64,7 +64,7 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
 
     The actions are None if the episode did not begin. No picture is drawn. If the record is an
     error, its actions are played as far as they go, and the new record gets the same error and
-    cause: actions do not show whether a policy raised.
+    cause: actions do not show whether a policy raised. `record` and `log` stay as they are.
 
     Raises:
         InvalidValueError: the job's wording file is missing or has changed.
@@ -123,7 +123,11 @@ class RecordedJob(PreparedJob):
 
 
 def prepared_job(record: Record) -> PreparedJob:
-    """Return what was played, without the address of the policy, and what was said."""
+    """Return the job of a record, ready to be played: what was to be done, and what was said.
+
+    The address of the policy is left out. If the record's words are not those of this package, they
+    are taken from the record.
+    """
     job = msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)
     if has_other_words(record):
         return RecordedJob(job, record)

@@ -65,7 +65,10 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
 
 
 def _names_below(folder: Path, name: str) -> list[str]:
-    """Return the files in a folder of a run, but no hidden ones, by their paths in the run."""
+    """Return the files below a folder of a run, sorted, by their paths in the run.
+
+    ``"actions"`` -> ``["actions/1a/2b.npz", …]``; hidden ones are left out.
+    """
     names: list[str] = []
     for path in (folder / name).rglob("[!.]*"):
         if path.is_file():
@@ -74,7 +77,7 @@ def _names_below(folder: Path, name: str) -> list[str]:
 
 
 def _write(out: Path, manifest: PackManifest, paths: Mapping[str, Path]) -> None:
-    """Write manifest and files into a pack, a ZIP file.
+    """Write manifest and files into a pack, a ZIP file, in the order of `paths`.
 
     Every entry gets the same date, so that the same files give the same bytes.
     """

@@ -73,6 +73,9 @@ def verify_run(
 ) -> Verification:
     """Check all records of a run, and play the actions of a sample of them.
 
+    All records are checked for what follows from their jobs; those of the sample, also for what
+    follows from their actions.
+
     Args:
         folder: output folder of the run.
         sample: share of the episodes that are played, 0 to 1.
@@ -141,7 +144,10 @@ def _excuses(failed: Sequence[RecordCheck], entries: Sequence[Summary]) -> Itera
 
 
 def _lines(run: StoredRun[Summary], sample: float, seed: int | None) -> Sequence[LineToCheck]:
-    """Return the newest line of each episode; a random share of them is marked to be played."""
+    """Return the newest line of each episode; a random share of them is marked to be played.
+
+    A share above 0 marks one line at least. `seed` None draws other lines each time.
+    """
     total = len(run.newest)
     count = round(sample * total)
     if sample > 0:
@@ -187,7 +193,7 @@ def _completeness(plans: Sequence[Plan], kept: Plans, entries: Sequence[Summary]
     episodes of an earlier plan that were never played, are no faults: the notes count them.
 
     Args:
-        plans: the newest ones of the run.
+        plans: the newest ones of the run; without any, nothing is missing.
         kept: all plans of the run by fingerprint, which records name.
         entries: all records.
     """
@@ -207,7 +213,7 @@ def _completeness(plans: Sequence[Plan], kept: Plans, entries: Sequence[Summary]
 
 
 def _slugs(plans: Sequence[Plan]) -> dict[RecordKey, str]:
-    """Return the names of the episodes of some plans, by what identifies them."""
+    """Return the names (slugs) of the episodes of some plans, by what identifies them."""
     slugs: dict[RecordKey, str] = {}
     for plan in plans:
         for job in plan.jobs():

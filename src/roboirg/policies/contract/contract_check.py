@@ -51,7 +51,13 @@ def check_policy(spec: str, policy: object, methods: tuple[str, ...]) -> None:
 
 
 def _check_arguments(spec: str, method: Callable[..., Any], takes: tuple[str, ...]) -> None:
-    """Raise for a method that cannot be called with the arguments that it gets."""
+    """Raise for a method of a class that cannot be called with the arguments that it gets.
+
+    Args:
+        spec: of the policy, for the error.
+        method: not bound to an object, so `self` is its first argument.
+        takes: names of the positional arguments, for the error, too.
+    """
     try:
         inspect.signature(method).bind(None, *takes)
     except ValueError:  # a method written in C may have no signature

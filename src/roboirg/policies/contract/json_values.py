@@ -62,7 +62,7 @@ def _as_json(value: Any, place: _Place) -> Any:  # noqa: ANN401
 
     Args:
         value: anything.
-        place: where it stands in what is converted.
+        place: where it stands in what is converted; decides what is refused, and the words for it.
     """
     if place.depth > MAX_DEPTH:
         if place.owner is not None:
@@ -120,8 +120,8 @@ def _array(value: Any, place: _Place) -> Any:  # noqa: ANN401
 def _text(value: object, place: _Place) -> str:
     """Return a value as a text.
 
-    A stranger's value may be anything. One with an owner has to be a text, a path or a whole
-    number, and anything else raises `InvalidValueError`.
+    A stranger's value (without an owner) may be anything, and is cut. One with an owner has to be a
+    text, a path or a whole number, and anything else raises `InvalidValueError`.
     """
     if place.owner is None:
         return printable(str(value)[:_MAX_TEXT_LENGTH])

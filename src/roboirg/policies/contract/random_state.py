@@ -15,7 +15,8 @@ import numpy as np
 class RandomState:
     """The states of the global random generators, as one episode left them.
 
-    PyTorch's generators are seeded in the first turn after an import of it.
+    `restore` before the episode's turn, `keep` after it. PyTorch's generators are seeded in the
+    first turn after an import of it.
 
     Args:
         seed: of all generators at the beginning of the episode.
@@ -69,7 +70,7 @@ class RandomTurns:
         """Of the episode whose numbers the generators give; None between turns."""
 
     def begin(self, episode: RandomState) -> None:
-        """Let the generators give the numbers of an episode, until the turn of another."""
+        """Let the generators give the numbers of an episode, until the turn of another or `end`."""
         if self._episode is not episode:
             self.end()
             self._episode = episode

@@ -118,7 +118,10 @@ class LeRobotPolicy:
         demonstration: Demonstration,  # noqa: ARG002
         seed: int = 0,
     ) -> CheckpointEpisode:
-        """Load the checkpoint and begin an episode.
+        """Load the checkpoint, if this is the first episode, and begin an episode.
+
+        Its model is a shallow copy, which shares the weights; parts with a reset of their own are
+        copied, too.
 
         Raises:
             MissingDependencyError: LeRobot, PyTorch or what the checkpoint needs is not installed.
@@ -137,7 +140,7 @@ class LeRobotPolicy:
     def act_batch(
         self, states: Sequence[CheckpointEpisode], observations: Sequence[Observation]
     ) -> list[Actions]:
-        """Return the checkpoint's next actions, (n, 8) for each episode."""
+        """Return the checkpoint's next actions, (n, 8) for each episode, in their order."""
         import torch
 
         # One at a time, unless the model takes batches: the noise of an episode, or what the model
@@ -156,7 +159,7 @@ class LeRobotPolicy:
     def _ask(
         self, states: Sequence[CheckpointEpisode], observations: Sequence[Observation], size: int
     ) -> list[Actions]:
-        """Return the model's actions for at most `size` episodes, in one batch.
+        """Return the model's actions (n, 8) for each of at most `size` episodes, in one batch.
 
         A batch always has `size` rows, as a model's rounding depends on their number: the last
         episode is repeated to fill it up, and the surplus rows are dropped.
@@ -217,7 +220,11 @@ class LeRobotPolicy:
         return torch.stack(rows, dim=1)
 
     def _batch(self, observations: Sequence[Observation]) -> dict[str, Any]:
-        """Return observations in LeRobot's form: pictures (n, 3, H, W) in [0, 1]."""
+        """Return observations in LeRobot's form, by its names of inputs, as tensors.
+
+        Pictures (n, 3, height, width) in [0, 1], states (n, 8) float32, and the list of
+        instructions.
+        """
         import torch
 
         states = []  # seven joints and the first finger
@@ -290,7 +297,7 @@ class LeRobotPolicy:
 
 
 def _noise_shape(config: Any, model: Any) -> tuple[int, int] | None:  # noqa: ANN401
-    """Return the shape of the noise that a chunk is made of; None if the model takes none."""
+    """Return the shape (steps, numbers) of the noise that a chunk is made of; None without."""
     steps = getattr(config, "chunk_size", None)
     dimensions = getattr(config, "max_action_dim", None)
     takes_noise = "noise" in inspect.signature(model.predict_action_chunk).parameters
@@ -336,5 +343,6 @@ def _describe(config: Any, before: object, after: object) -> dict[str, Any]:  # 
 
 
 def _step_names(processor: object) -> list[str]:
+    """Return the names of the steps of LeRobot's pre- or postprocessor, in order."""
     steps = getattr(processor, "steps", ())
     return [getattr(step, "_registry_name", type(step).__name__) for step in steps]

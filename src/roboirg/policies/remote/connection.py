@@ -58,7 +58,7 @@ _MAX_TRACEBACK_END = 4096
 
 
 class ServerConnection:
-    """One episode's use of a server; can begin again after its end.
+    """One episode's use of a server: `begin`, any number of `exchange`, `end`; can begin again.
 
     Args:
         scheme: of the policy's URL.
@@ -182,8 +182,14 @@ class ServerConnection:
     def _attempt(self, left: float) -> ClientConnection | str:
         """Return a connection, or why there is none yet; raise if another attempt cannot help.
 
+        The connection is closed by `end`.
+
         Args:
             left: seconds that are left to connect.
+
+        Returns:
+            The connection; or the reason in words, ``"HTTP status 503"``: the server may still be
+                starting.
         """
         endpoint = self.endpoint
         scheme = "wss" if self._options.tls else "ws"
@@ -223,7 +229,7 @@ class ServerConnection:
             raise PolicyConnectionError(f"{self} refused: {_describe(error)}.") from error
 
     def _refuse_surplus(self, websocket: ClientConnection) -> None:
-        """Raise if there is a message already, before the request."""
+        """Raise if there is a message before the request: it would be taken for the reply."""
         with contextlib.suppress(TimeoutError):
             surplus = websocket.recv(timeout=0)
             if isinstance(surplus, str):
@@ -242,7 +248,7 @@ class ServerConnection:
             ) from error
 
     def _broken(self, error: ConnectionClosed) -> RoboIRGError:
-        """Return the error for a connection that has ended, by what the library found out of it."""
+        """Return (not raise) the error for a connection that has ended, by what is known of it."""
         if isinstance(error.__cause__, BlockingIOError):
             seconds = self._options.timeout
             return PolicyTimeoutError(f"{self} did not take in a message within {seconds:g} s.")
@@ -277,7 +283,10 @@ def _next_message(websocket: ClientConnection, end: float) -> bytes | str | None
 
 
 def _shut_down(websocket: ClientConnection) -> None:
-    """Wake the threads that use a socket, also one with TLS, whose state is left alone."""
+    """Shut a socket down, which wakes the threads that use it.
+
+    The state of TLS is left alone, as another thread may be in the middle of it.
+    """
     with contextlib.suppress(OSError):
         socket.socket.shutdown(websocket.socket, socket.SHUT_RDWR)
 

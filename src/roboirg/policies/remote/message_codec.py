@@ -68,7 +68,7 @@ def unpack(data: bytes) -> dict[str, Any]:
 
 
 def _encode(text_keys: bool, value: object) -> object:
-    """Return an array or scalar of NumPy in a form that msgpack can pack.
+    """Return an array or scalar of NumPy in a form that msgpack can pack; `_decode` reverses it.
 
     Args:
         text_keys: the dialect. If true, an array is a map with texts as keys and a scalar a plain
@@ -99,7 +99,9 @@ def _encode(text_keys: bool, value: object) -> object:
 def _decode(packed: dict[Any, Any]) -> object:
     """Return what a map of a message stands for: an array, a scalar, or the map itself.
 
-    Maps of all dialects are read: ours with texts or bytes as keys, and those of msgpack-numpy.
+    ``{b"__ndarray__": True, b"data": …, b"dtype": "<f4", b"shape": [8]}`` -> an array (8,). Maps of
+    all dialects are read: ours with texts or bytes as keys, and those of msgpack-numpy. msgpack
+    calls this for every map, the innermost first.
     """
     entries: dict[Any, Any] = {}
     for key, value in packed.items():

@@ -174,7 +174,7 @@ class RemotePolicy(ABC):
 
     @contextlib.contextmanager
     def _closed_on_error(self) -> Iterator[None]:
-        """Unlock the server as soon as an episode cannot go on."""
+        """Disconnect and unlock the server as soon as the block raises: the episode is over."""
         try:
             yield
         except Exception:

@@ -89,6 +89,7 @@ class WebsocketServer:
             self._loop.call_soon_threadsafe(self._stop.set)
 
     async def _serve(self) -> None:
+        """Accept connections until `shutdown` is called."""
         async with serve(
             self._converse,
             sock=self.socket,
@@ -130,7 +131,11 @@ class WebsocketServer:
         return hmac.compare_digest(authorization.encode(), expected.encode())
 
     async def _converse(self, connection: ServerConnection) -> None:
-        """Send the metadata, then reply to each message until the client or an error ends it."""
+        """Send the metadata, then reply to each message until the client or an error ends it.
+
+        An idle or slow client ends it after `timeout_s`; after an error, its traceback is the last
+        reply.
+        """
         service = self._service.connection()
         timeout_s = self._options.timeout_s
         with contextlib.ExitStack() as ends, contextlib.suppress(ConnectionClosed, TimeoutError):

@@ -1,6 +1,6 @@
 """All goals of a task as a JSON schema, and the goal of an answer.
 
-An answer has a field for each slot of a goal, such as ``{"color": "red", "times": 3}``. Where a
+An answer has a field for each slot of a goal, such as ``{"color": "red", "repeats": 3}``. Where a
 goal counts cubes by color, each color is a field: ``{"blue": 0, "green": 2, "red": 1}``.
 
 The names of the slots and all their values come from the goals of the task's training scenes.
@@ -101,7 +101,9 @@ class GoalSchema:
         return object_schema(properties)
 
     def read(self, text: str) -> Goal:
-        """Return the goal that a reply names in a JSON object.
+        """Return the goal that a reply names in a JSON object, perhaps with other words around it.
+
+        ``'I think {"color": "Red", "repeats": "3"}'`` -> the goal *red, three times*.
 
         Raises:
             UnparsableReplyError: it names none; the message, which the model gets, says why.
@@ -140,7 +142,8 @@ def goal_schema(task: str) -> GoalSchema:
     """Return the form of an answer that names a goal of a task, and all goals by their answers.
 
     The goals are those of the training split. Answers with colors that are counted have a field for
-    each color; a goal has no entry for a color that it does not want, so 0 is filled in.
+    each color; a goal has no entry for a color that it does not want, so 0 is filled in: *two red*
+    -> ``{"blue": 0, "green": 0, "red": 2}``.
     """
     known_task = get_task(task)
     goals: dict[Goal, None] = {}  # a set that keeps its order
@@ -165,7 +168,10 @@ def goal_schema(task: str) -> GoalSchema:
 
 
 def _answer(goal: Goal) -> Answer:
-    """Return the answer that names a goal; of counted colors, those that it names."""
+    """Return the answer that names a goal; of counted colors, those that it names.
+
+    *Two red* -> ``{"red": 2}``; *red, three times* -> ``{"color": "red", "repeats": 3}``.
+    """
     slots = goal.as_mapping()
     if "counts" in slots:
         return dict(goal.amounts)

@@ -133,7 +133,7 @@ class VLMNamer:
         return ModelQuery(texts.system, (turn,), schema.schema(reasoning))
 
     def _video(self, demonstration: Demonstration, steps: int) -> tuple[Part, ...]:
-        """Return the demonstration, of so many control steps, as a clip; none without one."""
+        """Return the demonstration, of `steps` control steps, as a clip in a tuple, or no clip."""
         if not steps:
             return ()
         frames = demonstration[f"{CAMERA}_rgb"]

@@ -121,6 +121,8 @@ class VLMQuery:
         """Return the stored reply to a query, or send it and store the reply.
 
         A new reply is stored before anything sees it, so that an interrupted run repeats nothing.
+        Either way the store's number of calls goes up by one: it must count the same when the
+        episode is played again.
         """
         store = current_store()
         if store is None:
@@ -139,10 +141,10 @@ class VLMQuery:
         return reply
 
     def _send(self, query: ModelQuery, store: ReplyStore | None) -> ModelReply:
-        """Send a query until there is a reply.
+        """Send a query until there is a reply, and return it.
 
         It is sent again while the service is busy, for `patience_s` in all, and `retries` times if
-        it cannot be reached. Any other error is raised.
+        it cannot be reached. Any other error is raised at once.
 
         Args:
             query: for the model.

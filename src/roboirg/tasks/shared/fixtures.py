@@ -54,7 +54,7 @@ def draw_number(rng: np.random.Generator, bounds: Bounds) -> int:
 def counted_goals(scene: Scene, kind: ObjectKind, most: int) -> tuple[Goal, ...]:
     """Return a goal for every object of a kind, by color, for once to `most` times.
 
-    A red cube, at most twice -> *red once* and *red twice*.
+    A red cube, at most twice -> *red once* and *red twice*, ``Goal.of(color="red", repeats=2)``.
     """
     return goals_by_color(scene, kind, "repeats", range(1, most + 1))
 
@@ -62,7 +62,11 @@ def counted_goals(scene: Scene, kind: ObjectKind, most: int) -> tuple[Goal, ...]
 def goals_by_color(
     scene: Scene, kind: ObjectKind, slot: str, values: Iterable[SlotValue]
 ) -> tuple[Goal, ...]:
-    """Return a goal for every object of a kind, by color, with each value of another slot."""
+    """Return a goal for every object of a kind, by color, with each value of another slot.
+
+    A slot is a named part of a goal. A red cube, slot ``"relation"``, values ``("before",
+    "after")`` -> ``Goal.of(color="red", relation="before")`` and the same with ``"after"``.
+    """
     goals: list[Goal] = []
     for item in scene.of_kind(kind):
         goals += [Goal.of(color=str(item.color), **{slot: value}) for value in values]
@@ -86,7 +90,7 @@ class ButtonAndCubes(NamedTuple):
 
 
 def draw_button(rng: np.random.Generator, region: Region, name: str = "button") -> SceneObject:
-    """Draw a button anywhere in the region; it is placed first and needs no clearance."""
+    """Draw a button with its center in the region; it is placed first and needs no clearance."""
     x, y = region.draw(rng)
     return SceneObject(name, "button", Point(x, y, object_sizes.BUTTON_HEIGHT))
 
@@ -112,8 +116,9 @@ def cube_obstacle(cube: SceneObject) -> Rectangle | Line:
     """Return what keeps later objects away from a cube: its square, or a line instead.
 
     RoboMME fits a box to each cube and projects the box's first two axes; rounding decides which
-    axes these are. For every other cube one of them is vertical, and only a line through the
-    middle of two sides remains. Here the digits of the yaw decide.
+    axes these are. For every other cube one of them is vertical, and only a line through the middle
+    of two sides remains. Here the cube's yaw in whole millionths of a radian, modulo 4, chooses one
+    of `LINE_TURNS`, two of which stand for the square.
     """
     turn = LINE_TURNS[int(cube.yaw * YAW_DIGITS) % len(LINE_TURNS)]
     if turn is None:
@@ -150,7 +155,10 @@ def draw_cubes(
     gap: float,
     obstacles: Sequence[Obstacle],
 ) -> list[SceneObject]:
-    """Draw the planned cubes one after the other, each away from those before it."""
+    """Draw the planned cubes one after the other, each away from those before it.
+
+    Returns them in the order of `plans`. `gap` is in meters; `obstacles` is not changed.
+    """
     taken = list(obstacles)
     drawn: list[SceneObject] = []
     for plan in plans:
@@ -221,7 +229,10 @@ def draw_targets(
     obstacles: Sequence[Obstacle],
     rgb: tuple[float, float, float] | None = None,
 ) -> list[SceneObject]:
-    """Draw a target disc in each region, by its name, away from those before it."""
+    """Draw a target disc in each region, away from those before it; the keys name the discs.
+
+    Returns them in the order of `regions`. `radius` and `gap` are in meters, `rgb` is from 0 to 1.
+    """
     taken = list(obstacles)
     targets: list[SceneObject] = []
     for name, region in regions.items():

@@ -28,7 +28,9 @@ def draw_regions(
 ) -> dict[Color, Region]:
     """Draw which of two colors is on the robot's left, and return the region of each.
 
-    The region on the right is the mirror image of that on the left.
+    `left` is the region on the left (positive y); that on the right is its mirror image.
+    ``("green", "purple")`` -> ``{"green": right, "purple": left}``, for example; keys are in the
+    order of `colors`.
     """
     right = left._replace(y=-left.y)
     on_left = shuffled(rng, colors)[0]
@@ -38,7 +40,10 @@ def draw_regions(
 
 
 def left_to_right(scene: Scene, kind: ObjectKind) -> tuple[Color, ...]:
-    """Return the colors of the objects of a kind, from the robot's left to its right."""
+    """Return the colors of the objects of a kind, from the robot's left to its right.
+
+    The robot's left is at larger y. Objects without a color are passed over.
+    """
     items = sorted(scene.of_kind(kind), key=lambda item: -item.position.y)
     return tuple(item.color for item in items if item.color is not None)
 

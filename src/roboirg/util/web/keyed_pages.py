@@ -78,10 +78,10 @@ class KeyedPageServer(AppServer):
         return f"roboirg_{self.port}"
 
     def _refuse(self, request: Request) -> Response | None:
-        """Return None for a request with the cookie; else an answer that sets it, or refuses.
+        """Return None to let a request pass; else an answer that sets the cookie, or refuses.
 
-        The address that is printed has the key. It is exchanged for a cookie and left out of the
-        address, so that it is in no browser history.
+        A request with the cookie passes. The address that is printed has the key. It is exchanged
+        for a cookie and left out of the address, so that it is in no browser history.
         """
         if self._is_own(request):
             is_first = request.method == "GET" and request.url.path == "/"
@@ -102,6 +102,10 @@ class KeyedPageServer(AppServer):
         return is_own_request(hosts, http_origins, self._names)
 
     def _is_key(self, text: str) -> bool:
+        """Return whether a text is the key.
+
+        Takes equally long for every text, as the time of an early end would give letters away.
+        """
         return hmac.compare_digest(text.encode(), self.key.encode())
 
 

@@ -32,7 +32,7 @@ def is_own_request(hosts: Sequence[str], origins: Sequence[str], names: Collecti
 
 
 def is_own_host(host: str, names: Collection[str]) -> bool:
-    """Return whether ``name:port`` of a request names this machine."""
+    """Return whether ``name:port`` of a request names this machine: by a name or any IP address."""
     try:
         parts = urlsplit(f"//{host}")
         name = parts.hostname or ""

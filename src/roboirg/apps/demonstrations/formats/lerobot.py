@@ -79,7 +79,7 @@ _PYAV = " --dataset.video_backend=pyav"
 def make_parts(
     plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts]
 ) -> list[DatasetPart]:
-    """Return a part for each trajectory."""
+    """Return a part for each trajectory, numbered from 0; files are named after the numbers."""
     columns = FrameColumns(plan)
     return [
         DatasetPart(number, root, columns, (episode,))
@@ -90,7 +90,8 @@ def make_parts(
 def write_part(part: DatasetPart) -> None:
     """Write one trajectory as a Parquet file, with its videos: LeRobot's format 3.0.
 
-    The file has the trajectory's frames once for each of its instructions.
+    The file has the trajectory's frames once for each of its instructions; the videos are stored
+    once. Makes only files of this part, so parts can be written by several processes.
     """
     (episode,) = part.episodes
     columns = part.columns
@@ -113,9 +114,10 @@ def write_videos(part: DatasetPart, name_of: Callable[..., str]) -> None:
 
 
 def frame_columns(columns: FrameColumns, trajectory: Trajectory) -> dict[str, Any]:
-    """Return a trajectory's columns, as Parquet holds them, without those of single instructions.
+    """Return a trajectory's columns of Parquet that all its instructions share, by name.
 
     They are numbers such as states and actions, texts, and pictures if these are not in videos.
+    `own_columns` returns the others.
     """
     arrow_columns = {}
     for name, numbers in columns.numbers(trajectory).items():
@@ -129,7 +131,7 @@ def frame_columns(columns: FrameColumns, trajectory: Trajectory) -> dict[str, An
 
 
 def own_columns(placed: PlacedText, length: int) -> dict[str, Any]:
-    """Return the columns that differ between the instructions of a trajectory."""
+    """Return the columns that differ between the instructions of a trajectory: its indices."""
     indices = FrameColumns.indices(placed, length)
     return {name: number_column(values) for name, values in indices.items()}
 
@@ -137,7 +139,8 @@ def own_columns(placed: PlacedText, length: int) -> dict[str, Any]:
 def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the metadata of a complete dataset: episodes, texts, statistics, and ``info.json``.
 
-    The latter comes last, because nothing reads the dataset without it.
+    The latter comes last, because nothing reads the dataset without it. Episodes are added in the
+    order of their numbers, on which LeRobot's tables rely.
     """
     columns = parts[0].columns
     stats = StatsCollector(columns)
@@ -164,7 +167,11 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
 
 
 class StatsCollector:
-    """Collects the statistics of single episodes and of all."""
+    """Collects the statistics of single episodes and of the whole dataset, in one pass.
+
+    Call `add` for each episode, then `result`. All instructions of a trajectory must be added one
+    after the other: what they share is computed once and kept until another trajectory comes.
+    """
 
     def __init__(self, columns: FrameColumns) -> None:
         self._columns = columns
@@ -182,6 +189,9 @@ class StatsCollector:
         Args:
             trajectory: what the robot did.
             placed: the episode's instruction, with its numbers in the dataset.
+
+        Returns:
+            By column the statistics, ``{"action": {"min": […], "max": […], …}, …}``.
         """
         shared = self._columns.numbers(trajectory)
         indices = self._columns.indices(placed, trajectory.facts.frames)
@@ -260,8 +270,9 @@ def _flat(stats: Mapping[str, FeatureStats]) -> dict[str, Any]:
 def _write_tasks(path: Path, texts: Sequence[str]) -> None:
     """Write the distinct texts of instructions with their indices, as LeRobot expects them.
 
-    It reads the file with pandas, and wants the texts as the index of the data frame; this is said
-    by the metadata that pandas itself would write.
+    LeRobot reads the file with pandas, and wants the texts as the index of the data frame; this is
+    said by the metadata that pandas itself would write. `texts` are in the order of their indices
+    from 0.
     """
     import pyarrow as pa
     from pyarrow import parquet

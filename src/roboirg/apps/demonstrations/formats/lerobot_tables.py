@@ -29,7 +29,8 @@ def read_tables(root: Path) -> Iterator[ReplayableTrajectory]:
     """Read the trajectories of a dataset that was exported in LeRobot's format, to replay them.
 
     A trajectory is in the dataset once for each instruction, of which the first is read. Frames of
-    the video that the policy was shown are left out. A folder without an export has none.
+    the video that the policy was shown are left out. Yields nothing if the folder holds no such
+    export.
     """
     path = root / INFO
     if not path.is_file() or not (root / EPISODE_TABLE).is_file():
@@ -67,5 +68,5 @@ def read_tables(root: Path) -> Iterator[ReplayableTrajectory]:
 
 
 def _present(names: Iterable[str], info: Mapping[str, Any]) -> str:
-    """Return the first name that is one of a column."""
+    """Return the first of some names that is a column of the dataset, by its ``info.json``."""
     return next(name for name in names if name in info["features"])

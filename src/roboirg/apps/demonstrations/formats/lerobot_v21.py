@@ -109,7 +109,8 @@ GR00T reads `meta/modality.json`; it needs videos, so export with `--pictures lo
 def write_part(part: DatasetPart) -> None:
     """Write the episodes of one trajectory in LeRobot's format 2.1, each as a Parquet file.
 
-    An episode is the trajectory with one of its instructions.
+    An episode is the trajectory with one of its instructions; each gets a copy of frames and
+    videos. Makes only files of this part, so parts can be written by several processes.
     """
     (episode,) = part.episodes
     columns = part.columns
@@ -128,7 +129,8 @@ def write_part(part: DatasetPart) -> None:
 def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the metadata of a complete dataset: episodes, texts, statistics, and ``info.json``.
 
-    The latter comes last, because nothing reads the dataset without it.
+    The latter comes last, because nothing reads the dataset without it. Episodes are added in the
+    order of their numbers.
     """
     columns = parts[0].columns
     collector = StatsCollector(columns)

@@ -73,7 +73,7 @@ def check_hdf5_support() -> None:
 
 
 def words_of(words: TaskText) -> str:
-    """Return the name of the folder of a setting and form."""
+    """Return the name of the folder of a setting and form, such as ``"spatial-implicit"``."""
     return f"{words.options.setting}-{words.options.form}"
 
 
@@ -105,8 +105,9 @@ def _task(episode: RecordedEpisode) -> str:
 def write_part(part: DatasetPart) -> None:
     """Write the demonstrations of one task as RoboMME's HDF5 files.
 
-    With one setting and form, this is one file. With several, each has a folder with a file of its
-    words, whose time steps are links to a common file, as they do not depend on words.
+    With one setting and form, this is the file ``record_dataset_TASK.h5``. With several, each has a
+    folder with such a file of its words, whose time steps are links to a common file in
+    `SHARED_FOLDER`, as they do not depend on words.
     """
     import h5py
 
@@ -125,7 +126,7 @@ def write_part(part: DatasetPart) -> None:
 
 
 def _folders(part: DatasetPart) -> list[str]:
-    """Return the folders of a part: one for each setting and form of its instructions."""
+    """Return the folders of a part, each once: one for each setting and form of instructions."""
     folders: dict[str, None] = {}
     for episode in part.episodes:
         for placed in episode.texts:
@@ -146,10 +147,12 @@ def _write_episode(file: Any, episode: RecordedEpisode) -> None:  # noqa: ANN401
 def _link_episode(file: Any, episode: RecordedEpisode, folder: str, home: str) -> None:  # noqa: ANN401
     """Write an episode's words in one setting and form, and links to its time steps.
 
+    Nothing is written if the episode has no instruction in them.
+
     Args:
         file: open HDF5 file of the setting and form.
         episode: with its instructions.
-        folder: name of the setting and form.
+        folder: name of the setting and form, such as ``"spatial-implicit"``.
         home: path of the file with the time steps, from the folder.
     """
     import h5py
@@ -166,7 +169,11 @@ def _link_episode(file: Any, episode: RecordedEpisode, folder: str, home: str) -
 
 
 def time_steps(trajectory: Trajectory) -> list[int]:
-    """Return the rows that are time steps: all but the policy's first observation."""
+    """Return the rows of a trajectory that are time steps of RoboMME, in order.
+
+    All but the policy's first observation, whose action, a step at home, RoboMME does not store.
+    Video of 3 rows, 2 steps of the policy -> ``[0, 1, 2, 4, 5]``.
+    """
     facts = trajectory.facts
     return [row for row in range(facts.frames + 1) if row != facts.video_length]
 
@@ -245,7 +252,10 @@ def _write_observation(
 
 
 def _is_boundary(trajectory: Trajectory, row: int) -> bool:
-    """Return whether a row is the first of its subgoal among the time steps."""
+    """Return whether a row is the first of its subgoal among the time steps; see `time_steps`.
+
+    The first time step and the policy's first one always are.
+    """
     first_observation = trajectory.facts.video_length  # which is no time step
     if row in (0, first_observation + 1):
         return True
@@ -266,10 +276,11 @@ def training_text(_plan: ExportPlan, root: Path) -> str:
 
 
 def read(path: Path) -> Iterator[ReplayableTrajectory]:
-    """Read the trajectories of RoboMME's HDF5 files, to replay them.
+    """Read the trajectories of RoboMME's HDF5 files, ours or its own, to replay them.
 
     Args:
-        path: a folder of files, each of one task, or one such file; anything else has none.
+        path: a folder of files, each of one task, or one such file; of anything else, nothing is
+            yielded.
     """
     for file_path in _hdf5_files(path):
         check_hdf5_support()
@@ -282,7 +293,7 @@ def read(path: Path) -> Iterator[ReplayableTrajectory]:
 
 
 def _hdf5_files(path: Path) -> list[Path]:
-    """Return the HDF5 files that hold time steps, not links to them."""
+    """Return the HDF5 files that hold time steps, not links to them; none for other paths."""
     if path.is_file() and path.match(_FILES):
         return [path]
     return sorted(path.glob(_FILES)) or sorted((path / SHARED_FOLDER).glob(_FILES))

@@ -143,7 +143,11 @@ async def _play(
 ) -> dict[str, Any]:
     """Play an episode in a process of its own and return its record.
 
-    The process sends requests to the model, each of which is answered, and at last the record.
+    The process sends requests to the model, each of which is answered here, and at last the record.
+    Whatever happens, the process is ended.
+
+    Raises:
+        RoboIRGError: the process was lost.
     """
     # The kernel ends the child with the thread that started it, so that must be this one.
     child = ChildProcess.spawn(play, job, options)
@@ -164,9 +168,10 @@ async def _play(
 async def _ask(
     model: Model, request: ModelRequest, options: ListenerOptions, state: TaskState
 ) -> ModelReply:
-    """Return the model's reply; Inspect keeps its thoughts apart.
+    """Return the model's reply to a request of the playing process.
 
-    The state's messages become those of this request and the reply.
+    The state's messages become those of this request and the reply. Inspect keeps a model's
+    thoughts apart, so the reply has none.
     """
     config = GenerateConfig()
     if request.schema is not None and options.model.structured:
@@ -185,7 +190,10 @@ async def _ask(
 
 
 def _chat_message(message: dict[str, Any]) -> ChatMessage:
-    """Return a message, given as OpenAI's chat completions take it, as Inspect's."""
+    """Return a message of OpenAI's chat completions as Inspect's.
+
+    ``{"role": "system", "content": "…"}``; a user's content is a list of texts and pictures.
+    """
     content = message["content"]
     if message["role"] == "system":
         return ChatMessageSystem(content=content)
@@ -195,7 +203,7 @@ def _chat_message(message: dict[str, Any]) -> ChatMessage:
 
 
 def _contents(pieces: list[dict[str, Any]]) -> Iterator[Content]:
-    """Yield the texts and pictures of a message."""
+    """Yield the texts and pictures of a user's message as Inspect's, in order."""
     for piece in pieces:
         if piece["type"] == "text":
             yield ContentText(text=piece["text"])

@@ -180,6 +180,9 @@ def make_study(
 ) -> StudyPlan:
     """Return a balanced plan in a random order.
 
+    The same arguments give the same plan: blocks and the orders of their trials are drawn in turns,
+    then the demonstrations.
+
     Args:
         policies: specs, ``NAME=SPEC``, or labels of policies that other software runs.
         tasks: for a real robot.
@@ -187,6 +190,9 @@ def make_study(
         trials: arrangements per task; each policy meets each of them in every setting.
         demonstrations: per task.
         seed: of the orders.
+
+    Raises:
+        InvalidValueError: a name is missing, unknown or given twice, or a number is out of range.
     """
     policies_named = [name_and_spec(policy) for policy in policies]
     names = tuple(name for name, _ in policies_named)
@@ -251,7 +257,11 @@ class _Block(NamedTuple):
 
 
 def _blocks(tasks: Sequence[str], trials: int, rng: np.random.Generator) -> Iterator[_Block]:
-    """Yield the blocks: tasks alternate, their episodes in random order."""
+    """Yield the blocks, one arrangement each: tasks alternate, their episodes in random order.
+
+    A generator on purpose: `_trials` draws from the same `rng` between two blocks, so making it a
+    list changes all plans.
+    """
     episodes = {}
     for task in tasks:
         chosen = counterbalanced_episodes(task, TRIAL_SPLIT, trials)
@@ -269,7 +279,8 @@ def _trials(
 ) -> tuple[PlannedTrial, ...]:
     """Return a trial of each policy in each setting for every block, in a random order there.
 
-    The policies are unread, as they may be labels of what other software runs.
+    Drawing is lazy: the next block is drawn after the order of the trials of the one before. The
+    policies are unread, as they may be labels of what other software runs.
     """
     conditions = list(product(settings, range(len(refs))))
     planned = []

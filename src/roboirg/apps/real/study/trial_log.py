@@ -51,7 +51,9 @@ class TrialLog:
 
     @classmethod
     def read(cls, plan: StudyPlan, folder: Path) -> TrialLog:
-        """Read the records of a folder, but for simulated ones.
+        """Read the records of a folder that are of this plan's trials and of a real robot.
+
+        Records of simulated episodes, which may be in the same folder, are passed over.
 
         Raises:
             StoreError: the records cannot be read.
@@ -74,7 +76,7 @@ class TrialLog:
         return len(self._history.get(name, ()))
 
     def state(self, name: str) -> State:
-        """Return the state of a trial."""
+        """Return the state of a trial: open, scored or void; its newest record decides."""
         record = self.newest(name)
         if record is None:
             return "open"
@@ -126,7 +128,10 @@ class TrialLog:
 
 
 def _verdict(trial: PlannedTrial, choice: str, note: str) -> dict[str, Any]:
-    """Return the fields of a record that a choice decides."""
+    """Return the fields of a record that a choice decides: outcome, error, cause and attribution.
+
+    `choice` is `SUCCESS`, `VOID_CHOICE` or the key of a failure.
+    """
     fields: dict[str, Any] = {"outcome": "success", "error": None, "cause": None}
     fields["attribution"] = None
     if choice == VOID_CHOICE:
@@ -142,7 +147,7 @@ def _verdict(trial: PlannedTrial, choice: str, note: str) -> dict[str, Any]:
 
 
 def _failure(trial: PlannedTrial, key: str) -> FailureChoice:
-    """Return the failure of a key.
+    """Return the failure of a key, such as ``"wrong_place:box_green"``.
 
     Raises:
         InvalidValueError: the trial has no such failure.

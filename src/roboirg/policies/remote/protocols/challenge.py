@@ -163,6 +163,9 @@ def _read_columns(message: Message) -> dict[str, list[Any]]:
     """Return the lists in a request by our names of the fields, all of the same length.
 
     ``front_rgb_list`` becomes ``front_rgb``. Depth and matrices are optional.
+
+    Raises:
+        ValueError: a field is missing, no list, empty, or of another length.
     """
     fields = dict(FIELDS)
     for name, field in (DEPTH_FIELDS | EXTRINSIC_FIELDS).items():
@@ -177,7 +180,10 @@ def _read_columns(message: Message) -> dict[str, list[Any]]:
 
 
 def _stack(observations: list[Observation]) -> dict[str, Any]:
-    """Return all observations but the last as a demonstration: by field, an array of all."""
+    """Return all observations but the last as a demonstration: by field, an array (T, …).
+
+    Without any before the last, T is 0.
+    """
     demonstration: dict[str, Any] = {}
     for field in observations[0]:
         if field != "instruction":

@@ -124,8 +124,9 @@ class MmeVlaPolicy(RemotePolicy):
     def _send_frames(self, observation: Observation) -> None:
         """Add the new frames to the server's memory, in messages of at most `part` frames.
 
-        In the first call these are the T frames of the video and the first one of the policy's
-        turn, which has the number T (``exec_start_idx``); later, one after each action since then.
+        In the first call of an episode these are the T frames of the video and the first one of the
+        policy's turn, which has the number T (``exec_start_idx``); later, one after each action
+        since then.
         """
         demonstration = self._demonstration
         self._demonstration = None
@@ -201,7 +202,7 @@ class MmeVlaService(Service):
         """Return the policy's actions and their milliseconds; the first request begins its episode.
 
         Of the kept frames, those before the policy's turn are then its demonstration; what comes
-        between two requests is its history.
+        between two requests is its history. Kept frames are dropped.
         """
         observation = read_request(message)
         instruction = observation["instruction"]
@@ -226,7 +227,8 @@ class MmeVlaService(Service):
 def _new_frames(demonstration: Demonstration | None, observation: Observation) -> Iterator[_Frame]:
     """Yield the frames of the video, if there is one to send, then those of the policy's turn.
 
-    The video's length is that of its joints: to read its pictures would draw them.
+    The video's length is that of its joints: to read its pictures would draw them. `demonstration`
+    is None for all but the first request of an episode.
     """
     if demonstration is not None and len(demonstration["joint_positions"]):
         states = proprioception(demonstration["joint_positions"], demonstration["gripper"])
@@ -237,6 +239,7 @@ def _new_frames(demonstration: Demonstration | None, observation: Observation) -
 
 
 def _state(observation: Observation) -> NDArray[np.float32]:
+    """Return what the server calls the state: seven joints (rad) and the first finger (m), (8,)."""
     return proprioception(observation["joint_positions"], observation["gripper"])
 
 

@@ -97,6 +97,7 @@ class OpenpiService(Service):
 
 
 def _empty_video(shape: tuple[int, ...]) -> dict[str, Any]:
+    """Return a demonstration without frames, given the shape of a picture."""
     return {
         "front_rgb": np.zeros((0, *shape), np.uint8),
         "wrist_rgb": np.zeros((0, *shape), np.uint8),

@@ -111,7 +111,7 @@ class HttpModel:
     def _fetch(self, request: HttpRequest, fetched: Future[_Response]) -> None:
         """Post a request; put the response, or any error, where another thread waits.
 
-        The error is a `ValueError` if the content is too large.
+        Runs in a thread of its own. The error is a `ValueError` if the content is too large.
         """
         # A few compressed kilobytes may become gigabytes: nothing is unpacked.
         plain = {"Content-Type": "application/json", "Accept-Encoding": "identity"}

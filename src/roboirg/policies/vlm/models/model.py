@@ -259,17 +259,19 @@ def tokens_of(count: object) -> float:
 
 
 def given(**entries: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
-    """Return the entries that are not None."""
+    """Return the entries that are not None: ``given(a=1, b=None)`` -> ``{"a": 1}``."""
     return {name: value for name, value in entries.items() if value is not None}
 
 
 def reported_count(usage: object, name: str, absent: int | None = None) -> float:
     """Return a count of tokens from what a service reports; NaN if it is unknown.
 
+    ``{"prompt_tokens": 12}``, ``"prompt_tokens"`` -> 12.
+
     Args:
         usage: the counts by name, or anything else.
         name: of the count.
-        absent: the count if there is none of that name.
+        absent: the count if there is none of that name; None for unknown.
     """
     if not isinstance(usage, dict):
         return math.nan
@@ -293,7 +295,11 @@ class Model(Protocol):
 def config_version(model: ModelOptions, about: Mapping[str, Any]) -> str:
     """Return the model's name and a fingerprint of all else that may change its answers.
 
-    The address is left out: a model at another port is the same model.
+    ``"gpt-4o 1a2b3c4d5e6f"``. The address is left out: a model at another port is the same model.
+
+    Args:
+        model: the model and its options.
+        about: what else counts, such as the listener's options and prompts, as JSON values.
     """
     about_model = model.about()
     del about_model["address"]

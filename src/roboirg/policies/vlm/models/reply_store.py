@@ -75,14 +75,16 @@ class ReplySettings(NamedTuple):
 
 @dataclass
 class ReplyStore:
-    """The store during one episode; the file is opened when it is first used.
+    """The store of a run's replies during one episode; the file is opened when it is first used.
+
+    A reply is found by episode, number of the call in it, and digest of what was sent.
 
     Args:
         settings: of the run.
         episode: name of the episode, policy and words, the same when it is played again.
 
     Attributes:
-        calls: number of the episode's next call.
+        calls: number of the episode's next call; whoever has used a reply adds 1.
     """
 
     settings: ReplySettings
@@ -167,6 +169,9 @@ class ReplyStore:
     def wait_for_turn(self, service: str, per_minute: float | None) -> None:
         """Wait until a service may be asked, of all processes of the run.
 
+        The file has the time at which each service is free again; this call moves it on by the gap
+        between requests, in one transaction, and then sleeps until its own turn.
+
         Args:
             service: its address and model.
             per_minute: requests that it takes; None for as many as there are.
@@ -191,7 +196,7 @@ class ReplyStore:
 
 
 def digest(query: ModelQuery, options: ModelOptions) -> str:
-    """Return a digest of everything that is sent to a model and may change its reply.
+    """Return a digest (SHA-256) of everything that is sent to a model and may change its reply.
 
     Each part leads with its kind and size, so that no two different queries give the same bytes.
     Stored replies are found by it, so that a change here makes runs ask again.
@@ -224,7 +229,7 @@ _stores: list[ReplyStore] = []
 def use_replies(settings: ReplySettings | None, episode: str) -> Iterator[None]:
     """Let the models of an episode use the run's store while the block runs.
 
-    The file is not made before a model is asked.
+    The file is not made before a model is asked. None for `settings`: the run keeps no replies.
     """
     if settings is None:
         yield

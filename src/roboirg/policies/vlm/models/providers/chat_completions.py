@@ -96,10 +96,12 @@ def _pieces(part: Part, options: ModelOptions) -> Iterator[dict[str, Any]]:
 
 
 def _image(picture: Picture) -> dict[str, Any]:
+    """Return a picture as a piece of a message, with the PNG inside."""
     return {"type": "image_url", "image_url": {"url": _data_url("image/png", encode_png(picture))}}
 
 
 def _data_url(kind: str, content: bytes) -> str:
+    """Return a file as a URL that holds it: ``"data:image/png;base64,iVBOR…"``."""
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 

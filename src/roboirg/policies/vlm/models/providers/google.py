@@ -82,6 +82,7 @@ def _part(part: Part, options: ModelOptions) -> dict[str, Any]:
 
 
 def _blob(content: bytes, kind: str) -> dict[str, str]:
+    """Return a file as Gemini's API takes it within a request, in URL-safe Base64."""
     return {"data": base64.urlsafe_b64encode(content).decode(), "mime_type": kind}
 
 
