@@ -241,12 +241,13 @@ def _check_rendering(render_s: int = 0) -> tuple[Check, Check]:
     # "-u" for no buffer, because a line may be the last one before a crash.
     draw = ("-u", "-m", "roboirg.cli.doctor", "--frame", str(render_s))
     child = _run_python(*draw, limit_s=2 * (FRAME_TIMEOUT + render_s))
-    device, *drawn = child.output.splitlines() or [""]
+    lines = child.output.splitlines() or [""]
+    device = lines.pop(0)
     remedy = f"{to_unset(DEVICE_VARIABLE, *DRIVER_VARIABLES)}{_RENDER_REMEDY}"
 
     found = "not tried: no device"
     if device:
-        steps = drawn[-1:]
+        steps = lines[-1:]  # the last thing that was drawn, if anything was
         if not child.is_ok:
             steps.append(child.fault)
         found = ", then ".join(steps)

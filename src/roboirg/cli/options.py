@@ -61,6 +61,7 @@ class PlanWords:
         section: str = "",
         own: Sequence[str] = (),
     ) -> None:
+        """Read the plan's file, if one is named."""
         from roboirg.runs.plan.plan_file import read_plan_file
 
         self._context = context

@@ -99,7 +99,7 @@ def report(
 
 
 def _serve(page: Path, port: int) -> None:
-    """Serve the page of a run with its videos on this machine."""
+    """Serve the page of a run with its videos on this machine until Ctrl-C."""
     from roboirg.analysis.page.page_server import run_server
     from roboirg.util.web.request_origin import LOOPBACK
 

@@ -161,11 +161,7 @@ def _numbers(action: ArrayLike, space: ActionSpace) -> CheckedActions:
     """
     got = type(action).__name__
     if hasattr(action, "detach"):
-        # A tensor of PyTorch; NumPy takes none in bfloat16, with a gradient, or on a GPU.
-        tensor = action.detach().cpu()
-        if tensor.is_floating_point():
-            tensor = tensor.double()
-        action = tensor.numpy()
+        action = _as_numpy(action)
     try:
         numbers = np.asarray(action)
     except ValueError:
@@ -182,6 +178,15 @@ def _numbers(action: ArrayLike, space: ActionSpace) -> CheckedActions:
             f"An action ({space.name}) is an array of {space.size} real numbers; got {got}."
         )
     return numbers.astype(np.float64)
+
+
+def _as_numpy(tensor: Any) -> NDArray[Any]:  # noqa: ANN401 - PyTorch need not be installed
+    """Return a tensor of PyTorch as an array; NumPy takes none in bfloat16, or on a GPU, itself."""
+    detached = tensor.detach().cpu()  # without its gradient
+    if detached.is_floating_point():
+        detached = detached.double()
+    array: NDArray[Any] = detached.numpy()
+    return array
 
 
 def _check_values(values: NDArray[np.object_]) -> None:

@@ -63,6 +63,7 @@ class SpokenInstruction:
     """
 
     def __init__(self, turns: Sequence[str], delivery: str) -> None:
+        """Schedule the utterances; hear what is said at step 0."""
         steps = utterance_steps(len(turns), delivery)
         self._schedule = tuple(zip(steps, turns, strict=True))
         self.heard: list[HeardUtterance] = []

@@ -46,6 +46,10 @@ class UnknownNameError(InvalidValueError):
     """
 
     def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
+        """Make the message: all known names, and the nearest one as a suggestion, if any is near.
+
+        ``There is no task 'PickXtime'; known: PickXtimes, …. Did you mean 'PickXtimes'?``
+        """
         names = list(known)
         import difflib  # here, because only a mistake needs it
 

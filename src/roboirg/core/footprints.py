@@ -39,6 +39,7 @@ class Rectangle:
         sin = math.sin(self.yaw)
         dx = x - self.x
         dy = y - self.y
+        # Turned back by the yaw.
         return cos * dx + sin * dy, cos * dy - sin * dx
 
 

@@ -175,6 +175,10 @@ class PolicyNeeds:
     )
 
     def __post_init__(self) -> None:
+        """Replace each value by its final form, as its rule `check` returns it.
+
+        A need that nobody has declared, None by default, is not checked.
+        """
         for need in fields(self):
             value = getattr(self, need.name)
             is_undeclared = value is None and need.default is None

@@ -70,6 +70,7 @@ class Versions(NamedTuple):
             if field != "makeup":
                 what = field.replace("_", " ")
                 pairs.append(Mismatch(what, getattr(self, field), getattr(other, field)))
+        # None stands for what one of the two does not know.
         return [pair for pair in pairs if pair.first != pair.second and None not in pair]
 
 

@@ -343,6 +343,7 @@ class _LookRecorder(EpisodeLoop):
     """
 
     def __init__(self, env: RoboIRGEnv, policy: WaypointExpert, drawn: range) -> None:
+        """Begin with nothing noted; `drawn` has the numbers of the looks to draw."""
         super().__init__(env, policy)
         self._expert = policy
         self._drawn = drawn
@@ -355,7 +356,7 @@ class _LookRecorder(EpisodeLoop):
         self._has_begun = False
 
     def record(self) -> ExpertRecording:
-        """Play the episode, and return what was noted."""
+        """Play the episode, and return all looks and decisions as arrays."""
         self.env.set_frame_hook(self._after_step)
         info = self.play()
         looks = self._looks

@@ -68,6 +68,7 @@ class EpisodeLog:
     """
 
     def __init__(self, path: Path, limit: int = MAX_LOG_BYTES) -> None:
+        """Replace the file by an empty one; `__enter__` starts the thread that keeps it short."""
         self.path = path
         self._limit = limit
         self._finished = threading.Event()

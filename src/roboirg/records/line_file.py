@@ -53,6 +53,7 @@ class LineFile:
     """
 
     def __init__(self, path: Path) -> None:
+        """Note the path; nothing is read before `parse`."""
         self._path = path
         self.place = LinePlace(0, 0, 0)
         self.torn = b""
@@ -161,6 +162,10 @@ class AppendFile:
     def __init__(
         self, folder: Path, name: str, torn_name: str, read: Callable[[LineFile], None]
     ) -> None:
+        """Lock the folder, read the lines, and open the file for appending, in this order.
+
+        If anything fails, what was opened is closed again, and the lock with it.
+        """
         self.path = folder / name
         self._folder = folder
         self._torn_path = folder / torn_name

@@ -58,6 +58,7 @@ class RecordStore:
     """
 
     def __init__(self, folder: Path) -> None:
+        """Open the folder's file for appending, and read what it holds."""
         self.folder = folder
         self.path = folder / RECORDS_FILE
         self.stored: dict[RecordKey, Summary] = {}
@@ -182,6 +183,10 @@ class StoredRun(Generic[Stored]):
     """
 
     def __init__(self, folder: Path, parse_line: Callable[[bytes, Path, int], Stored]) -> None:
+        """Read all lines; of each identity keep what the newest one gave, and where that is.
+
+        In `newest`, a record that was written again has the place of its first line.
+        """
         self._path = folder / RECORDS_FILE
         self.file = LineFile(self._path)
         placed: dict[RecordKey, tuple[Stored, LinePlace]] = {}

@@ -69,6 +69,7 @@ def _draw_run(rng: np.random.Generator, middle: Point, interval: int) -> Shuttle
     A path along the y axis, from the robot's right (smaller y) to its left, turned by at most
     `PATH_ANGLE` to either side; its ends are `PATH_HALF` meters from the middle.
     """
+    # Uniform, to either side of the y axis.
     angle = (2.0 * rng.random() - 1.0) * PATH_ANGLE
     along_x = -PATH_HALF * math.sin(angle)
     along_y = PATH_HALF * math.cos(angle)

@@ -150,7 +150,11 @@ def cache_folder() -> Path | None:
 
 
 def _size() -> float:
-    """Return the size limit of all caches together, bytes."""
+    """Return the size limit of all caches together, bytes, as the environment variable sets it.
+
+    Raises:
+        InvalidValueError: the variable is no positive number.
+    """
     text = os.environ.get(SIZE_VARIABLE) or str(DEFAULT_GIB)
     try:
         size_gib = float(text)

@@ -44,6 +44,7 @@ class ChildExit(NamedTuple):
         return self.code == -signal.SIGKILL
 
     def __str__(self) -> str:
+        """Return how it ended in words: ``"the process ended with exit code 1"``."""
         if self.code is None:
             return "the process closed its connection"
         if self.code < 0:

@@ -117,7 +117,7 @@ def _sheet(frames: Pixels) -> Pixels:
 
 
 def encode_png(picture: Picture) -> bytes:
-    """Return a picture as a PNG file."""
+    """Return a picture as a PNG file, by PyAV, which every installation with a simulator has."""
     _check_pyav()
     import av
 

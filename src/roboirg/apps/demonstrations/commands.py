@@ -113,7 +113,7 @@ def _print_size(plan: ExportPlan) -> None:
     if plan.options.wordings == "test":
         typer.echo(_TEST_WORDS, err=True)
     jobs = recording_jobs(plan)
-    episodes = sum(len(spoken.texts) for spoken in jobs)
+    episodes = sum(len(spoken.instructions) for spoken in jobs)
     recorded = counted(len(jobs), "trajectory", "trajectories")
     typer.echo(f"{recorded}, {counted(episodes, 'episode')}", err=True)
 

@@ -95,7 +95,7 @@ def _counts(parts: Sequence[DatasetPart]) -> dict[str, _Counts]:
         for episode in part.episodes:
             facts = load_facts(episode.path)
             for counts in (by_task.setdefault(facts.task, _Counts()), total):
-                counts.add(facts.frames, len(episode.texts))
+                counts.add(facts.frames, len(episode.instructions))
     return {**by_task, "all": total}
 
 

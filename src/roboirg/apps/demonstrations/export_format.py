@@ -24,7 +24,7 @@ class ExportFormat:
         name: as in the command line.
         make_parts: returns the parts of a dataset in order: a `DatasetPart` for each file or so.
             It is called with the `ExportPlan`, the folder of the dataset and the trajectories, each
-            a `RecordedTexts`.
+            a `RecordedInstructions`.
         write_part: writes the frames of a part; runs in a worker process.
         finish: writes what describes a dataset, whose last file makes it readable. It is called
             with the folder and all parts.

@@ -90,18 +90,18 @@ class ExportPlan:
                 "`disturbed: true`."
             )
         self._check_disturbed()
+        self._check_waypoints()
         self._check_pictures()
         return self
 
     def _check_disturbed(self) -> None:
-        """Check what disturbed demonstrations need, and what waypoints need.
+        """Check what disturbed demonstrations need; undisturbed ones always pass.
 
-        Of a disturbed demonstration, in which the expert is pushed off its way and corrects it,
-        both the executed and the right action are stored, for which the format must have room.
+        In a disturbed one the expert is led off its way and comes back. Both the executed and the
+        right action of each step are stored, for which the format must have room (labels).
 
         Raises:
-            InvalidValueError: it has not; the policy of a disturbed one is not the oracle; or
-                waypoints are to include the video.
+            InvalidValueError: it has not, or the policy is not the oracle.
         """
         if self.disturbed and (self.policy != ORACLE or not self.file_format.has_labels):
             unlabeled = names_where(lambda known: not known.has_labels)
@@ -110,6 +110,13 @@ class ExportPlan:
                 f"only the oracle is disturbed, and a time step of {unlabeled} is the "
                 "result of its action, so it has no place for one that was not executed."
             )
+
+    def _check_waypoints(self) -> None:
+        """Check what frames that are waypoints need; frames that are control steps always pass.
+
+        Raises:
+            InvalidValueError: the format has no such frames, or the video is to be included.
+        """
         if self.actions == "waypoint" and (self.video or not self.file_format.has_waypoints):
             able = names_where(lambda known: known.has_waypoints)
             raise InvalidValueError(
@@ -185,7 +192,7 @@ class ExportPlan:
         return hashlib.sha256(json.dumps([asdict(self), versions]).encode()).hexdigest()
 
 
-class TaskText(NamedTuple):
+class ExportedInstruction(NamedTuple):
     """One instruction of an episode.
 
     Attributes:
@@ -263,7 +270,7 @@ class SpokenJob(NamedTuple):
     """A trajectory to record, and the instructions with which it is exported."""
 
     job: RecordingJob
-    texts: tuple[TaskText, ...]
+    instructions: tuple[ExportedInstruction, ...]
 
 
 def training_words(split: str, options: InstructionOptions) -> InstructionOptions:
@@ -298,8 +305,8 @@ def _jobs_of(plan: ExportPlan, episode: Episode) -> list[SpokenJob]:
     all instructions, or each of several variations does. Any other policy is recorded once for each
     instruction, and does not vary. No instruction -> no trajectory.
     """
-    texts = _texts_of(plan, episode)
-    if not texts:
+    exported = _instructions_of(plan, episode)
+    if not exported:
         return []
     job = RecordingJob(
         task=episode.task,
@@ -311,20 +318,20 @@ def _jobs_of(plan: ExportPlan, episode: Episode) -> list[SpokenJob]:
         spec=plan.recording,
     )
     if plan.policy != ORACLE:
-        return [SpokenJob(replace(job, options=text.options), (text,)) for text in texts]
+        return [SpokenJob(replace(job, options=text.options), (text,)) for text in exported]
     variations = range(plan.variations)
-    return [SpokenJob(replace(job, variation=number), texts) for number in variations]
+    return [SpokenJob(replace(job, variation=number), exported) for number in variations]
 
 
-def _texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
+def _instructions_of(plan: ExportPlan, episode: Episode) -> tuple[ExportedInstruction, ...]:
     """Return the instructions of an episode in all settings and forms of the plan.
 
     Settings that cannot express the episode have none. An explicit instruction points back at
     nothing, so its implicit form is also its resolved form and is not given twice.
     """
-    words = InstructionOptions(wordings=plan.options.wordings)
-    explicit = instruct_with(episode, words).text
-    texts = []
+    explicit_options = InstructionOptions(wordings=plan.options.wordings)
+    explicit = instruct_with(episode, explicit_options).text
+    exported = []
     found = instructions([episode], plan.settings, plan.forms, plan.options)
     for _, instruction in found:
         is_explicit = not all_settings()[instruction.setting].implicit
@@ -333,5 +340,5 @@ def _texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
             continue
         options = replace(plan.options, setting=instruction.setting, form=instruction.form)
         facts = row(episode, instruction) | {"explicit": explicit}  # columns of the facts' table
-        texts.append(TaskText(options, instruction.text, facts))
-    return tuple(texts)
+        exported.append(ExportedInstruction(options, instruction.text, facts))
+    return tuple(exported)

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.apps.demonstrations import data_card
-from roboirg.apps.demonstrations.dataset_part import DatasetPart, RecordedTexts
+from roboirg.apps.demonstrations.dataset_part import DatasetPart, RecordedInstructions
 from roboirg.apps.demonstrations.export_plan import (
     ORACLE,
     ExportPlan,
@@ -118,7 +118,7 @@ def run_export(
 
 def _wanted(
     plan: ExportPlan, jobs: Sequence[SpokenJob], facts: Sequence[TrajectoryFacts], folder: Path
-) -> list[RecordedTexts]:
+) -> list[RecordedInstructions]:
     """Return the files and instructions of the trajectories that the plan exports.
 
     Args:
@@ -132,7 +132,9 @@ def _wanted(
     """
     pairs = zip(jobs, facts, strict=True)
     wanted = [spoken for spoken, recorded in pairs if _is_wanted(plan, recorded)]
-    found = [RecordedTexts(spoken.job.path(folder), spoken.texts) for spoken in wanted]
+    found = [
+        RecordedInstructions(spoken.job.path(folder), spoken.instructions) for spoken in wanted
+    ]
     if not found:
         raise InvalidValueError(
             f"None of the {len(jobs)} trajectories is a success; ask for `outcomes: all`."
@@ -145,7 +147,7 @@ def _episode_count(parts: Sequence[DatasetPart]) -> int:
     count = 0
     for part in parts:
         for episode in part.episodes:
-            count += len(episode.texts)
+            count += len(episode.instructions)
     return count
 
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.demonstrations.export_plan import ExportPlan, TaskText
+from roboirg.apps.demonstrations.export_plan import ExportedInstruction, ExportPlan
 from roboirg.apps.demonstrations.feature_stats import FeatureStats, picture_stats, vector_stats
 from roboirg.apps.demonstrations.picture_coding import STORED_FORMATS
 from roboirg.apps.demonstrations.trajectory import Trajectory, picture_name
@@ -44,17 +44,17 @@ EXECUTED = "executed_action"
 """Column of what was executed where that is not the action to learn."""
 
 
-class PlacedText(NamedTuple):
+class PlacedInstruction(NamedTuple):
     """An instruction at its place in a dataset.
 
     Attributes:
-        words: the instruction.
+        instruction: the instruction.
         episode_index: of its episode in the dataset.
         first_index: index of its first frame among all frames.
         task_index: of its text among all texts.
     """
 
-    words: TaskText
+    instruction: ExportedInstruction
     episode_index: int
     first_index: int
     task_index: int
@@ -149,16 +149,20 @@ class FrameColumns:
             columns[EXECUTED] = trajectory.actions[1:].astype(np.float32)
         is_last = frames == facts.frames - 1
         is_success = is_last & (facts.status == "success")
-        columns["next.reward"] = is_success.astype(np.float32)[:, None]
-        columns["next.done"] = is_last[:, None]
-        columns["next.success"] = is_success[:, None]
-        columns["is_video_demo"] = (frames < facts.video_length)[:, None]
-        columns["timestamp"] = (frames / CONTROL_RATE).astype(np.float32)[:, None]
-        columns["frame_index"] = frames[:, None]
+        single_values = {
+            "next.reward": is_success.astype(np.float32),
+            "next.done": is_last,
+            "next.success": is_success,
+            "is_video_demo": frames < facts.video_length,
+            "timestamp": (frames / CONTROL_RATE).astype(np.float32),
+            "frame_index": frames,
+        }
+        for name, values in single_values.items():
+            columns[name] = values[:, None]  # (frames,) becomes (frames, 1)
         return columns
 
     @staticmethod
-    def indices(placed: PlacedText, length: int) -> dict[str, NDArray[np.int64]]:
+    def indices(placed: PlacedInstruction, length: int) -> dict[str, NDArray[np.int64]]:
         """Return the columns of indices of one instruction, (frames, 1)."""
         return {
             "episode_index": np.full((length, 1), placed.episode_index, dtype=np.int64),

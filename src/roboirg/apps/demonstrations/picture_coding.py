@@ -69,6 +69,7 @@ class VideoEncoder:
     """
 
     def __init__(self, coding: PictureCoding, size: int) -> None:
+        """Open a video in memory; the codec follows from `coding`."""
         import av
 
         codec = _CODECS[coding]

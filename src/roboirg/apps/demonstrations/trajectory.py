@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from roboirg.apps.demonstrations.picture_coding import PictureCoding
 from roboirg.core.actions import JOINT_ANGLE, CheckedActions
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import CAMERAS, Pixels
+from roboirg.core.observations import Pixels
 from roboirg.util.atomic_write import replacing
 from roboirg.util.media import decode_png
 
@@ -33,6 +33,8 @@ SUFFIX = ".zip"
 
 _FACTS = "facts.json"
 _ARRAY = ".npy"
+_HISTOGRAM = "_histogram"
+"""Ends the name of an array with the histogram of a camera, such as ``front_histogram``."""
 
 
 class TrajectoryFacts(msgspec.Struct, frozen=True):
@@ -159,12 +161,11 @@ def load_trajectory(path: Path) -> Trajectory:
         names = [name for name in archive.namelist() if name.endswith(_ARRAY)]
         arrays = {name.removesuffix(_ARRAY): _read_array(archive, name) for name in names}
     histograms = {}
-    for camera in CAMERAS:
-        if f"{camera}_histogram" in arrays:
-            histograms[camera] = arrays.pop(f"{camera}_histogram")
     calibration = {}
     for name in list(arrays):
-        if name.endswith(("_extrinsic", "_intrinsic")):
+        if name.endswith(_HISTOGRAM):
+            histograms[name.removesuffix(_HISTOGRAM)] = arrays.pop(name)
+        elif name.endswith(("_extrinsic", "_intrinsic")):
             calibration[name] = arrays.pop(name)
     return Trajectory(path, facts, histograms=histograms, calibration=calibration, **arrays)
 

@@ -102,6 +102,7 @@ class PictureTracks:
     """
 
     def __init__(self, archive: zipfile.ZipFile, spec: RecordingSpec) -> None:
+        """Begin with row 0; a video has an encoder for each camera, PNGs have none."""
         self._archive = archive
         self._spec = spec
         self._rows = 0
@@ -234,6 +235,7 @@ class _Recorder(EpisodeLoop):
     def __init__(
         self, env: RoboIRGEnv, policy: Policy, spec: RecordingSpec, archive: zipfile.ZipFile
     ) -> None:
+        """Begin with no rows; the pictures go into `archive`, the trajectory's open file."""
         super().__init__(env, policy)
         self._spec = spec
         self._archive = archive

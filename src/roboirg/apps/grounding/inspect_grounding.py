@@ -93,6 +93,7 @@ def ask(data: str, question: str) -> Solver:
     again = load_prompts(PROMPTS)["again"]
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:
+        """Ask once, and once more if the answer is no readable JSON; the last answer counts."""
         state = await generate(state)
         if question == "slots":
             item = _items(data)[str(state.sample_id)]
@@ -120,6 +121,7 @@ def right(data: str, question: str) -> Scorer:
     kind = known_name("question", question, QUESTION_KINDS)
 
     async def score(state: TaskState, target: Target) -> Score:
+        """Judge the model's last answer as `roboirg score grounding` does."""
         item = _items(data)[str(state.sample_id)]
         verdict = judge_reply(item, kind, state.output.completion)
         return Score(

@@ -79,11 +79,8 @@ def _confusion_table(field: str, counts: Counter[Confusion]) -> Table:
         field: of the answers, such as ``color``.
         counts: by the values that were meant and understood.
     """
-    every_meant = set()
-    every_understood = set()
-    for pair in counts:
-        every_meant.add(pair.meant)
-        every_understood.add(pair.understood)
+    every_meant = {pair.meant for pair in counts}
+    every_understood = {pair.understood for pair in counts}
     columns = sorted(every_understood - {NO_ANSWER})
     if NO_ANSWER in every_understood:
         columns.append(NO_ANSWER)

@@ -46,11 +46,7 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
     """
     run = StoredRun(folder, read_summary)
     run.file.refuse_damage()
-    names = [RECORDS_FILE, *plan_names(folder), *_names_below(folder, ACTION_FOLDER)]
-    if logs:
-        names += _names_below(folder, LOG_FOLDER)
-    if videos:
-        names += _names_below(folder, VIDEO_FOLDER)
+    names = _names_to_pack(folder, videos=videos, logs=logs)
     paths = {name: run_file(folder, name) for name in names}
     _check_size(paths, folder)
     policies = {entry.policy for entry in run.newest}
@@ -62,6 +58,19 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
     )
     _write(out, manifest, paths)
     return manifest
+
+
+def _names_to_pack(folder: Path, *, videos: bool, logs: bool) -> list[str]:
+    """Return the files of a run that go into a pack, by their paths in the run, in a fixed order.
+
+    Records, plans and actions always, logs and videos if they are wanted.
+    """
+    names = [RECORDS_FILE, *plan_names(folder), *_names_below(folder, ACTION_FOLDER)]
+    if logs:
+        names += _names_below(folder, LOG_FOLDER)
+    if videos:
+        names += _names_below(folder, VIDEO_FOLDER)
+    return names
 
 
 def _names_below(folder: Path, name: str) -> list[str]:

@@ -197,16 +197,18 @@ def _completeness(plans: Sequence[Plan], kept: Plans, entries: Sequence[Summary]
         kept: all plans of the run by fingerprint, which records name.
         entries: all records.
     """
+    # Episodes are compared by their keys, what identifies them, and named by their slugs.
     planned = _slugs(plans)
     recorded = {identity_key(entry) for entry in entries}
     missing = {slug for key, slug in planned.items() if key not in recorded}
 
     notes: list[str] = []
-    earlier = recorded.difference(planned)
-    if plans and earlier:
-        notes.append(f"From an earlier plan: {counted(len(earlier), 'record')}.")
-    earlier_plans = {entry.plan for entry in entries} & kept.keys()
-    unplayed = _slugs([kept[name] for name in earlier_plans]).keys() - recorded - planned.keys()
+    unplanned = recorded.difference(planned)
+    if plans and unplanned:
+        notes.append(f"From an earlier plan: {counted(len(unplanned), 'record')}.")
+    named_plans = {entry.plan for entry in entries} & kept.keys()
+    planned_at_some_time = _slugs([kept[name] for name in named_plans])
+    unplayed = planned_at_some_time.keys() - recorded - planned.keys()
     if unplayed:
         notes.append(f"Earlier plans name {counted(len(unplayed), 'more episode')}, not played.")
     return _Completeness(tuple(sorted(missing)), tuple(notes))

@@ -52,6 +52,7 @@ class PolicyPlayer:
     """
 
     def __init__(self, source: str | Policy, seed: int) -> None:
+        """Note the policy; it is made when it is first needed."""
         self.source = source
         self.seed = seed
         self.needs = PolicyNeeds()

@@ -191,6 +191,7 @@ class KeyEvents:
     """
 
     def __init__(self, motions: Sequence[Motion]) -> None:
+        """Sort the motions into swaps, and objects that appear at a step, by that step."""
         self._swaps: list[Swap] = []
         self._appearing: dict[int, list[str]] = {}
         self._stage_starts: dict[int, int] = {}

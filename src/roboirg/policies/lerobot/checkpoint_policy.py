@@ -16,7 +16,7 @@ import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,8 @@ from roboirg.policies.contract.option_checking import NOT_COMPARED
 from roboirg.policies.contract.policy_urls import UrlOptions, read_options, split_url
 from roboirg.policies.lerobot.checkpoint_facts import PICTURE, STATE, picture_sizes, read_facts
 from roboirg.util.media import scaled_square
+
+Item = TypeVar("Item")
 
 _MAX_BRIGHTNESS = 255.0
 _GPU_BATCH = 8
@@ -100,6 +102,7 @@ class LeRobotPolicy:
     demonstration_frames: ClassVar[str] = "none"
 
     def __init__(self, url: str, seed: int = 0) -> None:  # noqa: ARG002
+        """Check the URL, and read what the checkpoint says of itself; it is loaded by `begin`."""
         parts = split_url(url)
         self.options = read_options(parts, LeRobotPolicyOptions)
         self.place = parts.target
@@ -166,21 +169,17 @@ class LeRobotPolicy:
         """
         import torch
 
-        count = len(states)
-        missing = size - count
         seeds = [int(state.rng.integers(_SEEDS)) for state in states]
         torch.manual_seed(seeds[0])  # before all that may draw random numbers
-        filled_observations = [*observations, *[observations[-1]] * missing]
-        batch = self._before(self._batch(filled_observations))
+        batch = self._before(self._batch(_filled_up(observations, size)))
         if size == 1:
             rows = self._select(states[0].model, batch)
         else:
-            filled_seeds = [*seeds, *[seeds[-1]] * missing]
-            rows = self._predict(states[0].model, filled_seeds, batch)
+            rows = self._predict(states[0].model, _filled_up(seeds, size), batch)
         # The postprocessor takes the actions of one step.
         steps = [self._after(rows[:, step]) for step in range(rows.shape[1])]
-        rows = torch.stack(steps, dim=1)
-        actions: NDArray[np.float64] = rows[:count].cpu().numpy().astype(np.float64)
+        wanted_rows = torch.stack(steps, dim=1)[: len(states)]
+        actions: NDArray[np.float64] = wanted_rows.cpu().numpy().astype(np.float64)
         return list(actions)
 
     def _predict(self, model: Any, seeds: Sequence[int], batch: dict[str, Any]) -> Any:  # noqa: ANN401
@@ -244,7 +243,7 @@ class LeRobotPolicy:
         return batch
 
     def _load(self) -> None:
-        """Load the checkpoint; raises like `begin`."""
+        """Load the checkpoint; turn the errors of LeRobot into ours, which `begin` names."""
         place = "" if Path(self.place).is_dir() else " (no folder here, so an id of the Hub)"
         try:
             self._load_model()
@@ -261,7 +260,11 @@ class LeRobotPolicy:
             ) from error
 
     def _load_model(self) -> None:
-        """Load configuration, processors and weights; find out how the model may be asked."""
+        """Load configuration, processors and weights; find out how the model may be asked.
+
+        Sets `model` last, so that a checkpoint that could not be loaded is tried again. Whether
+        several episodes can be asked about at once depends on where the model gets its noise from.
+        """
         from lerobot.configs.policies import PreTrainedConfig
         from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 
@@ -294,6 +297,12 @@ class LeRobotPolicy:
         self._takes_batches = self._noise is not None or draws_nothing
         self.metadata = _describe(config, self._before, self._after)
         self.model = model.to(self.options.device).eval()
+
+
+def _filled_up(items: Sequence[Item], size: int) -> list[Item]:
+    """Return `size` items: those given, then the last one as often as it takes."""
+    missing = size - len(items)
+    return [*items, *[items[-1]] * missing]
 
 
 def _noise_shape(config: Any, model: Any) -> tuple[int, int] | None:  # noqa: ANN401

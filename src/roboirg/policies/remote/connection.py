@@ -70,6 +70,7 @@ class ServerConnection:
     """
 
     def __init__(self, scheme: str, endpoints: Sequence[Endpoint], options: RemoteOptions) -> None:
+        """Note the servers and options; `begin` connects."""
         self._scheme = scheme
         self._endpoints = endpoints
         self._options = options

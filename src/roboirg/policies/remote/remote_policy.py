@@ -53,6 +53,7 @@ class RemotePolicy(ABC):
     actions: str = JOINT_ANGLE.name
 
     def __init__(self, url: str, seed: int = 0) -> None:
+        """Check URL and options; connect to nothing yet."""
         from roboirg.policies.remote.connection import ServerConnection
 
         del seed

@@ -67,6 +67,7 @@ class WebsocketServer:
     def __init__(
         self, service: Service, metadata: Mapping[str, Any], options: ServerOptions
     ) -> None:
+        """Listen at once; answer once `serve_forever` is called."""
         self._service = service
         self._metadata = pack(metadata)
         self._options = options

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from roboirg.core.episode import Goal
 from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES
-from roboirg.tasks import get_task
+from roboirg.tasks import Task, get_task
 from roboirg.tasks.splits.splits import split_episodes
 from roboirg.util.reply_reading import UnparsableReplyError, json_object, whole_number
 
@@ -49,7 +49,10 @@ class Field:
         return isinstance(self.values[0], int)
 
     def schema(self) -> dict[str, Any]:
-        """Return the JSON schema of the field."""
+        """Return the JSON schema of the field.
+
+        ``{"type": "string", "enum": ["blue", "green", "red"]}``; a list has one as its ``items``.
+        """
         kind = "integer" if self.is_number else "string"
         item: dict[str, Any] = {"type": kind, "enum": list(self.values)}
         if self.lengths is None:
@@ -146,17 +149,13 @@ def goal_schema(task: str) -> GoalSchema:
     -> ``{"blue": 0, "green": 0, "red": 2}``.
     """
     known_task = get_task(task)
-    goals: dict[Goal, None] = {}  # a set that keeps its order
-    for episode in split_episodes([known_task.name], ["train"]):
-        goals.update(dict.fromkeys(known_task.goals(episode.scene)))
-
-    short_answers = {goal: _answer(goal) for goal in goals}
+    short_answers = {goal: _answer(goal) for goal in _training_goals(known_task)}
     names = max(short_answers.values(), key=len)  # the longest answer has all fields
-    absent = dict.fromkeys(names, 0)
+    zeros = dict.fromkeys(names, 0)
     answers: list[dict[str, Any]] = []
     goals_by_answer: dict[str, Goal] = {}
     for goal, short_answer in short_answers.items():
-        answer = absent | dict(short_answer)
+        answer = zeros | dict(short_answer)
         answers.append(answer)
         goals_by_answer[_canonical(answer)] = goal
 
@@ -165,6 +164,14 @@ def goal_schema(task: str) -> GoalSchema:
         values = [answer[name] for answer in answers]
         fields.append(_field(name, values))
     return GoalSchema(tuple(fields), goals_by_answer, known_task.things.colored)
+
+
+def _training_goals(task: Task) -> Iterable[Goal]:
+    """Return all goals of the scenes of the training split, each once, in order of appearance."""
+    goals: dict[Goal, None] = {}  # a set that keeps its order
+    for episode in split_episodes([task.name], ["train"]):
+        goals.update(dict.fromkeys(task.goals(episode.scene)))
+    return goals
 
 
 def _answer(goal: Goal) -> Answer:

@@ -71,6 +71,7 @@ class VLMNamer:
     def __init__(
         self, options: ListenerOptions, connect: Callable[[ModelOptions], Model] = make_model
     ) -> None:
+        """Load the prompts; the model is connected at the first query."""
         self.options = options
         self.demonstration_frames: int | str = options.frames_every
         if not options.pictures:
@@ -162,6 +163,7 @@ class VLMListener(ScriptedPolicy):
         seed: int = 0,
         connect: Callable[[ModelOptions], Model] = make_model,
     ) -> None:
+        """Make the namer, whose needs of pictures and video become this policy's."""
         super().__init__(seed)
         self.namer = VLMNamer(options, connect)
         self.options = options

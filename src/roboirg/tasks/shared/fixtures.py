@@ -257,6 +257,7 @@ def draw_bin(
 
     def draw() -> SceneObject:
         x, y = region.draw(rng)
+        # Uniform, to either side.
         yaw = (2.0 * rng.random() - 1.0) * BIN_YAW
         position = Point(x, y, object_sizes.BIN_HEIGHT / 2)
         return SceneObject("bin", "bin", position, yaw)

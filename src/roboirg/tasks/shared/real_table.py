@@ -51,6 +51,7 @@ def left_to_right(scene: Scene, kind: ObjectKind) -> tuple[Color, ...]:
 def draw_box(rng: np.random.Generator, name: str, color: Color, region: Region) -> SceneObject:
     """Draw a box whose center is in the region; the region must keep it clear of other objects."""
     x, y = region.draw(rng)
+    # Uniform, to either side.
     yaw = (2.0 * rng.random() - 1.0) * BOX_YAW
     position = Point(x, y, object_sizes.BOX_HEIGHT / 2)
     return SceneObject(name, "box", position, yaw, color)

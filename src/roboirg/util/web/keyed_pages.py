@@ -61,6 +61,7 @@ class KeyedPageServer(AppServer):
     """
 
     def __init__(self, routes: Sequence[BaseRoute], key: str, port: int = 0) -> None:
+        """Build the application: routes behind the check of the key; our errors give status 400."""
         self.key = key
         self._names = names_of_this_machine()
         handlers = {RoboIRGError: error_handler(400)}

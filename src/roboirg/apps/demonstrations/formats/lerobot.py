@@ -17,17 +17,17 @@ from roboirg.apps.demonstrations.dataset_part import (
     CHUNK_SIZE,
     EPISODE_TABLE,
     DatasetPart,
-    RecordedTexts,
+    RecordedInstructions,
     all_texts,
     episode_row,
-    place_texts,
+    place_instructions,
     read_episodes,
 )
 from roboirg.apps.demonstrations.export_format import ExportFormat
 from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.apps.demonstrations.feature_stats import FeatureStats, vector_stats
 from roboirg.apps.demonstrations.formats.lerobot_tables import INFO, read_tables
-from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
+from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedInstruction
 from roboirg.apps.demonstrations.parquet_tables import (
     number_column,
     picture_column,
@@ -77,13 +77,13 @@ _PYAV = " --dataset.video_backend=pyav"
 
 
 def make_parts(
-    plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts]
+    plan: ExportPlan, root: Path, recorded: Sequence[RecordedInstructions]
 ) -> list[DatasetPart]:
     """Return a part for each trajectory, numbered from 0; files are named after the numbers."""
     columns = FrameColumns(plan)
     return [
         DatasetPart(number, root, columns, (episode,))
-        for number, episode in enumerate(place_texts(recorded))
+        for number, episode in enumerate(place_instructions(recorded))
     ]
 
 
@@ -100,7 +100,7 @@ def write_part(part: DatasetPart) -> None:
     if columns.has_videos:
         write_videos(part, partial(_VIDEO.format, **place))
     shared = frame_columns(columns, trajectory)
-    own = [own_columns(placed, trajectory.facts.frames) for placed in episode.texts]
+    own = [own_columns(placed, trajectory.facts.frames) for placed in episode.instructions]
     path = part.root / _DATA.format(**place)
     write_frames(path, columns.table_features(), shared, own)
 
@@ -130,7 +130,7 @@ def frame_columns(columns: FrameColumns, trajectory: Trajectory) -> dict[str, An
     return arrow_columns
 
 
-def own_columns(placed: PlacedText, length: int) -> dict[str, Any]:
+def own_columns(placed: PlacedInstruction, length: int) -> dict[str, Any]:
     """Return the columns that differ between the instructions of a trajectory: its indices."""
     indices = FrameColumns.indices(placed, length)
     return {name: number_column(values) for name, values in indices.items()}
@@ -147,7 +147,7 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     episodes = []
     facts = []
     for part, episode, trajectory in read_episodes(parts):
-        for placed in episode.texts:
+        for placed in episode.instructions:
             entry = _episode_entry(part, placed, trajectory.facts.frames)
             entry |= _flat(stats.add(trajectory, placed))
             episodes.append(entry)
@@ -157,12 +157,14 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     _write_tasks(root / "meta/tasks.parquet", texts)
     write_rows(root / EPISODE_TABLE, facts)
     write_json(root / "meta/stats.json", stats.result())
-    info = common_info(parts, texts)
-    info["codebase_version"] = "v3.0"
-    info["data_files_size_in_mb"] = 100
-    info["video_files_size_in_mb"] = 200
-    info["data_path"] = _DATA
-    info["video_path"] = _VIDEO if columns.has_videos else None
+    info = {
+        **common_info(parts, texts),
+        "codebase_version": "v3.0",
+        "data_files_size_in_mb": 100,
+        "video_files_size_in_mb": 200,
+        "data_path": _DATA,
+        "video_path": _VIDEO if columns.has_videos else None,
+    }
     write_json(root / INFO, info)
 
 
@@ -174,6 +176,7 @@ class StatsCollector:
     """
 
     def __init__(self, columns: FrameColumns) -> None:
+        """Begin with no episodes; `columns` says which columns there are."""
         self._columns = columns
         # By column: the numbers of each episode, (frames, size), and of pictures (3, 256) how often
         # each value of a color channel occurs.
@@ -183,7 +186,7 @@ class StatsCollector:
         self._last_path: Path | None = None
         self._shared_stats: dict[str, FeatureStats] = {}
 
-    def add(self, trajectory: Trajectory, placed: PlacedText) -> dict[str, FeatureStats]:
+    def add(self, trajectory: Trajectory, placed: PlacedInstruction) -> dict[str, FeatureStats]:
         """Add an episode to the statistics of the dataset; return those of the episode alone.
 
         Args:
@@ -228,7 +231,7 @@ class StatsCollector:
         return self._columns.stats(self._numbers, self._counts)
 
 
-def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[str, Any]:
+def _episode_entry(part: DatasetPart, placed: PlacedInstruction, length: int) -> dict[str, Any]:
     """Return a row of LeRobot's table of episodes: where an episode's frames are stored.
 
     Args:
@@ -239,7 +242,7 @@ def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[s
     chunk, file = part.place
     entry: dict[str, Any] = {
         "episode_index": placed.episode_index,
-        "tasks": [placed.words.text],
+        "tasks": [placed.instruction.text],
         "length": length,
         "data/chunk_index": chunk,
         "data/file_index": file,
@@ -321,7 +324,7 @@ def common_info(parts: Sequence[DatasetPart], texts: Sequence[str]) -> dict[str,
         texts: the distinct instructions.
     """
     last = parts[-1].episodes[-1]
-    placed = last.texts[-1]
+    placed = last.instructions[-1]
     count = placed.episode_index + 1
     return {
         "robot_type": "panda",

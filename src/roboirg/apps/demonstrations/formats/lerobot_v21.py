@@ -116,7 +116,7 @@ def write_part(part: DatasetPart) -> None:
     columns = part.columns
     trajectory = load_trajectory(episode.path)
     shared = frame_columns(columns, trajectory)
-    for placed in episode.texts:
+    for placed in episode.instructions:
         index = placed.episode_index
         place = {"episode_chunk": index // CHUNK_SIZE, "episode_index": index}
         if columns.has_videos:
@@ -138,9 +138,9 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     stats = []
     facts = []
     for _, episode, trajectory in read_episodes(parts):
-        for placed in episode.texts:
+        for placed in episode.instructions:
             index = placed.episode_index
-            tasks = [placed.words.text]
+            tasks = [placed.instruction.text]
             length = trajectory.facts.frames
             episodes.append({"episode_index": index, "tasks": tasks, "length": length})
             stats.append({"episode_index": index, "stats": collector.add(trajectory, placed)})
@@ -166,12 +166,14 @@ def _info(parts: Sequence[DatasetPart], texts: Sequence[str]) -> dict[str, Any]:
     columns = parts[0].columns
     info = common_info(parts, texts)
     episodes = info["total_episodes"]
-    info["codebase_version"] = "v2.1"
-    info["total_videos"] = episodes * len(columns.cameras) if columns.has_videos else 0
-    info["total_chunks"] = (episodes - 1) // CHUNK_SIZE + 1
-    info["data_path"] = _DATA
-    info["video_path"] = _VIDEO if columns.has_videos else None
-    return info
+    return {
+        **info,
+        "codebase_version": "v2.1",
+        "total_videos": episodes * len(columns.cameras) if columns.has_videos else 0,
+        "total_chunks": (episodes - 1) // CHUNK_SIZE + 1,
+        "data_path": _DATA,
+        "video_path": _VIDEO if columns.has_videos else None,
+    }
 
 
 def modality(columns: FrameColumns) -> dict[str, Any]:

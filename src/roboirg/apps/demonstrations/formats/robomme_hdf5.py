@@ -19,14 +19,14 @@ from roboirg.apps.demonstrations.dataset_part import (
     EPISODE_TABLE,
     DatasetPart,
     RecordedEpisode,
-    RecordedTexts,
+    RecordedInstructions,
     episode_row,
-    place_texts,
+    place_instructions,
     read_episodes,
 )
 from roboirg.apps.demonstrations.export_format import ExportFormat
-from roboirg.apps.demonstrations.export_plan import ExportPlan, TaskText
-from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
+from roboirg.apps.demonstrations.export_plan import ExportedInstruction, ExportPlan
+from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedInstruction
 from roboirg.apps.demonstrations.parquet_tables import write_rows
 from roboirg.apps.demonstrations.replayable_trajectory import ReplayableTrajectory
 from roboirg.apps.demonstrations.trajectory import (
@@ -72,13 +72,13 @@ def check_hdf5_support() -> None:
         import h5py  # noqa: F401
 
 
-def words_of(words: TaskText) -> str:
+def folder_of(instruction: ExportedInstruction) -> str:
     """Return the name of the folder of a setting and form, such as ``"spatial-implicit"``."""
-    return f"{words.options.setting}-{words.options.form}"
+    return f"{instruction.options.setting}-{instruction.options.form}"
 
 
 def make_parts(
-    plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts]
+    plan: ExportPlan, root: Path, recorded: Sequence[RecordedInstructions]
 ) -> list[DatasetPart]:
     """Divide a dataset into parts, one for each task, as RoboMME has a file for each.
 
@@ -89,7 +89,7 @@ def make_parts(
     """
     columns = FrameColumns(plan)
     by_task: dict[str, list[RecordedEpisode]] = {}
-    for episode in place_texts(recorded):
+    for episode in place_instructions(recorded):
         by_task.setdefault(_task(episode), []).append(episode)
     parts = []
     for number, episodes in enumerate(by_task.values()):
@@ -99,7 +99,7 @@ def make_parts(
 
 def _task(episode: RecordedEpisode) -> str:
     """Return the name of an episode's task."""
-    return str(episode.texts[0].words.facts["task"])
+    return str(episode.instructions[0].instruction.facts["task"])
 
 
 def write_part(part: DatasetPart) -> None:
@@ -129,8 +129,8 @@ def _folders(part: DatasetPart) -> list[str]:
     """Return the folders of a part, each once: one for each setting and form of instructions."""
     folders: dict[str, None] = {}
     for episode in part.episodes:
-        for placed in episode.texts:
-            folders[words_of(placed.words)] = None
+        for placed in episode.instructions:
+            folders[folder_of(placed.instruction)] = None
     return list(folders)
 
 
@@ -138,7 +138,7 @@ def _write_episode(file: Any, episode: RecordedEpisode) -> None:  # noqa: ANN401
     """Write an episode into an open HDF5 file: its time steps and its first instruction."""
     trajectory = load_trajectory(episode.path)
     group = file.create_group(f"episode_{trajectory.facts.episode}")
-    _write_setup(group, trajectory, episode.texts[0])
+    _write_setup(group, trajectory, episode.instructions[0])
     with zipfile.ZipFile(episode.path) as archive:
         for step, row in enumerate(time_steps(trajectory)):
             _write_step(group.create_group(f"timestep_{step}"), trajectory, row, archive)
@@ -157,8 +157,8 @@ def _link_episode(file: Any, episode: RecordedEpisode, folder: str, home: str) -
     """
     import h5py
 
-    for placed in episode.texts:
-        if words_of(placed.words) != folder:
+    for placed in episode.instructions:
+        if folder_of(placed.instruction) != folder:
             continue
         trajectory = load_trajectory(episode.path)
         name = f"episode_{trajectory.facts.episode}"
@@ -178,7 +178,7 @@ def time_steps(trajectory: Trajectory) -> list[int]:
     return [row for row in range(facts.frames + 1) if row != facts.video_length]
 
 
-def _write_setup(group: Any, trajectory: Trajectory, placed: PlacedText) -> None:  # noqa: ANN401
+def _write_setup(group: Any, trajectory: Trajectory, placed: PlacedInstruction) -> None:  # noqa: ANN401
     """Write the group ``setup`` of an episode: seed, difficulty, instruction, camera intrinsics."""
     import h5py
 
@@ -186,7 +186,7 @@ def _write_setup(group: Any, trajectory: Trajectory, placed: PlacedText) -> None
     setup = group.create_group("setup")
     setup["seed"] = np.int64(facts.seed)
     setup["difficulty"] = facts.difficulty
-    setup.create_dataset("task_goal", data=[placed.words.text], dtype=h5py.string_dtype())
+    setup.create_dataset("task_goal", data=[placed.instruction.text], dtype=h5py.string_dtype())
     for camera in CAMERAS:
         name = f"{camera}_intrinsic"
         setup[f"{camera}_camera_intrinsic"] = trajectory.calibration[name]
@@ -266,7 +266,7 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the table of facts."""
     rows = []
     for _, episode, trajectory in read_episodes(parts):
-        rows += [episode_row(trajectory, placed) for placed in episode.texts]
+        rows += [episode_row(trajectory, placed) for placed in episode.instructions]
     write_rows(root / EPISODE_TABLE, rows)
 
 

@@ -120,6 +120,7 @@ def play_with_model(frames: int = 16, think: bool = False, structured: bool = Tr
     """
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001
+        """Play the sample's job; store the record, and return the goal as the state's output."""
         model = get_model()
         model_options = ModelOptions(
             model=str(model), base_url=VIA, structured=structured, clip_frames=frames
@@ -218,6 +219,7 @@ def grounds_reference() -> Scorer:
     """Score 1 if the episode succeeded, else 0; the explanation says why it failed."""
 
     async def score(state: TaskState, target: Target) -> Score:  # noqa: ARG001
+        """Score the record that the solver has stored; 0 without one."""
         record = state.store.get(RECORD)
         if record is None:
             return Score(value=0, explanation="The episode was not played.")

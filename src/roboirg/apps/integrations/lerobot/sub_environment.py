@@ -70,6 +70,11 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
         size: int = PICTURE_SIZE,
         **options: Unpack[EnvOptions],
     ) -> None:
+        """Check the options, and make the environment; no world is built before the first reset.
+
+        With `video`, LeRobot's limit of steps is raised by `LONGEST_VIDEO`, as it counts the
+        frames, too.
+        """
         if not options.get("cameras", CAMERAS):
             raise InvalidValueError("cameras is empty; LeRobot needs at least one picture.")
         check_whole("size", size, most=PICTURE_SIZE)

@@ -73,6 +73,7 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         send_state: bool = True,
         send_video_history: bool = True,
     ) -> None:
+        """Check tasks and action space, and keep the options; nothing is played or imported yet."""
         super().__init__()
         self.tasks = find_tasks(tasks or [ALL])
         self.setting = setting

@@ -64,7 +64,7 @@ def _to_svg(x: float, y: float) -> tuple[float, float]:
 
 
 def _draw(shape: Shape) -> str:
-    """Return a shape at its place, with its hole above it."""
+    """Return a shape at its place as SVG, with its hole drawn over it."""
     x, y = _to_svg(shape.x, shape.y)
     outer = _outline(shape, shape.half, shape.fill)
     hole = _outline(shape, shape.hole, HOLE_FILL)

@@ -41,6 +41,7 @@ class ScoreServer(KeyedPageServer):
     """
 
     def __init__(self, plan: StudyPlan, folder: Path, operator: str, port: int = 0) -> None:
+        """Listen at the port, with a new key; answer once `serve_forever` is called."""
         check_page_support("The page")
         self.plan = plan
         self.folder = folder

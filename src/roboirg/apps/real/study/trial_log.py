@@ -132,18 +132,19 @@ def _verdict(trial: PlannedTrial, choice: str, note: str) -> dict[str, Any]:
 
     `choice` is `SUCCESS`, `VOID_CHOICE` or the key of a failure.
     """
-    fields: dict[str, Any] = {"outcome": "success", "error": None, "cause": None}
-    fields["attribution"] = None
+    cleared = {"error": None, "cause": None, "attribution": None}  # of an earlier verdict
+    if choice == SUCCESS:
+        return {**cleared, "outcome": "success"}
     if choice == VOID_CHOICE:
-        fields["outcome"] = "error"
-        fields["error"] = "infrastructure"
-        fields["cause"] = f"{VOID}; {note}" if note else VOID
-    elif choice != SUCCESS:
-        attribution = _failure(trial, choice).attribution(note)
-        fields["outcome"] = "failure"
-        fields["cause"] = attribution.sentence
-        fields["attribution"] = attribution
-    return fields
+        cause = f"{VOID}; {note}" if note else VOID
+        return {**cleared, "outcome": "error", "error": "infrastructure", "cause": cause}
+    failure = _failure(trial, choice).attribution(note)
+    return {
+        **cleared,
+        "outcome": "failure",
+        "cause": failure.sentence,
+        "attribution": failure,
+    }
 
 
 def _failure(trial: PlannedTrial, key: str) -> FailureChoice:

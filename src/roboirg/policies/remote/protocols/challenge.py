@@ -57,6 +57,7 @@ class ChallengePolicy(RemotePolicy):
     observe_every: ClassVar[int] = 1
 
     def __init__(self, url: str, seed: int = 0) -> None:
+        """Check URL and options; choose the fields that requests have."""
         super().__init__(url, seed)
         self.depth = self.options.depth
         self.calibration = self.options.calibration

@@ -78,6 +78,7 @@ class MmeVlaPolicy(RemotePolicy):
     lowers_prompt: ClassVar[bool] = True
 
     def __init__(self, url: str, seed: int = 0) -> None:
+        """Check URL and options; with `history`, every frame is required, and the whole video."""
         super().__init__(url, seed)
         self.demonstration_frames = "none"
         self.observe_every: int | None = None
@@ -108,7 +109,7 @@ class MmeVlaPolicy(RemotePolicy):
         self._subgoal = subgoal.lower()
 
     def request_actions(self, observation: Observation) -> Actions:
-        """Send the frames since the last call, then request actions."""
+        """Send the frames since the last call, then request actions; return the first `execute`."""
         if self.options.history:
             self._send_frames(observation)
         message = {
@@ -132,8 +133,7 @@ class MmeVlaPolicy(RemotePolicy):
         self._demonstration = None
         frames = _new_frames(demonstration, observation)
         start = 0 if demonstration is None else len(demonstration["joint_positions"])
-        part = list(itertools.islice(frames, self.options.part))
-        while part:
+        while part := list(itertools.islice(frames, self.options.part)):
             pictures = np.stack([frame.picture for frame in part])
             message = {
                 "add_buffer": True,
@@ -143,7 +143,6 @@ class MmeVlaPolicy(RemotePolicy):
             }
             self.request_confirmed(message, "add_buffer_finished")
             start = 0  # only the first message needs it: the server keeps the first that is not 0
-            part = list(itertools.islice(frames, self.options.part))
 
 
 @dataclass

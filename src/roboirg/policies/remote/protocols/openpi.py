@@ -53,6 +53,7 @@ class OpenpiPolicy(RemotePolicy):
     deterministic: ClassVar[bool] = False
 
     def __init__(self, url: str, seed: int = 0) -> None:
+        """Check URL and options; pictures without a key are not required."""
         super().__init__(url, seed)
         self._keys: dict[str, str] = {}
         """The keys of the pictures, by the camera."""
@@ -86,7 +87,10 @@ class OpenpiService(Service):
         return OpenpiService(self.make_policy)
 
     def handle(self, message: Message) -> dict[str, Any]:
-        """Return the reply to a request for actions."""
+        """Return the reply to a request: the policy's actions, and how long they took.
+
+        Another prompt than the last one begins a new episode, as the protocol has no sign of it.
+        """
         observation = read_request(message)
         # The protocol has no beginning of an episode: another prompt is taken for one.
         if self.policy is None or observation["instruction"] != self.said:

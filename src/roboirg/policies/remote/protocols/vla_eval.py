@@ -52,6 +52,7 @@ class VlaEvalPolicy(RemotePolicy):
     deterministic: ClassVar[bool] = False
 
     def __init__(self, url: str, seed: int = 0) -> None:
+        """Check URL and options; the observations have what these ask for."""
         super().__init__(url, seed)
         self.cameras = ("front", "wrist") if self.options.wrist else ("front",)
         self.demonstration_frames = "all" if self.options.video else "none"
@@ -161,15 +162,19 @@ class VlaEvalPolicy(RemotePolicy):
             f"{_clipped(number)}, where {awaited!r} with number {self._number} was expected."
         )
 
+    @property
+    def _server_params(self) -> Mapping[str, Any]:
+        """What the server's hello says about observations, by name; empty if it says nothing."""
+        params = self.metadata.get("observation_params")
+        return params if isinstance(params, Mapping) else {}
+
     def _wants(self, name: str) -> bool:
         """Return whether the server wants to be shown something; by default it does."""
-        params = self.metadata.get("observation_params")
-        return not isinstance(params, Mapping) or bool(params.get(name, True))
+        return bool(self._server_params.get(name, True))
 
     def _check_params(self) -> None:
         """Raise if the server acts in another action space than the URL gives."""
-        params = self.metadata.get("observation_params")
-        wanted = params.get("action_space") if isinstance(params, Mapping) else None
+        wanted = self._server_params.get("action_space")
         if wanted not in (None, self.actions):
             raise InvalidValueError(
                 f"The server acts in the action space {_clipped(wanted)!r}, but the policy's URL "

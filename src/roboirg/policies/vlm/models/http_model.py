@@ -54,6 +54,7 @@ class HttpModel:
     """
 
     def __init__(self, options: ModelOptions) -> None:
+        """Read the key and the proxy from the environment; nothing is sent yet."""
         self.options = options
         self._key = options.key()
         proxy = proxy_of(options.url)

@@ -70,7 +70,10 @@ def read(reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server
 
 
 def _part(part: Part, options: ModelOptions) -> dict[str, Any]:
-    """Return a text, picture or clip as a part of the request."""
+    """Return a text, picture or clip as a part of Gemini's request.
+
+    ``{"text": "…"}``, or ``{"inlineData": …}`` with the file inside.
+    """
     if isinstance(part, str):
         return {"text": part}
     if isinstance(part, Picture):
