@@ -110,7 +110,7 @@ def run_checks(render_s: int = 0) -> list[Check]:
 
 
 def report(checks: Sequence[Check]) -> str:
-    """Return a line for each check, with a remedy below every failure."""
+    """Return a line for each check, with a remedy below every failure, and last how many failed."""
     width = max((len(check.name) for check in checks), default=0)
     lines: list[str] = []
     failures = 0
@@ -146,7 +146,10 @@ def _check_python() -> Check:
 
 
 def _check_packages() -> Iterator[Check]:
-    """Check this package, and each package that it, or one of its extras, needs."""
+    """Check this package, and each package that it, or one of its extras, needs.
+
+    What only other extras need is not looked at. Versions are compared, nothing is imported.
+    """
     try:
         requirements = metadata.requires(DISTRIBUTION) or []
     except metadata.PackageNotFoundError:
@@ -174,7 +177,7 @@ def _is_needed(requirement: Requirement) -> bool:
 
 
 def _check_package(name: str, specifier: SpecifierSet) -> Check:
-    """Check that a package is installed in a version that will do."""
+    """Check that a package is installed in a version that `specifier`, such as ``>=2``, allows."""
     remedy = f"pip install '{name}{specifier}'"
     try:
         version = metadata.version(name)
@@ -289,7 +292,7 @@ def _run_python(*arguments: str, limit_s: int = FRAME_TIMEOUT) -> _Child:
 
 
 def _check_memory() -> Check:
-    """Check the memory of this machine, or what a container may use of it."""
+    """Check the memory of this machine, or what a container may use of it: enough for a worker."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     limit_file = Path("/sys/fs/cgroup/memory.max")  # a container's own limit
     if limit_file.is_file():
@@ -352,7 +355,10 @@ def _draw_test_frame(render_s: int) -> None:
 
 
 def _go_on_drawing(world: World, seconds: int) -> None:
-    """Draw a world that moves for some seconds; print after each how many pictures were drawn."""
+    """Draw a world that moves for some seconds; print after each how many pictures were drawn.
+
+    The kernel ends this process if a single picture takes longer than `FRAME_TIMEOUT`.
+    """
     from roboirg.core.observations import CAMERAS
     from roboirg.simulation.physics_settings import HOME_ACTION
 
@@ -370,7 +376,10 @@ def _go_on_drawing(world: World, seconds: int) -> None:
 
 
 def _main() -> int:
-    """Run the doctor, or with ``--frame SECONDS`` its child that draws; return the exit code."""
+    """Run the doctor, or with ``--frame SECONDS`` its child that draws; return the exit code.
+
+    0 if all is well, else 1.
+    """
     if "--frame" not in sys.argv[1:]:
         return run_doctor()
     seconds = sys.argv[2:] or ["0"]

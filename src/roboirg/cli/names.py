@@ -11,9 +11,13 @@ def known_tasks(given: object, wordings: str | None = None) -> tuple[str, ...]:
     """Return the names of the tasks that were typed or that a plan names, such as ``all``.
 
     Args:
-        given: names or groups of tasks.
+        given: names of tasks or suites: a text with commas, or a list.
         wordings: identity of a wording file, which has sentences that others wrote. If it is given,
-            ``all`` means only the tasks for which it has sentences.
+            ``all`` means only the tasks for which it has sentences. None, or a pool of ours,
+            changes nothing.
+
+    Raises:
+        InvalidValueError: there is no such task or suite.
     """
     from roboirg.core.word_pools import outside_words
     from roboirg.language.scenarios.wording_store import find_wordings

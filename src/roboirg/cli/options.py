@@ -61,7 +61,14 @@ class PlanWords:
         section: str = "",
         own: Sequence[str] = (),
     ) -> None:
-        """Read the plan's file, if one is named."""
+        """Read the plan's file, if one is named; `fields` is what stands in it, else empty.
+
+        Args:
+            context: of the command, which knows what was typed.
+            plan: name of a plan or its file.
+            section: key of the part of the file that belongs to this command alone.
+            own: keys that this part may have.
+        """
         from roboirg.runs.plan.plan_file import read_plan_file
 
         self._context = context

@@ -202,7 +202,12 @@ def tables(
 
 
 def _print_tables(tables: Sequence[Table], format: str) -> None:  # noqa: A002
-    """Print tables: in colors, as one document for a program, or one after the other."""
+    """Print tables: in colors, as one document for a program, or one after the other.
+
+    Args:
+        tables: to print.
+        format: ``terminal``, or the name of a format of files, such as ``csv``.
+    """
     from rich.console import Console
 
     from roboirg.analysis.tables.rendering import get_format

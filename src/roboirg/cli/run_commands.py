@@ -144,7 +144,10 @@ def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummar
 
 
 def print_tables_of(source: Source) -> None:
-    """Print the tables of a run, what is mixed in it, and its unsuccessful episodes."""
+    """Print the tables of a run, what is mixed in it, and its unsuccessful episodes.
+
+    The tables go to stdout, warnings of mixed versions to stderr.
+    """
     from rich.console import Console
 
     from roboirg.analysis.results.reading import read_frame
@@ -173,7 +176,10 @@ def warn_of_mixtures(*frames: Frame) -> None:
 
 
 def report_problems(summary: RunSummary, folder: Path) -> None:
-    """Print errors and missing episodes of a run on stderr; exits with 2 if there are any."""
+    """Print errors and missing episodes of a run on stderr; exit with 2 if there are any.
+
+    Videos that could not be written are printed, too, but are no reason to exit.
+    """
     if summary.video_errors:
         typer.echo(
             f"{len(summary.video_errors):,} of {counted(summary.played, 'video')} could not be "
@@ -232,7 +238,13 @@ def _plan(name: str | None, typed: dict[str, Any], usual: Sequence[str]) -> Plan
 
 
 def _executor(plan: Plan, name: str, workers: int | None) -> Executor:
-    """Return what plays the episodes of a plan: processes of this machine, or a Ray cluster."""
+    """Return what plays the episodes of a plan: processes of this machine, or a Ray cluster.
+
+    Args:
+        plan: with the time limit of an episode, and what a cluster needs.
+        name: ``local`` or ``ray``.
+        workers: number of workers; None for as many as suit the machine or cluster.
+    """
     check_names("executor", [name], EXECUTORS)
     if name == "ray":
         from roboirg.runs.run.ray_cluster import RayCluster

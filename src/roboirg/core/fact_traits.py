@@ -298,10 +298,10 @@ def register_fact_kind(kind: FactKind, traits: FactTraits) -> None:
 
 
 def fact_traits(kind: FactKind) -> FactTraits:
-    """Return the traits of a kind.
+    """Return the traits of a kind of fact: what it means, and how it is said and shown.
 
-    A kind that is not registered, as in a record of a task that is not installed, is a state
-    called by its name.
+    A kind that is not registered, as in a record of a task that is not installed, is a state called
+    by its name: ``"upside_down"`` -> *upside down cube_red*.
     """
     traits = FACT_TRAITS.get(kind)
     if traits is not None:

@@ -380,7 +380,10 @@ class _LookRecorder(EpisodeLoop):
         )
 
     def act(self, observation: dict[str, Any]) -> ArrayLike:
-        """Return the expert's action; note its decision, and the look that it belongs to."""
+        """Return the expert's action; note its decision, and the look that it belongs to.
+
+        A decision belongs to the newest look; without one at this very step, one is added first.
+        """
         action = super().act(observation)
         if not self._has_looked():
             self._look(is_video=False)
@@ -398,7 +401,11 @@ class _LookRecorder(EpisodeLoop):
         return not newest.is_video and newest.steps == self._steps
 
     def _after_step(self, env: RoboIRGEnv, is_demonstration: bool) -> None:
-        """Look after every `LOOK_EVERY`-th step; video and policy's turn are counted apart."""
+        """Look after every `LOOK_EVERY`-th step; video and policy's turn are counted apart.
+
+        The environment calls this after every control step. In the video, the first step is looked
+        at.
+        """
         del env
         if is_demonstration:
             if self._video_steps % LOOK_EVERY == 0:

@@ -123,7 +123,10 @@ def read_actions(folder: Path, digest: str) -> ActionLog:
 
 
 def _pack(log: ActionLog) -> bytes:
-    """Return the content of a compressed NumPy file (.npz) with the actions of an episode."""
+    """Return the content of a compressed NumPy file (.npz) with the actions of an episode.
+
+    `_unpack` is the reverse; no number changes.
+    """
     file = io.BytesIO()
     # Column by column: the numbers of one joint resemble each other, so they take less space.
     rows = np.asfortranarray(log.rows)

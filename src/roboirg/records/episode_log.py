@@ -41,7 +41,10 @@ def log_path(folder: Path, slug: str) -> Path:
 
 
 def logged_slugs(folder: Path) -> frozenset[str]:
-    """Return the names (slugs) of a run's episodes that have a log that is not empty."""
+    """Return the names (slugs) of a run's episodes that have a log that is not empty.
+
+    Read at once from the folder, as asking for each episode would be slow.
+    """
     slugs = set()
     with contextlib.suppress(FileNotFoundError), os.scandir(folder / LOG_FOLDER) as entries:
         for entry in entries:
@@ -101,7 +104,10 @@ class EpisodeLog:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Trim the file, remove keys of services from it, and delete it if it is empty."""
+        """Trim the file, remove keys of services from it, and delete it if it is empty.
+
+        Then the file is closed. Errors of the disk are ignored: a log must not end a run.
+        """
         self._finished.set()
         self._thread.join()
         # A policy may have closed the descriptor; its log must not end the run.

@@ -44,7 +44,8 @@ STOPPED = Fact("stopped", "shuttle", "target")
 def sample(rng: np.random.Generator, _difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, target and cube; speed, goal visit and direction of the path are uniform.
 
-    The cube has a random color, which means nothing.
+    The cube has a random color, which means nothing. The order of the draws decides which scene a
+    seed gives: the cube's color and speed before the goal's visit.
     """
     button = draw_button(rng, BUTTON_REGION)
     middle = Point(*TARGET_REGION.draw(rng), HEIGHT)

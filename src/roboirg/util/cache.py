@@ -71,7 +71,11 @@ class Cache:
         return self._folder is not None
 
     def read(self, key: str) -> memoryview | None:
-        """Return the content of an entry; None if it is missing or damaged."""
+        """Return the content of an entry; None if it is missing or damaged, or the cache is off.
+
+        A damaged entry is removed. Reading an entry makes it the newest, so that it is kept
+        longest.
+        """
         if self._folder is None:
             return None
         path = self._folder / key
@@ -109,7 +113,7 @@ class Cache:
             _warn_once(error)
 
     def _make_room(self, size: int) -> None:
-        """Remove the least recently used entries until `size` bytes more fit in."""
+        """Remove the least recently used entries until `size` bytes more fit in the limit."""
         entries = sorted(self._entries())
         total = size + sum(entry.size for entry in entries)
         for entry in entries:

@@ -89,7 +89,11 @@ def find_entry(name: str, attribute: str, kind: type[Thing], group: str) -> Thin
 
 
 def discover_in_modules(package: str, attribute: str, kind: type[Thing]) -> list[Thing]:
-    """Return what the modules of a package define, in the order of their names."""
+    """Return what the modules of a package define, in the order of the modules' names.
+
+    Imports all modules of `package`; those whose `attribute` is no `kind`, or that have none, count
+    for nothing.
+    """
     things = []
     for info in pkgutil.iter_modules(importlib.import_module(package).__path__):
         module = importlib.import_module(f"{package}.{info.name}")

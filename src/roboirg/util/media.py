@@ -76,7 +76,10 @@ def evenly_spaced(count: int, most: int) -> NDArray[np.intp]:
 
 
 def scaled_square(picture: NDArray[Any], size: int) -> NDArray[Any]:
-    """Crop a picture to its central square and scale it to `size` x `size` pixels."""
+    """Crop a picture to its central square and scale it to `size` x `size` pixels.
+
+    The picture is (height, width, 3) or (height, width); the result has as many channels.
+    """
     import cv2
 
     height, width = picture.shape[:2]
@@ -106,7 +109,10 @@ def contact_sheets(frames: Pixels, labels: Sequence[str]) -> Iterator[Pixels]:
 
 
 def _sheet(frames: Pixels) -> Pixels:
-    """Return frames in rows of `SHEET_SIDE`; what is missing in the last row is black."""
+    """Return frames (n, height, width, 3) as one picture, in rows of `SHEET_SIDE`.
+
+    What is missing in the last row is black.
+    """
     count, height, width, _ = frames.shape
     rows = math.ceil(count / SHEET_SIDE)
     places = np.zeros((rows * SHEET_SIDE, height, width, 3), np.uint8)

@@ -40,7 +40,14 @@ def run_main() -> None:
 
 
 def begin(parent: int) -> None:
-    """Put this process under the supervision of its parent, and prepare it for its work."""
+    """Put this process under the supervision of its parent, and prepare it for its work.
+
+    From then on it ignores Ctrl-C, is killed when its parent dies, and leads a process group and
+    session of its own, so that what it starts can be ended with it. Call it once, first of all.
+
+    Args:
+        parent: process id of the parent; if that is dead already, this process ends at once.
+    """
     # Ctrl-C is for the parent, which decides what to do.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

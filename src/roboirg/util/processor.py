@@ -58,7 +58,7 @@ def _described_by(names: Sequence[str]) -> list[str]:
 
 @functools.cache
 def _fields() -> dict[str, str]:
-    """Return what Linux says of the first processor; empty elsewhere."""
+    """Return what Linux says of the first processor: ``{"model name": "…"}``; empty elsewhere."""
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
     except OSError:

@@ -123,7 +123,7 @@ def _words_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator
 
 
 def _content_lines(plan: ExportPlan) -> Iterator[str]:
-    """Yield the card's lines on what a frame holds: state, action and pictures."""
+    """Yield the card's lines on what a frame holds: state, action, video and pictures."""
     yield "State: seven joint angles (rad) and the first finger (m)."
     origin = "exactly what was executed"
     if plan.disturbed:

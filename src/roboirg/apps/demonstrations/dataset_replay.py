@@ -125,7 +125,10 @@ def _find_episode(recorded: ReplayableTrajectory) -> Episode:
 
 @functools.cache
 def _places(task: str) -> dict[int, tuple[str, int]]:
-    """Return the split and the number in it of each episode of a task, by its seed."""
+    """Return the split and the number in it of each episode of a task, by its seed.
+
+    Of train, val and test: ``{510000: ("test", 0), …}``. Makes all of them once, and keeps them.
+    """
     places = {}
     for split in SPLITS:
         for index in range(SIZES[split]):

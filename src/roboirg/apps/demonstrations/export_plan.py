@@ -287,6 +287,8 @@ def training_words(split: str, options: InstructionOptions) -> InstructionOption
 def recording_jobs(plan: ExportPlan) -> list[SpokenJob]:
     """Return what is to be recorded: trajectories with their instructions, in the dataset's order.
 
+    Task by task, episode by episode; the dataset's numbers follow this order.
+
     Raises:
         InvalidValueError: no setting can express any of the episodes.
     """

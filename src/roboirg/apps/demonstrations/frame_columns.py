@@ -178,7 +178,11 @@ class FrameColumns:
         }
 
     def pictures(self, trajectory: Trajectory) -> dict[str, list[bytes]]:
-        """Return the pictures of each camera as PNG files, one for each frame, by column."""
+        """Return the pictures of each camera as PNG files, one for each frame, by column.
+
+        ``{"observation.images.front": [b"…", …]}``. The last row has no frame, as no action follows
+        it.
+        """
         rows = range(trajectory.facts.frames)
         columns = {}
         with zipfile.ZipFile(trajectory.path) as archive:

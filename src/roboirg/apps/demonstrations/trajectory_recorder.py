@@ -245,7 +245,11 @@ class _Recorder(EpisodeLoop):
         self._acts_in_waypoints = env.actions == WAYPOINT.name
 
     def record(self, policy_name: str, variation: int) -> TrajectoryFacts:
-        """Play the episode, and store its pictures, states and actions; return how it ended."""
+        """Play the episode, and store its pictures, states and actions; return how it ended.
+
+        Pictures are written while it is played, all else at the end. `policy_name` and `variation`
+        are kept among the facts.
+        """
         if self._spec.video and self._spec.coding != "none":
             self.env.set_frame_hook(self._see_video)
         observation, info = self.begin()
@@ -285,7 +289,11 @@ class _Recorder(EpisodeLoop):
         self._tracks.add(pictures)
 
     def begin(self) -> Moment:
-        """Start the episode; store what the policy observes first, as if after a step at home."""
+        """Start the episode; store what the policy observes first, as if after a step at home.
+
+        Row 0 of the policy's turn has the home pose as its action, since every row has the action
+        that led to it.
+        """
         from roboirg.simulation.physics_settings import HOME_ACTION
 
         observation, info = super().begin()

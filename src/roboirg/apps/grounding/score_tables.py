@@ -83,7 +83,10 @@ def _words(row: ScoreRow) -> tuple[str, ...]:
 
 
 def _notes(scores: Sequence[GroundingScore]) -> Iterator[str]:
-    """Yield the notes below the table: its columns, and answers that are unreadable or missing."""
+    """Yield the notes below the table: its columns, and answers that are unreadable or missing.
+
+    One sentence for each score that has some of them.
+    """
     yield (
         "Percent correct, as means over tasks. Random: goals of the scene, letters or pixels "
         "drawn at random. Above random: 0 is random, 100 all correct. Command: a guess among the "

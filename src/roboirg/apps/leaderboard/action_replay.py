@@ -103,7 +103,9 @@ class RecordedJob(PreparedJob):
     def words(self) -> TrialWords:
         """The words of the trial, with those of the record in place of those made from its job.
 
-        What they mean (`meaning`) stays open: the record does not hold it.
+        The goal and its explicit command are made here, in the arm that decides the goal:
+        `OTHER_GOAL`, or `TOLD` for all others. What the words mean (`meaning`) stays open: the
+        record does not hold it.
         """
         arm = OTHER_GOAL if self.job.arm == OTHER_GOAL else TOLD
         explicit = word_trial(self.scene_episode, InstructionOptions(), arm)

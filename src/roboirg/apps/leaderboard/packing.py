@@ -102,7 +102,15 @@ def _write(out: Path, manifest: PackManifest, paths: Mapping[str, Path]) -> None
 
 
 def _check_size(paths: Mapping[str, Path], folder: Path) -> None:
-    """Raise if the files are larger in all than the most that is unpacked from a pack."""
+    """Raise if the files are larger in all than the most that is unpacked from a pack.
+
+    Args:
+        paths: of the files, by their names in the pack.
+        folder: of the run, for the error.
+
+    Raises:
+        StoreError: they are; the message names the largest.
+    """
     sizes = {name: path.stat().st_size for name, path in paths.items()}
     total = sum(sizes.values())
     if total > MOST_PACKED_BYTES:

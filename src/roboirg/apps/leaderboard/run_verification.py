@@ -105,6 +105,8 @@ def _summed_up(
 ) -> Verification:
     """Return the result of a verification: of the checks of all records, and of the run's plans.
 
+    Only checks with findings are kept, sorted, so that the result does not depend on their order.
+
     Args:
         folder: of the run, which has the plans.
         entries: all records.
@@ -128,7 +130,12 @@ def _summed_up(
 
 
 def _excuses(failed: Sequence[RecordCheck], entries: Sequence[Summary]) -> Iterator[str]:
-    """Yield why a record may not hold here, or was not checked, without being wrong."""
+    """Yield why a record may not hold here, or was not checked, without being wrong.
+
+    Args:
+        failed: checks with findings.
+        entries: all records.
+    """
     elsewhere = [result for result in failed if result.elsewhere]
     if elsewhere:
         yield (

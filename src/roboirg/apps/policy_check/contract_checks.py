@@ -148,7 +148,10 @@ def _describe_actions(
 
 
 def check_reports(player: PolicyPlayer) -> Iterator[CheckResult]:
-    """Check what records take from the policy besides its actions: metadata, subgoal and costs."""
+    """Check what records take from the policy besides its actions: metadata, subgoal and costs.
+
+    The policy has just played, as some of them exist only after `reset` or `act`.
+    """
     policy = player.policy
     source = player.source
     is_ours = isinstance(source, str) and not read_policy(source).is_foreign

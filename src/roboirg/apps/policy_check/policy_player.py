@@ -129,7 +129,10 @@ class PolicyPlayer:
         return SyntheticRollout(chunks, dtype)
 
     def ask(self, episode: ExpertEpisode) -> Chunks:
-        """Return a fresh policy's answers in the expert's episode; its errors are not caught."""
+        """Return a fresh policy's answers, (n, size) each, at the moments of the expert's episode.
+
+        Its errors are not caught. The observations follow the expert, whatever the policy answers.
+        """
         policy = self.make_fresh()
         policy.reset(episode.instruction, episode.demonstration)
         answers: Chunks = []

@@ -29,7 +29,11 @@ MINIMUM_WIDTH = 100
 def print_episode(
     episode: Episode, settings: Sequence[str], options: InstructionOptions, console: Console
 ) -> None:
-    """Print objects, motions, video, goal, and the instruction in some settings."""
+    """Print objects, motions, video, goal, and the instruction in some settings.
+
+    Where the output is no terminal, lines have at least `MINIMUM_WIDTH` characters: the width of
+    `console` changes.
+    """
     if not console.is_terminal:
         console.width = max(console.width, MINIMUM_WIDTH)
     console.print(
@@ -121,7 +125,7 @@ def instructions_table(
 def spoken_settings(
     episode: Episode, settings: Sequence[str], options: InstructionOptions
 ) -> list[SpokenSetting]:
-    """Return what is said in each setting that can express the episode."""
+    """Return what is said in each setting that can express the episode, in their order."""
     said = []
     for setting in settings:
         chosen = replace(options, setting=setting)

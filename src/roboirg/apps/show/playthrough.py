@@ -59,6 +59,8 @@ class Playthrough:
 def play_through(episode: Episode) -> Playthrough:
     """Let the oracle play; capture the start, completed stages, key events and the end.
 
+    The last picture gets the verdict as its caption; after a success, with what was done last.
+
     Raises:
         RenderDeviceError: no Vulkan device can render.
         MissingDependencyError: the simulator is not installed.

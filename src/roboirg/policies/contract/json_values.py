@@ -84,7 +84,11 @@ def _as_json(value: Any, place: _Place) -> Any:  # noqa: ANN401
 
 
 def _scalar(value: object, place: _Place) -> Any:  # noqa: ANN401
-    """Return a value that holds no others as a plain JSON value; one that JSON lacks as a text."""
+    """Return a value that holds no others as a plain JSON value; one that JSON lacks as a text.
+
+    Numbers of a subclass become plain ones. Infinite or too large ones are texts, or an error; see
+    `_text`.
+    """
     if value is None or isinstance(value, bool):
         return value
     if isinstance(value, int) and abs(value) < _TOO_LARGE:
@@ -97,7 +101,8 @@ def _scalar(value: object, place: _Place) -> Any:  # noqa: ANN401
 def _object(value: Mapping[Any, Any], place: _Place) -> dict[str, Any]:
     """Return a mapping as a JSON object, whose keys are texts.
 
-    In errors, the entry ``b`` of ``a`` is called ``a.b``.
+    ``{1: 2.5}`` -> ``{"1": 2.5}``. In errors, the entry ``b`` of ``a`` is called ``a.b``, and a key
+    that cannot be a text *a key*.
     """
     entries: dict[str, Any] = {}
     for key, entry in value.items():
@@ -108,7 +113,10 @@ def _object(value: Mapping[Any, Any], place: _Place) -> dict[str, Any]:
 
 
 def _array(value: Any, place: _Place) -> Any:  # noqa: ANN401
-    """Return an array as lists; of a large one only ``array of shape (256, 256, 3), uint8``."""
+    """Return an array, or a scalar of NumPy, PyTorch or JAX, as lists or a number.
+
+    Of more than `_MAX_LISTED` numbers only a text: ``"array of shape (256, 256, 3), uint8"``.
+    """
     if math.prod(value.shape) > _MAX_LISTED:
         return f"array of shape {tuple(value.shape)}, {value.dtype}"
     listed = value.tolist()

@@ -98,7 +98,10 @@ def plain_complaint(message: str) -> str:
 
 
 def _names(kind: type[BaseModel]) -> list[str]:
-    """Return the names of all options, with those in a table (a field that is a model itself)."""
+    """Return the names of all options, for suggestions.
+
+    A field that is a model itself is a table of options; its options are listed instead.
+    """
     names: list[str] = []
     for name, field in kind.model_fields.items():
         table = field.annotation

@@ -185,7 +185,8 @@ class LeRobotPolicy:
     def _predict(self, model: Any, seeds: Sequence[int], batch: dict[str, Any]) -> Any:  # noqa: ANN401
         """Return the chunks of several episodes (episodes, n, 8), each with noise of its own seed.
 
-        The model must remember nothing of an episode, as all are asked about with the same one.
+        The model must remember nothing of an episode, as that of the first one answers for all. A
+        model that takes no noise draws none; see `_load_model`.
         """
         import torch
 
@@ -203,7 +204,8 @@ class LeRobotPolicy:
         """Return the next actions of one episode (1, n, 8), as ``lerobot-eval`` asks for them.
 
         That asks before every action; the model answers from a queue until it is empty. Here, all
-        are taken from the queue at once that the next observations cannot change any more.
+        are taken from the queue at once that the next observations cannot change any more. Models
+        without a queue give one action.
         """
         import torch
 

@@ -238,7 +238,13 @@ class ServerConnection:
             raise PolicyReplyError(f"{self} sent a message without a request.")
 
     def _read(self, data: bytes | str) -> dict[str, Any]:
-        """Return what a server has sent; a text is an error of the server."""
+        """Return the message that a server has sent; a text is an error of the server.
+
+        Keys that this process has sent are replaced by asterisks first.
+
+        Raises:
+            PolicyReplyError: it is a text, or no message.
+        """
         if isinstance(data, str):
             raise self.error_reply(data)
         try:
@@ -268,6 +274,9 @@ class ServerConnection:
 
 def _next_message(websocket: ClientConnection, end: float) -> bytes | str | None:
     """Return the next message of a server; None if none comes until `end` of the monotonic clock.
+
+    It is waited for in pieces of `_CHECK_S`, to see whether the library has refused a message
+    meanwhile.
 
     Raises:
         ConnectionClosed: the connection broke.

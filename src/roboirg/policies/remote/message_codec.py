@@ -143,7 +143,11 @@ def _array(described: object, shape: Any, data: object) -> np.ndarray[Any, Any]:
 
 
 def _dtype(text: object) -> np.dtype[Any]:
-    """Return the dtype that a text such as ``<f4`` describes; raise if it is not accepted."""
+    """Return the dtype that a text such as ``<f4`` describes.
+
+    Raises:
+        ValueError: it is no text, too long, or not accepted: Python objects are never read.
+    """
     if not isinstance(text, str) or len(text) > _MAX_DTYPE_LENGTH:
         raise ValueError(f"the dtype of an array is {str(text)[:_MAX_DTYPE_LENGTH]!r}")
     dtype = np.dtype(text)

@@ -157,7 +157,10 @@ class WebsocketServer:
 
 
 def _answer(service: Service, data: bytes | str) -> bytes | str:
-    """Return the reply to a message in bytes, or the traceback of an error as a text."""
+    """Return the reply to a message in bytes, or the traceback of an error as a text.
+
+    Runs in the policy's thread. The last line of the text is the error in one sentence.
+    """
     try:
         if isinstance(data, str):
             raise TypeError("Messages must be binary, not text.")

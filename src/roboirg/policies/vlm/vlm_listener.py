@@ -201,7 +201,10 @@ class VLMListener(ScriptedPolicy):
         super().reset(instruction, demonstration)
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
-        """Return the goal that the model names; None if it names none, or one not in this scene."""
+        """Return the goal that the model names; None if it names none, or one not in this scene.
+
+        Called once an episode, when all has been said. Keeps the goal for the records in any case.
+        """
         given = SaidAndShown(
             task=env.episode.task,
             text=instruction,

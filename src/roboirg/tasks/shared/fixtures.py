@@ -137,7 +137,8 @@ def draw_cube(
 ) -> SceneObject:
     """Draw a cube that lies in the region, with any yaw, at least `gap` meters from all obstacles.
 
-    Draws again until there is room; see `placed`.
+    Draws place and yaw, in this order, again until there is room. Raises SceneRejectedError after
+    256 draws without any.
     """
 
     def draw() -> SceneObject:
@@ -188,9 +189,14 @@ def draw_button_and_cubes(
     gap: float,
     button_region: Region = BUTTON_REGION,
 ) -> ButtonAndCubes:
-    """Draw a button, then `CUBES` away from it as `draw_colored_cubes` does.
+    """Draw a button, then one cube or three of different colors around it.
 
-    `region` and `gap` are those of the cubes.
+    Args:
+        rng: the button is drawn first.
+        difficulty: decides the number of cubes.
+        region: of the cubes.
+        gap: between a cube and what was drawn before, m.
+        button_region: of the button's center.
     """
     button = draw_button(rng, button_region)
     keep_out = button_keep_out(button)
@@ -210,7 +216,8 @@ def draw_target(
 ) -> SceneObject:
     """Draw a target disc of `radius` meters, at least `gap` meters from all obstacles.
 
-    Draws again until there is room; see `placed`.
+    Draws again until there is room; raises SceneRejectedError after 256 draws without any. `rgb`,
+    each from 0 to 1, is the color of its rings; None for the usual one.
     """
 
     def draw() -> SceneObject:
@@ -253,7 +260,10 @@ def marker_over(target: SceneObject, name: str) -> SceneObject:
 def draw_bin(
     rng: np.random.Generator, region: Region, obstacles: Sequence[Obstacle]
 ) -> SceneObject:
-    """Draw a bin whose center is in the region and whose walls touch no obstacle."""
+    """Draw a bin whose center is in the region and whose walls touch no obstacle.
+
+    It is turned by at most `BIN_YAW` to either side. Draws again until there is room; see `placed`.
+    """
 
     def draw() -> SceneObject:
         x, y = region.draw(rng)

@@ -57,7 +57,7 @@ def names_of_this_machine() -> frozenset[str]:
 
 
 def _is_address(name: str) -> bool:
-    """Return whether a name is an IP address."""
+    """Return whether a name is an IP address, such as ``10.0.0.3`` or ``::1``."""
     import ipaddress
 
     try:

@@ -135,7 +135,11 @@ def _folders(part: DatasetPart) -> list[str]:
 
 
 def _write_episode(file: Any, episode: RecordedEpisode) -> None:  # noqa: ANN401
-    """Write an episode into an open HDF5 file: its time steps and its first instruction."""
+    """Write an episode into an open HDF5 file: its time steps and its first instruction.
+
+    The group is called ``episode_N`` by the number in the split, its steps ``timestep_0`` and so
+    on.
+    """
     trajectory = load_trajectory(episode.path)
     group = file.create_group(f"episode_{trajectory.facts.episode}")
     _write_setup(group, trajectory, episode.instructions[0])
@@ -179,7 +183,13 @@ def time_steps(trajectory: Trajectory) -> list[int]:
 
 
 def _write_setup(group: Any, trajectory: Trajectory, placed: PlacedInstruction) -> None:  # noqa: ANN401
-    """Write the group ``setup`` of an episode: seed, difficulty, instruction, camera intrinsics."""
+    """Write the group ``setup`` of an episode: seed, difficulty, instruction, camera intrinsics.
+
+    Args:
+        group: of HDF5, for the episode.
+        trajectory: what the robot did.
+        placed: its instruction, with its numbers in the dataset.
+    """
     import h5py
 
     facts = trajectory.facts

@@ -168,8 +168,9 @@ def _instruction_fields(
 ) -> dict[str, Any]:
     """Return the fields of an item on its instruction: its words, and what the command leaves open.
 
-    ``command_chance`` is the success of a guess among the goals that fit the command alone, 0 to 1;
-    ``hidden_slots`` are the values of the goal that only the command's context names.
+    The command is the last utterance. ``command_chance`` is the success of a guess among the goals
+    that fit the command alone, 0 to 1, or None; ``hidden_slots`` are the goal's values that only
+    the words before the command name.
     """
     hidden: list[str] = []
     if options.form != "resolved":  # a resolved command leaves none to its context

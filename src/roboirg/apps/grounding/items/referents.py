@@ -77,9 +77,10 @@ def _first_handled(scene: Scene, names: Sequence[str]) -> list[ObjectKind]:
 def find_referents(episode: Episode) -> tuple[Referent, ...]:
     """Return the things in the first picture that an instruction means: those to point at.
 
-    They are in the order in which they are handled; if the goal is amounts, there is one for each
-    color, as any object of a color is right. Things that are not there yet when the words are said,
-    such as containers that appear later, are replaced by the cubes in their places.
+    Red, then blue -> the red cube, the blue cube. They are in the order in which they are handled;
+    if the goal says how many of each color, there is one for each color, as any object of a color
+    is right. Things that are not there yet when the words are said, such as containers that appear
+    later, are replaced by the cubes in their places.
     """
     task = get_task(episode.task)
     scene = episode.scene

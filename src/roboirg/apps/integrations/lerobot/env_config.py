@@ -106,7 +106,10 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
         return environments
 
     def _create(self, task: str, n_envs: int, use_async: bool) -> VectorEnv[Any, Any, Any]:
-        """Return the vector environment of a task; its processes start when it is first used."""
+        """Return the vector environment of a task; its processes start when it is first used.
+
+        With `use_async`, each of several episodes has a process; else all are played in this one.
+        """
         options = self.gym_kwargs
         example = LeRobotSubEnvironment(task, **options)  # checks the options; builds no world
         if not use_async or n_envs == 1:

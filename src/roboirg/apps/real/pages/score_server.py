@@ -111,7 +111,11 @@ class ScoreServer(KeyedPageServer):
         )
 
     async def _take_form(self, request: Request) -> Response:
-        """Store a verdict, then redirect: reloading the page must not repeat it."""
+        """Store a verdict, then redirect: reloading the page must not repeat it.
+
+        An error of ours becomes the message on the trial's page; after success the next trial is
+        shown.
+        """
         body = await read_body(request, MAX_BODY_BYTES)
         form = dict(parse_qsl(body.decode("utf-8", "replace"), keep_blank_values=True))
         try:

@@ -35,7 +35,10 @@ svg { float: left; height: 60mm; margin-right: 6mm; }
 
 
 def sheet_text(plan: StudyPlan) -> str:
-    """Return the page: each block and the demonstrations begin on paper of their own."""
+    """Return the sheet as HTML: each block, and the demonstrations, begin on paper of their own.
+
+    Trials are numbered over all blocks, in the order of the plan.
+    """
     page = _HEAD
     number = 1
     for block, trials in _by_block(plan).items():

@@ -125,7 +125,10 @@ class StudyPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     @property
     def twin_plans(self) -> dict[str, Plan]:
-        """For each task the plan with which ``roboirg run`` plays its trials in simulation."""
+        """For each task the plan with which ``roboirg run`` plays its trials in simulation.
+
+        It has the policies, settings and episodes of the task's trials, sorted.
+        """
         jobs: dict[str, list[Job]] = {}
         for trial in self.trials:
             jobs.setdefault(trial.job.task, []).append(trial.job)
@@ -302,7 +305,10 @@ def _trials(
 def _demonstrations(
     tasks: Sequence[str], count: int, rng: np.random.Generator
 ) -> tuple[PlannedDemonstration, ...]:
-    """Return the demonstrations: tasks alternate, their episodes in random order."""
+    """Return the demonstrations: tasks alternate, their episodes in random order.
+
+    Draws one order for each task, in the order of `tasks`; `count` are those of each task.
+    """
     episodes = {}
     for task in tasks:
         chosen = counterbalanced_episodes(task, DEMONSTRATION_SPLIT, count)
@@ -328,7 +334,11 @@ def _shared_settings(tasks: Sequence[str]) -> tuple[str, ...]:
 def _check_each_once(
     policies: Sequence[str], tasks: Sequence[str], settings: Sequence[str]
 ) -> None:
-    """Check that there are names of each kind, each once, and a letter for each policy."""
+    """Check that there are names of each kind, each once, and a letter for each policy.
+
+    Raises:
+        InvalidValueError: a kind has none, a name is given twice, or there are over 26 policies.
+    """
     for kind, names in (("policy", policies), ("task", tasks), ("setting", settings)):
         if not names:
             raise InvalidValueError(f"No {kind} was given.")

@@ -94,12 +94,15 @@ class TrialLog:
     ) -> Record:
         """Store an operator's verdict and return its record, which is then on the disk.
 
+        A trial may be scored again: the new record replaces the old one in tables, and keeps its
+        video and other fields.
+
         Args:
             trial: to score.
             choice: ``success``, ``void``, or the key of one of the trial's failures.
             operator: name of the operator.
             note: free text.
-            video: path of a video, relative to the folder.
+            video: path of a video, relative to the folder; empty keeps that of the last record.
 
         Raises:
             InvalidValueError: the trial has no such failure.

@@ -107,7 +107,7 @@ class ChallengeService(Service):
         """Return the reply to a reset or a request for actions.
 
         The first request of an episode has the demonstration before its newest observation; later
-        ones have what was seen since the last request.
+        ones have what was seen since the last request, which becomes the observation's history.
         """
         if message.get("reset"):
             self.forget()

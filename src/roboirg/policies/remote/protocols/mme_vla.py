@@ -160,7 +160,10 @@ class _SentFrames:
     turn_start: int = 0
 
     def add(self, message: Message) -> None:
-        """Add the frames in a message, and the number of the first one of the policy's turn."""
+        """Add the frames in a message, and the number of the first one of the policy's turn.
+
+        The first number that is not 0 counts, as the published server keeps it.
+        """
         images = read_array(message, "images", "uint8", ("T", 1, "H", "W", 3))
         states = read_array(message, "state", "real numbers", ("T", 8))
         self.count += len(images)
@@ -183,7 +186,10 @@ class MmeVlaService(Service):
         self._sent = _SentFrames()
 
     def handle(self, message: Message) -> dict[str, Any]:
-        """Return the reply to a reset, to frames for the memory, or to a request for actions."""
+        """Return the reply to a reset, to frames for the memory, or to a request for actions.
+
+        A message with ``reset`` is a reset whatever else it has; then ``add_buffer`` counts.
+        """
         begin = time.perf_counter()
         if message.get("reset"):
             self.forget()
@@ -245,7 +251,11 @@ def _state(observation: Observation) -> NDArray[np.float32]:
 def _demonstration(
     frames: Sequence[dict[str, NDArray[Any]]], observation: Observation
 ) -> Demonstration:
-    """Return the frames before the policy's turn; the protocol has no wrist pictures of them."""
+    """Return the frames before the policy's turn as a demonstration, by field, arrays (T, …).
+
+    The protocol has no wrist pictures of them. Without frames T is 0; `observation` gives the
+    shapes.
+    """
     demonstration: dict[str, NDArray[Any]] = {}
     for name in ("front_rgb", "joint_positions", "gripper"):
         if frames:

@@ -67,7 +67,10 @@ class OpenpiPolicy(RemotePolicy):
         """Do nothing: the protocol has neither a reset nor a memory."""
 
     def request_actions(self, observation: Observation) -> Actions:
-        """Send the observation; return the rows of the reply to execute."""
+        """Send the observation; return the first `execute` rows of the reply, or all.
+
+        The names of the message's entries are those that the URL's options give.
+        """
         message: dict[str, Any] = {}
         for camera, key in self._keys.items():
             message[key] = observation[f"{camera}_rgb"]  # type: ignore[literal-required]

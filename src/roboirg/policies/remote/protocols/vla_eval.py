@@ -80,7 +80,10 @@ class VlaEvalPolicy(RemotePolicy):
         return {"version": version, **hello}
 
     def begin_episode(self, demonstration: Demonstration) -> None:
-        """Begin an episode; the demonstration goes with the first observation."""
+        """Begin an episode; the demonstration goes with the first observation, if it is wanted.
+
+        The URL and the server must both want it.
+        """
         self._check_params()
         self._subgoal = None
         sends_video = self.options.video and self._wants("send_video_history")

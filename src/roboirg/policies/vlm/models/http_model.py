@@ -65,7 +65,11 @@ class HttpModel:
         weakref.finalize(self, self._client.close)  # the connection ends with this object
 
     def answer(self, query: ModelQuery) -> ModelReply:
-        """Send a query and return the reply; errors become those that `Model` names."""
+        """Send a query and return the reply; errors become those that `Model` names.
+
+        No key is in the reply or in an error. No error is chained to the service's own, as
+        tracebacks are recorded.
+        """
         if not self.options.structured:
             query = query._replace(schema=None)
         service = self.options.service

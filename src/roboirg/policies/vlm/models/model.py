@@ -137,7 +137,7 @@ class ModelOptions(BaseModel):
     @field_validator("base_url")
     @classmethod
     def _has_no_secret(cls, url: str | None) -> str | None:
-        """Refuse an address that could hold a secret, or that is none."""
+        """Refuse an address that could hold a secret, or that is none; None is the provider's."""
         parts = urlsplit(url or "http://provider")
         if parts.scheme not in ("http", "https") or not parts.hostname:
             raise ValueError("an address must begin with http:// or https:// and name a host")
@@ -209,7 +209,10 @@ class ModelOptions(BaseModel):
         return self.prices != TokenPrices()
 
     def cost_usd(self, reply: ModelReply) -> float:
-        """Return what a reply costs: 0 without prices, NaN if tokens with a price are unknown."""
+        """Return what a reply costs in US dollars: 0 without prices.
+
+        NaN if tokens that have a price are not known; such a cost is unknown, not 0.
+        """
         cost = 0.0
         prices = self.prices
         if prices.input:

@@ -93,7 +93,10 @@ class ReplyStore:
 
     @functools.cached_property
     def _database(self) -> sqlite3.Connection:
-        """The run's file of replies, opened and if need be made when it is first used."""
+        """The run's file of replies, opened and if need be made when it is first used.
+
+        Every statement is a transaction of its own, unless one is begun (isolation level None).
+        """
         self.settings.folder.mkdir(parents=True, exist_ok=True)
         database = sqlite3.connect(
             self.settings.folder / REPLIES_FILE, timeout=_LOCK_S, isolation_level=None

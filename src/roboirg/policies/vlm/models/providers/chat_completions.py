@@ -25,7 +25,11 @@ _ANSWERS = frozenset({"text", "output_text"})
 
 
 def write(query: ModelQuery, options: ModelOptions, key: str) -> HttpRequest:
-    """Return the HTTP request for a query, in the form of OpenAI's chat completions."""
+    """Return the HTTP request for a query, in the form of OpenAI's chat completions.
+
+    Options that are None are left out of the body, so that the service's defaults count. The bytes
+    for equal queries are equal.
+    """
     response_format = None
     if query.schema:
         form = {"name": "answer", "strict": True, "schema": query.schema}
@@ -73,7 +77,10 @@ def chat_messages(query: ModelQuery, options: ModelOptions) -> list[dict[str, An
 
 
 def _message(turn: ChatTurn, options: ModelOptions) -> dict[str, Any]:
-    """Return a turn of the conversation as a message; those of the model are texts only."""
+    """Return a turn of the conversation as a message; those of the model are texts only.
+
+    ``{"role": "user", "content": [{"type": "text", "text": "…"}, …]}``
+    """
     if turn.role == "model":
         return {"role": "assistant", "content": "".join(map(str, turn.parts))}
     pieces: list[dict[str, Any]] = []
@@ -83,7 +90,10 @@ def _message(turn: ChatTurn, options: ModelOptions) -> dict[str, Any]:
 
 
 def _pieces(part: Part, options: ModelOptions) -> Iterator[dict[str, Any]]:
-    """Yield the pieces of a message that hold a part: a clip may be several pictures."""
+    """Yield the pieces of a message that hold a part: a text, a picture, or a clip.
+
+    A clip is one video, or several pictures, as the options say.
+    """
     if isinstance(part, str):
         yield {"type": "text", "text": part}
     elif isinstance(part, Picture):
