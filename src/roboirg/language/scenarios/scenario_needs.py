@@ -26,7 +26,7 @@ def scenario_settings() -> Mapping[str, Setting]:
     return {
         name: setting
         for name, setting in all_settings().items()
-        if setting.offers not in without_scenarios
+        if setting.content_plans not in without_scenarios
     }
 
 
@@ -53,7 +53,7 @@ def check_needs(scenario: Scenario, stated: Collection[str], mistakes: Mistakes)
     if not scenario.said:
         mistakes.add(f"has no say; write say.{' or say.'.join(stated)}")
     has_derive = fields.derive is not None
-    if has_derive != (setting.offers == "reasoning"):
+    if has_derive != (setting.content_plans == "reasoning"):
         mistakes.add("must have derive if its setting is reasoning, and only then")
     if fields.people is not None:
         names_of_people = set(itertools.chain.from_iterable(fields.people.values()))
@@ -70,7 +70,7 @@ def _check_presence(scenario: Scenario, setting: Setting, mistakes: Mistakes) ->
     needed: list[str] = ["introduction"]
     if setting.name == "direct":
         needed += CONTEXTUAL
-    if setting.offers == "direct-rival":
+    if setting.content_plans == "direct-rival":
         needed += REMARKS
     lacking: list[str] = []
     for name in dict.fromkeys([*needed, *scenario.texts]):

@@ -26,7 +26,7 @@ from roboirg.language.generator import request_of, spoken_instruction
 from roboirg.language.instruction import FORMS, Instruction, Meaning, Mention
 from roboirg.language.meaning import field_values, meant_goals
 from roboirg.language.request import InstructionRequest
-from roboirg.language.scenarios.choice import Chosen, choose, misfit
+from roboirg.language.scenarios.choice import ScenarioChoice, choose, explain_misfit
 from roboirg.language.scenarios.literals import in_words
 from roboirg.language.scenarios.markup import slots_in
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
@@ -135,7 +135,7 @@ def check_scenario(
 
     if not report.scenes:
         request = request_of(first, checker.usual)
-        why = misfit(request, scenario.fields.setting, [scenario])
+        why = explain_misfit(request, scenario.fields.setting, [scenario])
         report.add(f"fits none of the scenes; in {first.key} {why}", "")
     elif not report.open:
         report.add("its command alone gives the goal in every scene", "")
@@ -234,7 +234,7 @@ class _SceneChecker:
             variants += [replace(variant, distractor="competing") for variant in variants]
         return [self._check_text(request_of(episode, options), chosen) for options in variants]
 
-    def _check_text(self, request: InstructionRequest, chosen: Chosen) -> Instruction:
+    def _check_text(self, request: InstructionRequest, chosen: ScenarioChoice) -> Instruction:
         """Check one text of the scenario, add what is found to the report, and return the text.
 
         Args:
@@ -252,7 +252,7 @@ class _SceneChecker:
             report.competing = instruction.text
         return instruction
 
-    def _chosen(self, request: InstructionRequest) -> Chosen | None:
+    def _chosen(self, request: InstructionRequest) -> ScenarioChoice | None:
         """Return how the scenario says an episode.
 
         None if it does not fit, or its setting cannot express the episode.
@@ -262,7 +262,7 @@ class _SceneChecker:
         scenario = self._report.scenario
         return choose(request, scenario.fields.setting, [scenario])
 
-    def _instruction_of(self, request: InstructionRequest, chosen: Chosen) -> Instruction:
+    def _instruction_of(self, request: InstructionRequest, chosen: ScenarioChoice) -> Instruction:
         """Return the instruction of the scenario."""
         return spoken_instruction(request, say_chosen(request, self._words, chosen))
 
@@ -344,7 +344,7 @@ def _in_both_pools(scenario: Scenario, words: TaskScenarios) -> Iterator[str]:
 
 
 def _broken_rules(
-    request: InstructionRequest, chosen: Chosen, instruction: Instruction
+    request: InstructionRequest, chosen: ScenarioChoice, instruction: Instruction
 ) -> Iterator[str]:
     """Yield a complaint for each rule that a text of a scenario breaks.
 

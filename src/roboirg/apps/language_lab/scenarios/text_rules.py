@@ -13,7 +13,7 @@ from roboirg.core.motions import Swap
 from roboirg.language.instruction import Instruction
 from roboirg.language.number_words import CARDINALS, ORDINALS
 from roboirg.language.request import InstructionRequest
-from roboirg.language.scenarios.choice import Chosen
+from roboirg.language.scenarios.choice import ScenarioChoice
 
 Patterns = Mapping[str, str]
 """Patterns of wrong words, and why they are wrong."""
@@ -81,7 +81,7 @@ OF_LISTS: Mapping[int, Patterns] = {
 
 
 def broken_text(
-    instruction: Instruction, chosen: Chosen, request: InstructionRequest
+    instruction: Instruction, chosen: ScenarioChoice, request: InstructionRequest
 ) -> Iterator[str]:
     """Yield a complaint for each grammar rule that a text breaks: *says 'a apple'; 'an' is right*.
 
@@ -95,7 +95,7 @@ def broken_text(
     """
     yield from _complaints(GRAMMAR, "\n".join(instruction.turns))
     patterns = dict(MENTIONED)
-    length = len(chosen.introduced.values.get("list", ()))
+    length = len(chosen.fillers.values.get("list", ()))
     patterns |= OF_LISTS.get(length, {})
     if request.episode.scene.motions_of(Swap):
         patterns |= MOVED
