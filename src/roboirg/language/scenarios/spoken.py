@@ -29,7 +29,7 @@ from roboirg.language.scenarios.markup import Text, pointers_in
 from roboirg.language.scenarios.realizer import Realizer
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.wording_store import task_words
-from roboirg.language.scenarios.written import shown
+from roboirg.language.scenarios.written import excerpt
 from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.language.settings.setting import Setting
 from roboirg.tasks import Task
@@ -214,7 +214,7 @@ def say_chosen(
         return _scenario_words(request, words, chosen)
     except LookupError as error:
         raise InvalidValueError(
-            f"{words.file}, scenario {shown(chosen.scenario.fields.frame)}, lacks {error} in "
+            f"{words.file}, scenario {excerpt(chosen.scenario.fields.frame)}, lacks {error} in "
             "this episode."
         ) from error
 
