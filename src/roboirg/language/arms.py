@@ -46,7 +46,7 @@ _KEPT_NOTES = ("pattern", "patterns", "relation", "rival")
 
 
 class ArmWords(NamedTuple):
-    """What is said in an arm of a scene.
+    """What is said of a scene in one arm, a variant of the words for a comparison.
 
     Attributes:
         episode: the episode, with the goal by which its verdict falls.
@@ -60,13 +60,13 @@ class ArmWords(NamedTuple):
 
 
 class TrialWords(NamedTuple):
-    """Everything that is said of a trial.
+    """Everything that is said of a trial, one playing of an episode.
 
     Attributes:
         episode: the episode, with the goal by which its verdict falls.
         instruction: what is said.
         command: the explicit command of its goal.
-        stated: its goal in words.
+        stated: its goal in words, ``color red, repeats 3``.
         goals: the episode with each goal that its scene allows, by the goal's words.
     """
 
@@ -177,12 +177,16 @@ def _paraphrase(
 
 
 def _notes_to_keep(instruction: Instruction) -> list[object]:
-    """Return the notes in which a paraphrase equals the told text."""
+    """Return the entries of the metadata in which a paraphrase must equal the usual text."""
     return [instruction.metadata.get(name) for name in _KEPT_NOTES]
 
 
 def _silence(instruction: Instruction, text: str) -> Instruction:
-    """Return a text that says nothing about the goal; it leaves all goals of the scene."""
+    """Return the instruction with a text that says nothing about the goal.
+
+    ``Please do your task.`` means all goals of the scene; if the instruction declares no meaning,
+    neither does the result.
+    """
     meaning = None if instruction.meaning is None else Meaning({})
     return _with_texts(instruction, [text], meaning)
 
@@ -212,7 +216,7 @@ def _scramble(episode: Episode, instruction: Instruction) -> Instruction:
 
 
 def _content_words(text: str) -> list[str]:
-    """Return the words of a text in lower case, without `FUNCTION_WORDS`."""
+    """Return the words of a text in lower case, in order, without `FUNCTION_WORDS`."""
     function_words = FUNCTION_WORDS.split()
     words = [word.lower() for word in _WORD.findall(text)]
     return [word for word in words if word not in function_words]
@@ -221,9 +225,14 @@ def _content_words(text: str) -> list[str]:
 def _with_texts(
     instruction: Instruction, texts: Sequence[str], meaning: Meaning | None = None
 ) -> Instruction:
-    """Return an instruction of other texts, which mention nothing; the last is the command.
+    """Return an instruction with other texts for its utterances, and no mentions.
 
-    Fewer texts than there are utterances stand for the last ones.
+    Fewer texts than there are utterances stand for the last ones; the last text is the command.
+
+    Args:
+        instruction: whose stages and metadata are kept.
+        texts: at least one.
+        meaning: of the texts; None if it is not known.
     """
     spoken = instruction.utterances[-len(texts) :]
     utterances = [
