@@ -90,7 +90,7 @@ def broken_text(
 
     Args:
         instruction: whose text is checked.
-        chosen: how a scenario says the episode, with the values that it lists.
+        chosen: the scenario (template) of the text with its fillers, among them those of its list.
         request: with the episode.
     """
     yield from _complaints(GRAMMAR, "\n".join(instruction.turns))
@@ -103,7 +103,12 @@ def broken_text(
 
 
 def _complaints(patterns: Patterns, text: str) -> Iterator[str]:
-    """Yield a complaint for each pattern of wrong words that a text has, with the reason."""
+    """Yield a complaint for each pattern that is found in a text: *says 'a apple'; 'an' is right*.
+
+    Args:
+        patterns: of wrong words, with the reason why they are wrong.
+        text: to search.
+    """
     for pattern, reason in patterns.items():
         found = re.search(pattern, text)
         if found:
@@ -111,10 +116,10 @@ def _complaints(patterns: Patterns, text: str) -> Iterator[str]:
 
 
 def _with_marked_mentions(instruction: Instruction) -> str:
-    """Return the text with its referring words marked, as the patterns of rules need it.
+    """Return the text of an instruction with its mentions marked, as the patterns of rules need it.
 
-    *Lift it.* becomes ``Lift <it red:it>.``: class of the expression, value, and the words; None
-    is the class of words that name a value. A line is an utterance.
+    *Lift it.* becomes ``Lift <it red:it>.``: class of the expression, value, and the words. Words
+    that name a value have the class None: ``<None red:red>``. A line is an utterance.
     """
     turns = list(instruction.turns)
     # From the end, so that the positions of earlier mentions stay right.
