@@ -207,11 +207,12 @@ def _scramble(episode: Episode, instruction: Instruction) -> Instruction:
     new_order = words
     while new_order == words:
         new_order = shuffled(rng, words)
-    next_words = iter(new_order)  # each utterance takes the next of them
-    texts = [
-        " ".join(itertools.islice(next_words, len(utterance_words)))
-        for utterance_words in words_by_utterance
-    ]
+    texts: list[str] = []
+    start = 0
+    for utterance_words in words_by_utterance:
+        end = start + len(utterance_words)
+        texts.append(" ".join(new_order[start:end]))
+        start = end
     return _with_texts(instruction, texts)
 
 

@@ -95,6 +95,7 @@ class Ranking(NamedTuple):
             return None
         ordered = sorted(candidates, key=self.quantity, reverse=True)
         chosen = ordered[rank]
+        # The one before it, if it is not the first, and the one after it, if it is not the last.
         neighbors = [*ordered[max(rank - 1, 0) : rank], *ordered[rank + 1 : rank + 2]]
         for neighbor in neighbors:
             if abs(self.quantity(chosen) - self.quantity(neighbor)) < self.margin:
@@ -138,13 +139,14 @@ def agreed(found: Iterable[SceneObject | None]) -> SceneObject | None:
 def selectors(scene: Scene, kind: ObjectKind, frame: Frame) -> Iterator[Selector]:
     """Yield phrases for where an object stands, each with the rule by which it singles one out.
 
-    The rule ranks the objects of the kind, for example from left to right. Simpler words come
-    first, and this order must stay: words of texts are drawn from it.
+    *closest to you*, *second from your left*, *closest to the button*, *nearest to the cube closest
+    to you*. A rule ranks the objects of the kind, for example from left to right. Simpler words
+    come first, and this order must stay: words of texts are drawn from it.
 
     Args:
         scene: with the objects.
         kind: of the objects. Boxes and tapes stand in pairs, one on each side of the robot; only
-            their sides are used.
+            their sides are used, *on your left*.
         frame: whose left and right is meant.
     """
     candidates = candidates_in(scene, kind)
@@ -251,7 +253,7 @@ def _column(item: SceneObject) -> float:
 
 
 def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    """Yield the words for the first thing in each direction: *closest to you*."""
+    """Yield the words for the first thing in each of the four directions: *closest to you*."""
     for direction in directions(frame):
         is_sided = bool(direction.side)
         landmark = Landmark(direction.extreme, is_sided, is_in_depth=not is_sided)
@@ -318,8 +320,12 @@ def _in_rows(
 ) -> Iterator[Selector]:
     """Yield the words for things in a row, counted from an end: *second from your left*.
 
-    `ordinals` has the words by rank, 1 for *second*. The last thing in a row gets none, since it is
-    the first from the other end.
+    The last thing in a row gets none, since it is the first from the other end.
+
+    Args:
+        candidates: the things.
+        frame: whose left and right is meant.
+        ordinals: the words by rank, from 0: 1 is *second*.
     """
     for rank, ordinal in ordinals.items():
         # The last one in a row is the extreme of the other end.
@@ -328,7 +334,7 @@ def _in_rows(
         for direction in directions(frame):
             is_sided = bool(direction.side)
             # *Fourth closest* is not counted as depth: `places` would leave it out.
-            is_in_depth = not is_sided and ordinals is ORDINALS
+            is_in_depth = not is_sided and rank not in FOURTH
             landmark = Landmark(f"{ordinal} {direction.rank}", is_sided, is_in_depth)
             yield Selector(landmark, (direction.ranking,), candidates, rank)
 

@@ -135,9 +135,10 @@ def _landmarks(scene: Scene, kind: ObjectKind, frame: Frame) -> Iterator[SpokenP
 
 
 def _places_of(scene: Scene, things: Things, frame: Frame) -> Iterator[SpokenPlace]:
-    """Yield the words for where things stand, of all classes that people say, in any order.
+    """Yield the words for where things stand, of all classes that people say.
 
-    Corners and sides of a fixture are said in the robot's frame only.
+    Corners and sides of a fixture are said in the robot's frame only. `spoken_places` sorts them by
+    class and keeps the order within one, from which words are drawn, so the order here must stay.
     """
     yield from _in_directions(things, frame)
     if frame == "robot":
@@ -149,20 +150,18 @@ def _places_of(scene: Scene, things: Things, frame: Frame) -> Iterator[SpokenPla
 
 
 @lru_cache(maxsize=64)
-def things_at(
-    scene: Scene, kind: ObjectKind, frame: Frame
-) -> Mapping[str | None, SceneObject | None]:
+def things_at(scene: Scene, kind: ObjectKind, frame: Frame) -> Mapping[str, SceneObject | None]:
     """Return the thing that each phrase for a place singles out; None where that is unclear.
 
-    ``{"on the left": <a cube>, "in the middle": <another>}``. The phrase None, for places that have
-    no words of a form, means nothing.
+    ``{"on the left": <a cube>, "in the middle": <another>}``
     """
-    found: dict[str | None, SceneObject | None] = {}
+    found: dict[str, SceneObject | None] = {}
     for selector in selectors(scene, kind, frame):
         found[selector.landmark.phrase] = selector.select()
     for place in spoken_places(scene, kind, frame):
-        found[place.attributive] = place.thing
-        found[place.spot] = place.thing
+        for words in (place.attributive, place.spot):
+            if words is not None:
+                found[words] = place.thing
     return found
 
 
@@ -303,9 +302,12 @@ _WORDS_BY_FRAME: Mapping[Frame, tuple[_DirectionWords, ...]] = {
 
 
 def _in_directions(things: Things, frame: Frame) -> Iterator[SpokenPlace]:
-    """Yield the words for things far to the left, right, front and back, with their things.
+    """Yield the words for the things at the left, right, front and back, each with its thing.
 
-    The frame says whose left and right: the robot's, or that of the front camera's picture.
+    *all the way on the left*, *on the left*, *second from the left* …; the frame says whose left
+    and
+    right: the robot's, or that of the front camera's picture. Words by depth must also be right by
+    the distance from the robot.
     """
     left_words, right_words, near_words, far_words = _WORDS_BY_FRAME[frame]
     to_left, to_right, in_front, behind = directions(frame)
@@ -506,7 +508,8 @@ class _Corner(NamedTuple):
 def _corners(things: Things) -> Iterator[SpokenPlace]:
     """Yield words for the thing nearest to each of the four corners of the table, with the thing.
 
-    Front and left are the robot's: *nearest to the front left corner*.
+    *at the back left*, *in the back left corner*, *nearest to the back left corner*; left and right
+    are the robot's, and the front is near the robot.
     """
     left, right, near, far = (direction.ranking for direction in directions("robot"))
     corners = (

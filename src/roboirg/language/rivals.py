@@ -5,8 +5,8 @@ values, each possible in the other, are partners: the value of one is the rival 
 two values each is the meant one in half of a split's episodes.
 
 - *meant*: the value that the goal has. *rival*: another one that the goal could have there.
-- *pair*: a meant value with a rival. `possible_pairs` finds all, `rival_pairs` those of one slot,
-  and `balanced_rival` the one that is said.
+- *pair*: a meant value with a rival. `possible_pairs` finds all, `pairs_of_drawn_slot` those of one
+  slot, and `balanced_rival` the one that is said.
 - *entry*: an episode of a split with all that may be its rival.
 """
 
@@ -63,19 +63,19 @@ def pair_refusal(request: InstructionRequest) -> str | None:
 
     None if it can. The text is the end of a sentence, without a stop.
     """
-    if rival_pairs(request):
+    if pairs_of_drawn_slot(request):
         return None
     if len(request.values_of("amount")) > _FIELDS_OF_ONE_AMOUNT:
         return "a goal that counts cubes of several colors leaves no rival"
     return "the scene has no second value that the goal could ask for"
 
 
-def rival_pairs(request: InstructionRequest) -> list[ValuePair]:
-    """Return the goal's value in one slot, with each other value that words may name next to it.
+def pairs_of_drawn_slot(request: InstructionRequest) -> list[ValuePair]:
+    """Draw a slot of the goal, and return its value there with each of its rivals.
 
-    Such another value is a rival: *red or blue?* where red is meant. Of several slots that can have
-    rivals one is drawn. A color that the video gives away has none, as the choice would be no
-    choice. Empty if no slot can have a rival.
+    A rival is a value that words may name next to it: *red or blue?* where red is meant. Only slots
+    that can have rivals are drawn from. A color that the video gives away has none, as the choice
+    would be no choice. Empty if no slot can have a rival. The draw is the same each time.
     """
     pairs_by_slot: dict[str, list[ValuePair]] = {}
     for pair in possible_pairs(request):
@@ -183,7 +183,7 @@ def balanced_rival(request: InstructionRequest, pairs: list[ValuePair]) -> Value
 
     Args:
         request: the episode.
-        pairs: all pairs of its value, as `rival_pairs` returns them; at least one.
+        pairs: all pairs of its value, as `pairs_of_drawn_slot` returns them; at least one.
     """
     by_rival = {pair.rival.value: pair for pair in pairs}
     likely = _likely_rivals(request, pairs[0].meant)
@@ -233,7 +233,7 @@ def _unpaired_entry(episode: Episode, task: Task) -> _SplitEntry | None:
     None if there are none. The entry is not paired with another episode yet.
     """
     request = InstructionRequest(episode, task, InstructionOptions(), sampler_of(episode))
-    pairs = rival_pairs(request)
+    pairs = pairs_of_drawn_slot(request)
     if not pairs:
         return None
     meant = _SlotValue(pairs[0].slot, pairs[0].meant.value)
@@ -292,7 +292,7 @@ def draw_order(request: InstructionRequest) -> PairOrder:
     """Draw in which order two values are said, and whether the remark points at the meant one.
 
     Each block of four episodes has each of the four cases once: with independent draws, a split of
-    fifty could favor the value named first by chance.
+    fifty could favor the value named first by chance. The case is added to the log of the request.
     """
     episode = request.episode
     block, place_in_block = divmod(episode.index, BLOCK)

@@ -15,7 +15,7 @@ from roboirg.language.settings import setting_names
 from roboirg.language.token_counts import SHORT_LIMIT, USUAL_LIMIT, count_tokens
 from roboirg.tasks import every_task
 
-_BY_TASK = {
+_METADATA_ENTRY_BY_TITLE = {
     "Reasoning patterns (scenes)": "pattern",
     "Relations (scenes)": "relation",
     "Landmark classes (targets)": "landmark_classes",
@@ -27,12 +27,13 @@ _BY_TASK = {
 def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
     """Yield tables for the terminal: lengths of the texts, and how often each kind of words occurs.
 
-    A table of metadata that no instruction has, such as patterns of reasoning, is left out.
+    They are by setting, and those of metadata entries, such as ``pattern``, by task. Of the latter,
+    a table of an entry that no instruction has is left out.
     """
     yield _word_count_table(instructions)
     yield _token_count_table(instructions)
     yield expression_table(corpus_statistics.expression_counts(instructions))
-    for title, name in _BY_TASK.items():
+    for title, name in _METADATA_ENTRY_BY_TITLE.items():
         counts = corpus_statistics.metadata_counts(instructions, name)
         if counts:
             classes = sorted(corpus_statistics.classes_in(counts))

@@ -111,12 +111,13 @@ def hidden_term(
     """
     base, _, number = field.partition(".")
     pointer = _pointer_of(field, words)
+    # The slot of the numbers, if the pointer is for several colors, each with its number.
     numbers_slot = NUMBERS.get(pointer.of)
     if numbers_slot and base == "colors":
         return Term("same", history.operands(field))  # "the same ones": each color as it was said
     if remark:
         return chosen_term(pointer, remark, history)
-    if numbers_slot:
+    if numbers_slot:  # "half as many": of the number of this color
         pointer = pointer._replace(of=f"{numbers_slot}.{number or 0}")
     return pointed_term(pointer, history)
 

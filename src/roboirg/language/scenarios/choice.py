@@ -168,7 +168,8 @@ def _draw_reasoning_plan(request: InstructionRequest, matches: Iterable[_Match])
 
     Kinds, or patterns, are such as ``color exclusion``; the number of the episode decides which has
     its turn. Among the plans of that pattern the draw is by name: relation, reference and listed
-    slot, ``one fewer 3``. These names are hash keys, so their spelling has to stay.
+    slot, ``one fewer 3``. These names are hash keys, so their spelling has to stay. The plan itself
+    is returned, no copy: `_draw_match` finds its matches by identity.
     """
     plans_by_pattern: dict[str, dict[str, ContentPlan]] = {}
     for _, plan in matches:

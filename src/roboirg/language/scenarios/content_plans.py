@@ -25,7 +25,7 @@ from roboirg.language.rivals import (
     ValuePair,
     balanced_rival,
     draw_order,
-    rival_pairs,
+    pairs_of_drawn_slot,
 )
 from roboirg.language.scenarios.derived import derivations_of
 from roboirg.language.scenarios.fillers import (
@@ -37,7 +37,7 @@ from roboirg.language.scenarios.fillers import (
     goal_fillers,
     list_fillers,
 )
-from roboirg.language.settings.grounded import clues_of
+from roboirg.language.settings.grounded import draw_clues
 
 
 def _direct_plans(request: InstructionRequest) -> Iterator[ContentPlan]:
@@ -154,7 +154,7 @@ def _grounded_plans(request: InstructionRequest) -> Iterator[ContentPlan]:
     *The cube in the middle is wet. Lift it.* Such words are a clue. The slot of the goal that they
     stand for is drawn; nothing is yielded if no value has a clue.
     """
-    clues = clues_of(request)
+    clues = draw_clues(request)
     if not clues:
         return
     slots = list(dict.fromkeys(value.slot for value in clues))
@@ -213,7 +213,7 @@ def _rival_plans(request: InstructionRequest) -> Iterator[ContentPlan]:
     other one, its rival, and the order of the two are drawn, so that each of two values is meant,
     and each position, equally often. The episode must have a rival (`pair_refusal`).
     """
-    pair = balanced_rival(request, rival_pairs(request))
+    pair = balanced_rival(request, pairs_of_drawn_slot(request))
     order = draw_order(request)
     meant = filler_of(pair.meant)
     rival = Filler(pair.rival.slot, pair.meant.slot_type, pair.rival.value)

@@ -185,10 +185,11 @@ class Realizer:
         return (TaggedText(f"the {noun} "), *text)
 
     def _naming_text(self, name: str) -> Text:
-        """Return a text that names what a slot holds, with the slot in it: ``the {color} cube``.
+        """Return a text that names what a slot holds, with the slot in it.
 
-        A color gets a noun, a visit or placement *the*, a number is said as *twice*; some have
-        words of the task.
+        ``color`` gives ``the {color} cube``, ``visit`` gives ``the {visit}``, *the third*, and
+        ``repeats`` gives ``{repeats:times}``, *twice*. For a placement or moment the task's own
+        words are taken if it has any; anything else is the slot alone.
         """
         values = self._fillers.values[name]
         kind = values[0].kind if len(values) == 1 else "several"

@@ -386,7 +386,7 @@ def _read_scenarios(
         settings = _settings_of(scenario)
         if settings & settings_before:
             part.add(f"stands twice in the setting {min(settings & settings_before)}")
-        settings_before |= settings
+        settings_before |= settings  # in place, in the dictionary
         yield scenario
 
 

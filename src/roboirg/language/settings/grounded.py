@@ -24,12 +24,12 @@ def refusal(request: InstructionRequest) -> str | None:
 
     The text is the end of a sentence, without a stop.
     """
-    if clues_of(request):
+    if draw_clues(request):
         return None
     return "nothing to see in this scene singles out a slot's value"
 
 
-def clues_of(request: InstructionRequest) -> Clues:
+def draw_clues(request: InstructionRequest) -> Clues:
     """Return words for what is to be seen for each value of the goal that has any; they are drawn.
 
     For the goal *red* it may be *the cube in the middle*. Where a color is described, counts are
