@@ -151,8 +151,9 @@ def _paraphrase(
 ) -> Instruction:
     """Return the instruction in other words: paraphrase 1, 2, ..., all with different texts.
 
-    Words are drawn again (`variant`) until `number` texts other than the usual one have come up;
-    the last of them is returned. Only texts that take the same reasoning count.
+    Words are drawn again, variant after variant, until `number` texts other than the usual one have
+    come up; the last of them is returned. Only texts that take the same reasoning count, and
+    variants that the setting refuses do not.
 
     Args:
         episode: what to say.
@@ -197,6 +198,9 @@ def _scramble(episode: Episode, instruction: Instruction) -> Instruction:
     *Please lift the red cube.* may become *cube red lift*. Each utterance keeps its number of
     content words; what the new text means is not known. The order depends on the episode and the
     text only.
+
+    Raises:
+        InvalidValueError: fewer than two different words are left, so there is no other order.
     """
     words_by_utterance = [_content_words(utterance_text) for utterance_text in instruction.turns]
     words = list(itertools.chain.from_iterable(words_by_utterance))

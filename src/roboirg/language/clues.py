@@ -201,8 +201,8 @@ def _cubes_on_sides(scene: Scene) -> Iterator[EventClue]:
     """Yield clues to a number of repeats: how many cubes of a color are left or right of another.
 
     *Once for each red cube to the left of the cube from the video* leads to ``repeats`` 2 if two
-    red cubes are there. Yields nothing if all cubes have one color, as in scenes where they change
-    places.
+    red cubes are there. The video must show that a cube is picked up. Yields nothing if all cubes
+    have one color, as in scenes where they change places.
     """
     shown = scene[scene.past[0].subject]
     cubes = scene.of_kind("cube")

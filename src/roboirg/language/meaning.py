@@ -220,6 +220,12 @@ def _values_without(operands: Sequence[Operand], field: str, episode: Episode) -
 
     In a scene of red, blue and green cubes, *neither red nor blue* leaves ``{"green"}``. Things may
     be set aside by descriptions, *the one on the left*; then the only thing left gives the value.
+    For a number of cubes, *all but three* of five leaves ``{2}``.
+
+    Args:
+        operands: what is set aside: values, or descriptions.
+        field: of the goal, ``color``.
+        episode: with the scene.
     """
     described = [operand for operand in operands if isinstance(operand, Described)]
     if described:

@@ -345,6 +345,11 @@ def _in_direction(
 
     They are the first one, *all the way on the left*; one that is far ahead, *on the far left*; the
     only one there, *on the left*; and those after the first, *second from the left*.
+
+    Args:
+        things: that are compared.
+        words: of the direction.
+        ranking: the order of things, the first in the direction first.
     """
     yield from _place_if_any(PlaceClass.EXTREME, ranking.select(things, 0), words.most)
 
@@ -369,6 +374,11 @@ def _in_row(things: Things, words: _DirectionWords, ranking: Ranking) -> Iterato
     """Yield words for the things after the first one in a direction: *second from the left*.
 
     The last one gets no such words, since it is the first from the other end.
+
+    Args:
+        things: that are compared.
+        words: of the direction; they must have those for a row.
+        ranking: the order of things, the first in the direction first.
     """
     for rank, ordinal in ORDINALS.items():
         if rank >= len(things) - 1:
@@ -401,15 +411,15 @@ def _near_others(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
 def _near(
     anchor: SceneObject, name: str, things: Things, kind: PlaceClass
 ) -> Iterator[SpokenPlace]:
-    """Yield *nearest to the button* and *next to the button*, for the things that are so.
+    """Yield *nearest to the button* and *next to the button*, each for the thing that is so.
 
-    The anchor is what the words name, here the button. *Next to* is within a few centimeters
-    (`BESIDE`) of touching it.
+    *Next to* is for the only thing within a few centimeters (`BESIDE`) of touching the button. By a
+    fixture it also says where something happens, *right by the button*.
 
     Args:
-        anchor: near which things are looked for.
+        anchor: near which things are looked for, here the button.
         name: words for it, *the button*.
-        things: that may be near it.
+        things: that may be near it; at least one.
         kind: class of the places.
     """
     nearness_to_anchor = nearness(anchor.position)
@@ -447,11 +457,12 @@ def _way_between(first: SceneObject, second: SceneObject) -> Ranking:
 
 
 def _in_middle(things: Things) -> Iterator[SpokenPlace]:
-    """Yield the thing that is nearest to the center, if it can be called *in the middle*.
+    """Yield *in the middle* for the thing that is nearest to the center, if it can be called so.
 
     It has to be the nearest to the center of the work area and to that of the things, since people
     may mean either. Of an even number of things, it must be the only one around the center; of an
-    odd number, it must be the middle one from left to right.
+    odd number, it must be the middle one from left to right. Only a thing that is alone around the
+    center also says where something happens, as a spot.
     """
     nearness_to_area_center = nearness(_CENTER.position)
     nearness_to_their_center = nearness(_center_of(things).position)
@@ -526,7 +537,8 @@ def _at_corner(things: Things, corner: _Corner) -> Iterator[SpokenPlace]:
     """Yield words for the thing nearest to a corner, if one is clearly the nearest.
 
     Alone in that quarter of the table, it is *at the back left*, and close enough to the corner
-    also *in the back left corner*. Else it is *nearest to the back left corner*.
+    also *in the back left corner*. Else it is *nearest to the back left corner*, which is no spot:
+    it does not say where something happens.
     """
     nearest = corner.nearest(things)
     if nearest is None:

@@ -278,7 +278,8 @@ def _command_words(
 ) -> TaskScenarios:
     """Return a task's commands and words that state values, with no scenarios yet.
 
-    What the file lacks is taken from the file that the task names for its words.
+    Commands and stated values that the file lacks are taken from the file that the task names for
+    its words; `TaskScenarios.own` says which are the file's own.
 
     Args:
         head: the content of the file.
@@ -583,7 +584,8 @@ class _SentenceReader:
             mistakes: of the file, at the sentence.
         """
         kind = type_of(pointer.of, self.listed)
-        said = re.sub(r"<[^:<>]+: ", "<", sentence)  # as the table has it: without class and slot
+        # As the table has it, without class and slot: "<it color: it>" becomes "<it>".
+        said = re.sub(r"<[^:<>]+: ", "<", sentence)
         rows = [row for row in _rows_of(kind) if _row_matches(row, pointer.words, said)]
         # Rows with the words around them come first, then those of the relations.
         rows.sort(key=lambda row: ("<" not in row.words, row.operation not in self.operations))

@@ -190,9 +190,11 @@ class _SceneChecker:
             self._add_fit(episode, implicit=instruction[0])
 
     def _add_fit(self, episode: Episode, implicit: Instruction) -> None:
-        """Add a scene that the scenario fits to the report, and compare it with another goal.
+        """Add a scene that the scenario fits to the report.
 
-        The scenario must not say the same of another goal of the scene.
+        Its key is added, and its text if too few are shown yet, of every third scene. It is counted
+        if the command alone leaves the goal open. It is a broken rule if the scenario says the same
+        of another goal of the scene.
 
         Args:
             episode: with the scene.
@@ -432,9 +434,11 @@ def _unclear_references(instruction: Instruction, scenario: Scenario) -> Iterato
 def _ambiguous(pointer: Mention, words: str, values: Sequence[str]) -> Iterator[str]:
     """Yield a complaint if words that point back at one value could mean several.
 
+    *'it' can mean red or blue*.
+
     Args:
         pointer: the words that point back.
-        words: the same, for the complaint.
+        words: the same, quoted for the complaint.
         values: that were named before and are of its kind: *red*, *blue*.
     """
     named = list(dict.fromkeys(values))
@@ -452,10 +456,12 @@ def _wrong_antecedents(
 ) -> Iterator[str]:
     """Yield a complaint for each value of a pointer that was not named exactly once before.
 
+    *'it' points at what the introduction does not name*.
+
     Args:
-        pointer: words that point back.
-        words: the same, for the complaint.
-        values: of the mentions before it, of its kind.
+        pointer: words that point back, *it*.
+        words: the same, quoted for the complaint.
+        values: of the mentions before it, of its kind, in order: *red*, *blue*, *red*.
         is_named_again: whether one of two was named again to say that it is gone; then a value may
             be named twice.
     """
