@@ -124,7 +124,8 @@ def say_arm(episode: Episode, options: InstructionOptions, arm: str = TOLD) -> A
 def word_trial(episode: Episode, options: InstructionOptions, arm: str = TOLD) -> TrialWords:
     """Return what the policy hears in an arm, with the explicit command and the goals in words.
 
-    An arm is a variant of the words. Raises like `say_arm`.
+    An arm is a variant of what is said of a scene, for a comparison. The goals are those among
+    which a guesser could choose. Arguments and errors are those of `say_arm`.
     """
     words = say_arm(episode, options, arm)
     judged_episode = words.episode

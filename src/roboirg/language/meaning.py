@@ -316,7 +316,12 @@ def _described_thing(described: Described, episode: Episode) -> SceneObject | No
 def _values_of_thing(thing: SceneObject, field: str, episode: Episode) -> Values:
     """Return the colors by which a goal can ask for a thing: ``{"red"}`` for a red cube.
 
-    A container has the colors of what is under it. `field` is the goal's field, ``colors.1``.
+    A container has the colors of what is under it.
+
+    Args:
+        thing: of the scene.
+        field: of the goal, ``colors.1``, whose slot decides which colors are possible.
+        episode: with the scene.
     """
     kind_of_thing = get_task(episode.task).things.pointed
     found: set[Value] = set()
@@ -327,7 +332,10 @@ def _values_of_thing(thing: SceneObject, field: str, episode: Episode) -> Values
 
 
 def _possible_values(field: str, episode: Episode) -> Values:
-    """Return the values that a field's slot has in any goal of the scene."""
+    """Return the values that a field can have in any goal of the scene: ``{"red", "blue"}``.
+
+    They are those of its slot: for ``colors.1``, the second color, the colors of all goals.
+    """
     slot = field.partition(".")[0]  # of "colors.1", the second color
     found: set[Value] = set()
     for goal in goals_of(episode):

@@ -215,9 +215,11 @@ def _likely_rivals(request: InstructionRequest, meant: GoalValue) -> list[str | 
 
 @functools.cache
 def _paired_entries(task: str, split: Split) -> Mapping[int, _SplitEntry]:
-    """Return the episodes of a split that can have a rival value, by index, paired with each other.
+    """Return the episodes of a split that can have a rival, paired with each other, by index.
 
-    The rival of an entry is the meant value of the episode with which it is paired.
+    A rival is a value for which the goal could ask instead of its own. That of an entry is the
+    meant value of the episode with which it is paired: of red and blue, each is the rival of the
+    other.
     """
     entries: dict[int, _SplitEntry] = {}
     for episode in split_episodes([task], [split]):

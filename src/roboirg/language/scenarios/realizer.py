@@ -258,10 +258,12 @@ class Realizer:
         return all(pointer.of in fields for pointer in pointers_in(words))
 
     def meaning(self, command: Phrase) -> Meaning:
-        """Return how the value of each field follows from what has been said; call it last.
+        """Return the meaning of all that has been said; call it last.
 
-        It also has the fields whose values the command alone gives, ``settled``: it names them, or
-        it says no pointer for them.
+        After *Red is nice. Lift it twice.*: ``color`` is the same as *red*, ``repeats`` is 2, and
+        ``repeats`` is settled, since the command alone gives it. Settled are the fields whose value
+        the command names, and those for which it has no pointer such as *it*; in the resolved form
+        all.
 
         Args:
             command: the last utterance.

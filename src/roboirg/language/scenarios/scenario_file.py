@@ -640,8 +640,12 @@ def _row_as_written(row: PointerRow, of: str) -> str:
 def type_of(name: str, listed: str = "") -> str:
     """Return the type of the value that a slot holds, as the table of pointers names it.
 
-    ``repeats`` gives ``number`` and ``list`` gives ``pair``; ``list.0`` and ``taken`` have the type
-    of what is listed, of the slot `listed`.
+    ``repeats`` gives ``number``, ``visit`` gives ``visit``, and ``list``, all values together,
+    ``pair``. One value of a list, ``list.0`` or ``taken``, has the type of the slot that is listed.
+
+    Args:
+        name: of the slot.
+        listed: the slot of the goal of which the scenario lists values; empty if it lists none.
     """
     base, _, number = name.partition(".")
     if not number and base == "list":

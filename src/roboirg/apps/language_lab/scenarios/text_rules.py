@@ -85,8 +85,9 @@ def broken_text(
 ) -> Iterator[str]:
     """Yield a complaint for each grammar rule that a text breaks: *says 'a apple'; 'an' is right*.
 
-    Further rules depend on how many values the text lists, and on whether things change places in
-    the scene: then *there* needs a time.
+    Rules about its words come first, then those about words that name a value or point back. Of the
+    latter some depend on how many values the text lists, *the latter* of three is wrong, and on
+    whether things change places in the scene: then *there* needs a time.
 
     Args:
         instruction: whose text is checked.
