@@ -207,7 +207,7 @@ PLANTED_FAULTS = {
         lambda reckon, term, number: reckon(term._replace(operation="half"), number),
     ),
     "a list is heard backwards": change(
-        declared.SaidValues, "listed", lambda listed, *given: listed(*given)[::-1]
+        declared.DiscourseHistory, "listed", lambda listed, *given: listed(*given)[::-1]
     ),
     "a place is that of another thing": change(
         meaning, "_described_thing", lambda *given: another_if("place", *given)

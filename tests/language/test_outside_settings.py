@@ -44,7 +44,7 @@ NOT_FOR_EASY_SCENES = Setting(
     order=9,
     summary="direct, but not in easy scenes",
     color="#123456",
-    offers="contextual",
+    content_plans="contextual",
     applies_to=lambda task: task.suite == "counting",
     refusal=lambda request: TOO_EASY if request.episode.difficulty == "easy" else None,
     example=0,

@@ -298,8 +298,9 @@ found.append(sorted(spoken))
             " 'new coat': There is no setting 'colorful'; known: colored, direct, direct-rival, ",
         ),
         (
-            "colored.py", "offers=offers", 'offers="drect"', "PickXtimes", "colored",
-            "There is no way to the goal for the offers of colored, named 'drect'; known: direct, ",
+            "colored.py", "content_plans=content_plans", 'content_plans="drect"', "PickXtimes",
+            "colored",
+            "There is no setting for the content_plans of colored, named 'drect'; known: direct, ",
         ),
         (
             "colored.toml", 'say.color = ["<it color: it>"]', "", "PickXtimes", "colored",

@@ -385,7 +385,7 @@ def test_a_story_that_needs_a_spot_is_chosen_only_for_a_cube_with_a_spot():
         }
         assert bool(chosen) == bool(known)
         if chosen:
-            (landmark,) = chosen.offer.notes["landmarks"]
+            (landmark,) = chosen.plan.notes["landmarks"]
             assert landmark in known
             fitting += 1
 
@@ -405,8 +405,8 @@ def test_a_story_that_takes_any_place_prefers_a_spot():
         request = request_of(get_episode("PickXtimes", "train", index), options)
         spot = choose(request, "spatial", [scenario])
         found = choose(request, "spatial", [any_place])
-        assert spot is None or spot.offer == found.offer
-        forms.add(found.introduced.values["place"][0].form)
+        assert spot is None or spot.plan == found.plan
+        forms.add(found.fillers.values["place"][0].form)
 
     assert forms == {"spot", None}
 

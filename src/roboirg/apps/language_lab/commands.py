@@ -139,7 +139,12 @@ def score_shortcuts(
 
 
 def _sources(splits: Sequence[str], seeds: int) -> str:
-    """Return which scenes are scored, for a title: ``test and 200 random scenes per task``."""
+    """Return which scenes are scored, for a title: ``test and 200 random scenes per task``.
+
+    Args:
+        splits: names.
+        seeds: number of random scenes for each task; 0 for none.
+    """
     sources = list(splits)
     if seeds:
         sources.append(f"{seeds:,} random scenes per task")

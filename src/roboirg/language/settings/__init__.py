@@ -44,12 +44,15 @@ def all_settings() -> Mapping[str, Setting]:
 
 
 def setting_names() -> tuple[str, ...]:
-    """Return the names of all settings, explicit first."""
+    """Return the names of all settings, explicit first: ``("explicit", "direct", …)``."""
     return tuple(all_settings())
 
 
 def plain_settings(task: Task | None = None) -> tuple[str, ...]:
-    """Return the names that ``all`` means: of every setting, or a task's, but the harder ones."""
+    """Return the names of the settings that the word ``all`` means: all but the harder ones.
+
+    With a task only the settings that it has, else of every task.
+    """
     names = setting_names() if task is None else settings_of(task)
     return tuple(name for name in names if all_settings()[name].plain is None)
 
@@ -61,7 +64,7 @@ SETTING_GROUPS = {"all": plain_settings, "every": setting_names}
 def expand_settings(words: Iterable[str]) -> tuple[str, ...]:
     """Return names of settings, with words for groups, ``all``, replaced by the names they mean.
 
-    Each name stands there once, those from groups first.
+    Each name stands there once, those from groups first. Names are not checked.
     """
     names: list[str] = []
     others: list[str] = []
@@ -91,7 +94,12 @@ def settings_of(task: Task) -> tuple[str, ...]:
 
 
 def get_setting(name: str, task: Task) -> Setting:
-    """Return a setting of a task by name."""
+    """Return a setting of a task by name.
+
+    Raises:
+        UnknownNameError: there is no such setting.
+        InvalidValueError: the task lacks it.
+    """
     _check(name)
     if not all_settings()[name].applies_to(task):
         raise InvalidValueError(
@@ -101,7 +109,16 @@ def get_setting(name: str, task: Task) -> Setting:
 
 
 def _check(name: str, *groups: str) -> None:
-    """Raise if there is no setting, nor one of some groups, of that name."""
+    """Check that there is a setting of a name, or a group of settings such as ``all``.
+
+    Args:
+        name: to check.
+        groups: the words for groups that are allowed besides.
+
+    Raises:
+        UnknownNameError: there is neither.
+        InvalidValueError: the name is that of a form, ``resolved``, which is no setting.
+    """
     if name in FORMS:
         implicit = [setting.name for setting in all_settings().values() if setting.implicit]
         raise InvalidValueError(
