@@ -59,11 +59,11 @@ def make_subgoal_table(data: RunData) -> Table:
     It has a row for each task in each setting of a policy, from the whole records of its episodes.
 
     Raises:
-        InvalidValueError: no record holds a subgoal, or the failure of a planner.
+        InvalidValueError: no record holds a subgoal, the failure of a planner, or a call.
     """
     counts_by_cell = _count_in_cells(data)
     if not counts_by_cell:
-        raise InvalidValueError("No planner of the runs named a subgoal; their records hold none.")
+        raise InvalidValueError("No policy of the runs named a subgoal or asked a model.")
     # Only failures and costs that occur have columns.
     occurring: set[str] = set()
     for counts in counts_by_cell.values():
@@ -81,7 +81,7 @@ def make_subgoal_table(data: RunData) -> Table:
         notes.append(f"Failed episodes, by what the planner did: {meanings}.")
     return Table(
         key="subgoals",
-        title="Subgoals of planners",
+        title="Subgoals of planners, and what models cost",
         heads=("policy and setting", "task"),
         columns=_columns(failures, costs),
         rows=rows,
@@ -130,8 +130,8 @@ def _count_in_cells(data: RunData) -> dict[CellKey, Counter[str]]:
 
 
 def _has_planner(counts: Counter[str]) -> bool:
-    """Return whether a planner named a subgoal or failed in the episodes that were counted."""
-    return any(counts[name] for name in (*SUBGOAL_VERDICTS, *PLANNER_FAILURES))
+    """Return whether a planner named a subgoal or failed, or a model was asked, in an episode."""
+    return any(counts[name] for name in (*SUBGOAL_VERDICTS, *PLANNER_FAILURES, "calls"))
 
 
 def _words(counts: Counter[str], failures: Iterable[str], costs: Iterable[str]) -> Iterator[str]:
