@@ -181,7 +181,7 @@ def _entry(key: CellKey, results: TableResults) -> Entry:
         counts=cell.counts,
         interval=rate_interval([cell]),
         differences=results.differences.get(key),
-        episodes=frozenset(trial.episode for trial in cell.verdicts),
+        episodes=frozenset(cell.by_episode()),
     )
 
 

@@ -33,6 +33,8 @@ _COSTS = {
     "missed": "misses",
 }
 """What a planner costs: keys of a record's usage, and their headings."""
+_FROM_WHOLE = 100
+"""Means from here on have no decimals."""
 _UNKNOWN_IF_ABSENT = ("input_tokens", "output_tokens", "cost_usd")
 """What a service may not report, so that the records of its replies lack it."""
 
@@ -152,5 +154,13 @@ def _words(counts: Counter[str], failures: Iterable[str], costs: Iterable[str]) 
     for failure in failures:
         yield str(counts[failure])
     for cost in costs:
-        mean = counts[cost] / counts["episodes"]  # NaN if an episode's cost is unknown
-        yield "unknown" if math.isnan(mean) else f"{mean:.3g}"
+        yield _mean_text(counts[cost] / counts["episodes"])
+
+
+def _mean_text(mean: float) -> str:
+    """Return a mean cost: ``0.0125``, ``4``, ``1234``; *unknown* for NaN, an unknown cost."""
+    if math.isnan(mean):
+        return "unknown"
+    if mean >= _FROM_WHOLE:
+        return f"{mean:.0f}"
+    return f"{mean:.3g}"

@@ -306,8 +306,14 @@ def with_best(rows: Iterable[Row]) -> Iterator[Row]:
 
 def _best_rate(rivals: Sequence[Entry]) -> Decimal | None:
     """Return the best of several rates; None if they are equal, or cannot be compared."""
-    rates = {entry.percent for entry in rivals if entry.percent is not None}
-    episodes = {entry.episodes for entry in rivals if entry.percent is not None}
-    if len(rates) <= 1 or len(episodes) > 1 or any(entry.marks for entry in rivals):
+    rates = set()
+    episodes = set()
+    for entry in rivals:
+        if entry.marks:
+            return None
+        if entry.percent is not None:
+            rates.add(entry.percent)
+            episodes.add(entry.episodes)
+    if len(rates) <= 1 or len(episodes) > 1:
         return None
     return max(rates)
