@@ -103,6 +103,12 @@ def test_an_episode_with_more_trials_weighs_more():
     assert stratum.episodes == pytest.approx(1 / (0.75**2 + 0.25**2))
 
 
+def test_no_gap_reaches_beyond_100_points_if_one_side_has_more_trials_of_an_episode():
+    rows = np.array([[3, 3, 0, 1], [1, 1, 0, 3], [1, 2, 0, 1]])
+    low, high = mean_interval([TaskRates.of(rows).combined(1, -1)])
+    assert -1 <= low < high <= 1
+
+
 def test_one_episode_or_none_has_no_interval():
     single = Cell({Trial(0, seed): True for seed in range(3)})
     assert rate_interval([single]) is None

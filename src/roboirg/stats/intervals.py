@@ -66,7 +66,7 @@ class Stratum(NamedTuple):
             differences of two verdicts.
         shares: of the episodes that have each value; they add up to 1.
         episodes: their number; less if they differ in their weight, as Kish's effective size.
-        low: the least value that is possible, seen or not.
+        low: the least mean that is possible. Of an episode that counts little, a value may be less.
         high: the largest one.
     """
 
@@ -82,7 +82,7 @@ class Stratum(NamedTuple):
 
         Args:
             values: one for each episode, at least one.
-            low: the least value that is possible.
+            low: the least mean that is possible.
             high: the largest one.
             weights: above 0, how much each episode counts in the mean; all alike by default.
         """
@@ -92,10 +92,8 @@ class Stratum(NamedTuple):
         shares: dict[float, float] = {}
         for value, part in zip(numbers.tolist(), parts.tolist(), strict=True):
             shares[value] = shares.get(value, 0.0) + part
-        least = min(low, *shares)
-        most = max(high, *shares)
         episodes = 1 / float(parts @ parts)
-        return cls(list(shares), list(shares.values()), episodes, least, most)
+        return cls(list(shares), list(shares.values()), episodes, low, high)
 
     @property
     def mean(self) -> float:
@@ -221,6 +219,8 @@ def ratio_interval(tasks: Sequence[TaskRates]) -> Interval | None:
     if first > _ROUNDING:
         low = _root(below, estimate, 0.0)
     high = _root(above, estimate, 1.0)
+    if high == 1:
+        return Interval(low / (1 - low), math.inf)
     return Interval(low / (1 - low), high / (1 - high))
 
 
@@ -266,7 +266,7 @@ def _upper_end(strata: Sequence[Stratum], critical: float) -> float:
     tilt = 2 * critical * math.sqrt(sum(stratum.episodes for stratum in strata))
     for _ in range(_MOST_DOUBLINGS):
         if excess(tilt) >= 0:
-            return _tilted(strata, _root(excess, 0.0, tilt)).mean
+            return min(most, _tilted(strata, _root(excess, 0.0, tilt)).mean)
         tilt *= 2
     return most
 
