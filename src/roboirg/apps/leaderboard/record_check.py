@@ -6,18 +6,21 @@ checked by playing them again. Each difference is a *finding*, one sentence.
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
+import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from roboirg.apps.leaderboard.action_replay import prepared_job, replay
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.versions import WORDS
 from roboirg.records.action_log import ActionLog, read_actions
-from roboirg.records.record import Record
+from roboirg.records.record import Record, UtteranceRecord
 from roboirg.records.record_codec import read_record
 from roboirg.records.store import RECORDS_FILE
 from roboirg.runs.job_instruction import (
@@ -144,7 +147,8 @@ def _version_findings(record: Record) -> Iterator[str]:
             f"words: the record says {record.words!r}, which are no words of {record.words_owner}."
         )
     if record.words != record.metadata.get("words"):
-        yield "words: the record and its metadata name different ones."
+        named = record.metadata.get("words")
+        yield f"words: the record says {record.words!r}, and its metadata say {named!r}."
 
 
 def _check_unplayed(record: Record, *, has_actions: bool) -> RecordCheck:
@@ -180,10 +184,14 @@ def _check_played(record: Record, log: ActionLog) -> RecordCheck:
     has_same_hash = record.end_state == again.end_state
     verdict = _verdict(deviation, has_same_hash=has_same_hash, is_elsewhere=is_elsewhere)
     if verdict == "different":
-        findings.append(f"end_state: when played again, it differs by {deviation:.2g} (m, rad, s).")
+        findings.append(_end_difference(record, again, log.end_state, played.end_state))
     is_as_long = len(played.rows) == len(log.rows)
     if not (is_as_long and np.array_equal(played.requests, log.requests)):
-        findings.append("actions: some of them come after the end of the episode.")
+        findings.append(
+            "actions: some of them come after the end of the episode: the record says "
+            f"{len(log.rows)} in {len(log.requests)} answers; {len(played.rows)} in "
+            f"{len(played.requests)} are played."
+        )
     return RecordCheck(record.slug, tuple(findings), verdict, deviation, may_move_differently)
 
 
@@ -199,6 +207,29 @@ def _deviation(log: ActionLog, played: ActionLog) -> float:
     if played.end_state.shape != log.end_state.shape:
         return float("inf")
     return float(np.max(np.abs(played.end_state - log.end_state), initial=0.0))
+
+
+def _end_difference(
+    record: Record, again: Record, recorded: NDArray[np.float64], played: NDArray[np.float64]
+) -> str:
+    """Return a finding that names the number by which two end states differ most, in both.
+
+    Args:
+        record: as stored.
+        again: the record of its actions played again.
+        recorded: the numbers of its end state, m, rad and s.
+        played: likewise when played again.
+    """
+    if recorded.shape != played.shape:
+        return _difference("end_state, its length", len(recorded), len(played))
+    differences = np.abs(recorded - played)
+    if not differences.any():  # what differs is not among the numbers
+        return _difference("end_state, its hash", record.end_state, again.end_state)
+    place = int(differences.argmax())
+    return (
+        f"end_state: when played again, it differs by {differences[place]:.2g} (m, rad, s): the "
+        f"record says {recorded[place]:.9g} as number {place}; it should be {played[place]:.9g}."
+    )
 
 
 def _verdict(deviation: float, *, has_same_hash: bool, is_elsewhere: bool) -> ReplayVerdict:
@@ -220,9 +251,9 @@ def _verdict(deviation: float, *, has_same_hash: bool, is_elsewhere: bool) -> Re
     return "different"
 
 
-def _utterances(record: Record) -> tuple[tuple[str, str], ...]:
-    """Return the stage and the text of each utterance of a record."""
-    return tuple((utterance.stage, utterance.text) for utterance in record.instruction)
+def _utterances(record: Record) -> tuple[UtteranceRecord, ...]:
+    """Return the utterances of a record without the steps at which they were heard."""
+    return tuple(msgspec.structs.replace(said, step=None) for said in record.instruction)
 
 
 def _differences(record: Record, expected: Record, fields: tuple[str, ...]) -> Iterator[str]:
@@ -234,13 +265,50 @@ def _differences(record: Record, expected: Record, fields: tuple[str, ...]) -> I
             yield _difference(name, value, expected_value)
 
 
-def _difference(name: str, recorded: object, expected: object) -> str:
-    return f"{name}: the record says {_short(recorded)}; it should be {_short(expected)}."
+def _difference(place: str, recorded: Any, expected: Any) -> str:  # noqa: ANN401 - of any field
+    """Return a finding that names where two values first differ, and what stands there in both.
+
+    If the second of three events differs, that is ``events, entry 2: the record says Event(…); it
+    should be Event(…).``; in mappings the place is named by its key, ``goal.count``. What only one
+    of two lists has is `_NOTHING` in the other.
+    """
+    if isinstance(recorded, tuple) and isinstance(expected, tuple):
+        pairs = itertools.zip_longest(recorded, expected, fillvalue=_NOTHING)
+        for number, (entry, expected_entry) in enumerate(pairs, start=1):
+            if entry != expected_entry:
+                return _difference(f"{place}, entry {number}", entry, expected_entry)
+    if isinstance(recorded, Mapping) and isinstance(expected, Mapping):
+        for key in dict.fromkeys([*recorded, *expected]):
+            value = recorded.get(key, _NOTHING)
+            expected_value = expected.get(key, _NOTHING)
+            if value != expected_value:
+                return _difference(f"{place}.{key}", value, expected_value)
+    text = repr(recorded)
+    expected_text = repr(expected)
+    same = 0  # characters at their beginnings
+    for letter, expected_letter in zip(text, expected_text, strict=False):
+        if letter != expected_letter:
+            break
+        same += 1
+    says = _excerpt(text, same)
+    return f"{place}: the record says {says}; it should be {_excerpt(expected_text, same)}."
 
 
-def _short(value: object) -> str:
-    """Return a value as a text of limited length; of several entries, their number and the last."""
-    if isinstance(value, tuple) and len(value) > 1:
-        return f"{len(value)} entries, the last {_short(value[-1])}"
-    text = repr(value)
-    return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}…"
+def _excerpt(text: str, place: int) -> str:
+    """Return at most `_MOST_SHOWN` characters of a text, among them that at a place."""
+    start = max(place - _MOST_SHOWN // 2, 0)
+    if len(text) <= _MOST_SHOWN:
+        start = 0
+    before = "…" if start else ""
+    after = "…" if len(text) > start + _MOST_SHOWN else ""
+    return f"{before}{text[start : start + _MOST_SHOWN]}{after}"
+
+
+class _Nothing:
+    """Stands for what a list or mapping lacks."""
+
+    def __repr__(self) -> str:
+        return "nothing"
+
+
+_NOTHING = _Nothing()

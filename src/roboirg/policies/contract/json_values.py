@@ -19,6 +19,8 @@ _MAX_LISTED = 64
 _MAX_TEXT_LENGTH = 1000
 _TOO_LARGE = 2**63
 _MAX_SHOWN = 80
+_TEXTUAL = str, PurePath, int, np.integer
+"""Types of what may stand for a text: paths and whole numbers do, too."""
 
 
 class _Place(NamedTuple):
@@ -101,10 +103,19 @@ def _object(value: Mapping[Any, Any], place: _Place) -> dict[str, Any]:
     """
     entries: dict[str, Any] = {}
     for key, entry in value.items():
-        name = _text(key, place._replace(key=place.key or "a key"))
+        name = _key(key, place)
         path = f"{place.key}.{key}" if place.key else str(key)
         entries[name] = _as_json(entry, place.inside(path))
     return entries
+
+
+def _key(key: object, place: _Place) -> str:
+    """Return a key of the mapping at a place as a text; raise if an owner's is none."""
+    if place.owner is not None and not isinstance(key, _TEXTUAL):
+        where = f" of {place.key!r}" if place.key else ""
+        shown = clip_text(repr(key), _MAX_SHOWN)
+        raise InvalidValueError(f"{place.owner}: a key{where} is {shown}; keys must be texts.")
+    return _text(key, place)
 
 
 def _array(value: Any, place: _Place) -> Any:  # noqa: ANN401
@@ -127,7 +138,7 @@ def _text(value: object, place: _Place) -> str:
         return printable(str(value)[:_MAX_TEXT_LENGTH])
     if isinstance(value, str):
         return str.__str__(value)  # of a subclass, too
-    if isinstance(value, PurePath | int | np.integer):
+    if isinstance(value, _TEXTUAL):
         return str(value)
     raise InvalidValueError(
         f"{place.owner}: {place.key!r} is {clip_text(repr(value), _MAX_SHOWN)}; it must be a text, "

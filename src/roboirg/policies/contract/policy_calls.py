@@ -50,7 +50,7 @@ def check_rows(rows: Any, space: ActionSpace) -> NDArray[np.float64]:  # noqa: A
     """
     count = len(rows) if hasattr(rows, "__len__") else 0
     if count > MAX_ROWS:
-        raise InvalidActionError(f"{count} actions at once are too many; at most {MAX_ROWS}.")
+        raise InvalidActionError(f"Actions at once: expected at most {MAX_ROWS:,}, got {count:,}.")
     return check_chunk(rows, space)
 
 
@@ -146,6 +146,9 @@ def policy_usage(policy: Policy) -> dict[str, float]:
         return {}
     usage: dict[str, float] = {}
     for name, value in policy.usage().items():
+        if not isinstance(name, str):
+            shown = clip_text(repr(name), MAX_COST_LETTERS)
+            raise InvalidValueError(f"usage() has the name {shown}; names must be texts.")
         try:
             usage[str(name)] = float(value)
         except (TypeError, ValueError):
