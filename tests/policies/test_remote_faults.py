@@ -29,10 +29,10 @@ MALFORMED_REPLIES = [
     (pack({1: 2}), "int is not allowed"),
     ({"action": np.zeros((20, 8))}, "without 'actions'; it holds 'action'"),
     ({}, "it holds nothing"),
-    ({"actions": np.zeros((20, 7))}, r"shape \(n, 8\).*got shape \(20, 7\)"),
+    ({"actions": np.zeros((20, 7))}, r"shape \(n, 8\) with n >= 1, got shape \(20, 7\)"),
     ({"actions": np.zeros((0, 8))}, r"got shape \(0, 8\)"),
-    ({"actions": np.full((20, 8), np.nan)}, "every value must be a finite number"),
-    ({"actions": "left"}, "array of 8 real numbers; got str"),
+    ({"actions": np.full((20, 8), np.nan)}, "value 0 of row 0: expected a finite number, got nan"),
+    ({"actions": "left"}, "array of 8 real numbers, got str"),
     ({"actions": {"__numpy__": "AAAA", "dtype": "<f8"}}, "dialect .keys '__numpy__', 'dtype'."),
     ({"actions": None}, "got NoneType"),
     ({"actions": np.zeros((200_000, 8))}, "more than 1 MiB; option max_reply_mib"),
@@ -73,6 +73,73 @@ def test_a_malformed_reply_is_reported_and_the_next_episode_works(protocol, repl
             assert server.place in str(caught.value)
         with client_of(server, protocol) as following:
             assert len(play_episode(following)) == 1
+
+
+@pytest.mark.parametrize(
+    ("reply", "words"),
+    [
+        ({"status": "error", "message": "CUDA out of memory"}, "CUDA out of memory"),
+        ({"error": {"type": "OOM", "message": "no memory."}}, "no memory"),
+        ({"error": "RuntimeError", "detail": "no memory"}, "RuntimeError: no memory"),
+        ({"error": True, "errors": ["first", "second"]}, "first; second"),
+        ({"traceback": "Traceback:\n  a\nKeyError: 'x'\n"}, "KeyError: 'x'"),
+    ],
+)
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("is_late", [False, True])
+def test_an_error_in_a_reply_is_shown_in_the_words_of_the_server(protocol, is_late, reply, words):
+    """It comes in place of the confirmed reset (openpi has none), or of the actions."""
+    faults = [reply]
+    if is_late:
+        faults = [None] * messages_before_inference(protocol) + [reply]
+    with (
+        PROTOCOLS[protocol](faults=faults) as server,
+        client_of(server, protocol) as policy,
+        pytest.raises(PolicyReplyError) as caught,
+    ):
+        play_episode(policy)
+
+    assert str(caught.value).endswith(f"replied with an error: {words}.")
+
+
+def test_an_error_in_place_of_the_metadata_is_shown():
+    with WireServer() as server, client_of(server, "openpi") as policy:
+        server.metadata = {"status": "error", "message": "The checkpoint is missing."}
+        with pytest.raises(PolicyReplyError, match="with an error: The checkpoint is missing"):
+            play_episode(policy)
+
+
+def test_a_server_that_takes_smaller_messages_only_is_not_taken_for_one_that_sends_larger_ones():
+    """Its close code 1009 is also the one for replies above max_reply_mib."""
+    with (
+        WireServer(most_bytes=500) as server,
+        client_of(server, "openpi") as policy,
+        pytest.raises(PolicyReplyError) as caught,
+    ):
+        play_episode(policy)
+
+    assert "does not take messages of 649 bytes; raise its limit." in str(caught.value)
+
+
+def test_the_reason_with_which_a_server_closes_is_shown():
+    with (
+        WireServer(faults=["close"]) as server,
+        client_of(server, "openpi") as policy,
+        pytest.raises(PolicyConnectionError, match=r"\(close code 1011: No memory is left\)"),
+    ):
+        play_episode(policy)
+
+
+def test_what_a_server_says_when_it_refuses_a_connection_is_shown():
+    with answering(refuses_with_text) as place:
+        policy = make_policy(f"openpi://{place}", 0)
+        with pytest.raises(PolicyConnectionError, match=r"HTTP status 404: No such model\.$"):
+            policy.reset(INSTRUCTION, video(2))
+
+
+def refuses_with_text(connection):
+    connection.recv(65536)
+    connection.sendall(b"HTTP/1.1 404 No\r\nContent-Length: 14\r\n\r\nNo such model.")
 
 
 @pytest.mark.parametrize("protocol", ["mme-vla", "challenge"])

@@ -54,6 +54,8 @@ _MIN_TIMEOUT = 0.001
 _MICROSECONDS = 1_000_000
 """In a second."""
 _MAX_ERROR_LENGTH = 300
+_MOST_SHOWN = 80
+"""Bytes of what is no message in an error."""
 _MAX_TRACEBACK_END = 4096
 
 
@@ -75,6 +77,7 @@ class ServerConnection:
         self._options = options
         self.endpoint = endpoints[0]
         self._websocket: ClientConnection | None = None
+        self._largest_sent = 0  # bytes of the largest message to the server
         self._held = contextlib.ExitStack()
         """The lock, and connections."""
 
@@ -121,6 +124,7 @@ class ServerConnection:
                 if data is not None:
                     if not is_numbered:
                         self._refuse_surplus(websocket)
+                    self._largest_sent = max(self._largest_sent, len(data))
                     websocket.send(data)
                 if not awaited:
                     return {}
@@ -143,7 +147,10 @@ class ServerConnection:
         self._held.close()
 
     def error_reply(self, text: str) -> PolicyReplyError:
-        """Return the error for a traceback that a server has sent; its last line is shown."""
+        """Return the error for what a server has sent about one, such as a traceback.
+
+        Its last line is shown.
+        """
         text = without_keys(text)  # before it is cut, perhaps within a key
         # Only the end is split into lines: there may be millions.
         lines = text[-_MAX_TRACEBACK_END:].rstrip().splitlines()
@@ -205,14 +212,16 @@ class ServerConnection:
             )
         except InvalidStatus as error:
             status = error.response.status_code
+            words = f"HTTP status {status}"
+            page = (error.response.body or b"").decode(errors="replace")
+            said = " ".join(without_keys(page).split())[:_MAX_ERROR_LENGTH]
+            if said:
+                words += f": {said.rstrip('.')}"
             if status in _RETRYABLE:
-                return f"HTTP status {status}"
-            hint = ""
+                return words
             if status in _REFUSED_KEY:
-                hint = "; name the key with api_key_env=NAME"
-            raise PolicyConnectionError(
-                f"{self} refused the connection with HTTP status {status}{hint}."
-            ) from error
+                words += "; name the key with api_key_env=NAME"
+            raise PolicyConnectionError(f"{self} refused the connection with {words}.") from error
         except socket.gaierror as error:
             raise PolicyConnectionError(
                 f"{self} cannot be reached: there is no host {endpoint.host!r}."
@@ -234,11 +243,13 @@ class ServerConnection:
         """Return what a server has sent; a text is an error of the server."""
         if isinstance(data, str):
             raise self.error_reply(data)
+        data = bytes_without_keys(data)
         try:
-            return unpack(bytes_without_keys(data))
+            return unpack(data)
         except CodecError as error:
             raise PolicyReplyError(
-                f"{self} sent something other than a message: {error}."
+                f"{self} sent something other than a message: {error}; it begins "
+                f"{data[:_MOST_SHOWN]!r}."
             ) from error
 
     def _broken(self, error: ConnectionClosed) -> RoboIRGError:
@@ -248,6 +259,12 @@ class ServerConnection:
             return PolicyTimeoutError(f"{self} did not take in a message within {seconds:g} s.")
         if isinstance(error.__cause__, TooManyFragments):
             return PolicyReplyError(f"{self} sent a reply in too many pieces.")
+        # Whoever receives a close code sends it back, so it is that of the side that sent it first.
+        is_theirs = error.rcvd is not None and error.rcvd_then_sent is not False
+        if error.rcvd is not None and is_theirs and error.rcvd.code == _TOO_BIG:
+            return PolicyReplyError(
+                f"{self} does not take messages of {self._largest_sent:,} bytes; raise its limit."
+            )
         if error.sent is not None and error.sent.code == _TOO_BIG:
             return PolicyReplyError(
                 f"{self} sent a reply of more than {self._options.max_reply_mib:g} MiB; "
@@ -256,6 +273,8 @@ class ServerConnection:
         code = "without a close code"
         if error.rcvd is not None:
             code = f"close code {error.rcvd.code}"
+            if error.rcvd.reason:
+                code += f": {without_keys(error.rcvd.reason)}"
         return PolicyConnectionError(f"{self} ended the connection ({code}).")
 
 

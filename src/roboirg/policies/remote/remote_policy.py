@@ -21,6 +21,8 @@ from roboirg.policies.remote.endpoints import RemoteOptions, read_endpoints
 
 _MOST_SHOWN = 80
 """Characters of a server's value in an error message."""
+_ERROR_KEYS = ("traceback", "error", "errors", "message", "detail", "reason")
+"""Where servers say what went wrong."""
 _MOST_KEYS = 8
 """Keys of a server's reply in an error message."""
 
@@ -108,8 +110,15 @@ class RemotePolicy(ABC):
             return self.request_actions(observation)
 
     def greet(self) -> Mapping[str, Any]:
-        """Return what a server says about itself on a new connection, which it does first."""
-        return self.connection.exchange(None, "its metadata")
+        """Return what a server says about itself on a new connection, which it does first.
+
+        Raises:
+            PolicyReplyError: it says that it has failed.
+        """
+        metadata = self.connection.exchange(None, "its metadata")
+        if "error" in (metadata.get("status"), *metadata):
+            self.refuse_error(metadata)
+        return metadata
 
     @abstractmethod
     def begin_episode(self, demonstration: Demonstration) -> None:
@@ -135,14 +144,29 @@ class RemotePolicy(ABC):
 
         return self.connection.exchange(pack(message))
 
+    def refuse_error(self, reply: Mapping[str, Any]) -> None:
+        """Raise if a reply that lacks what was asked for says why.
+
+        Servers have no common form for that: ``{"status": "error", "message": "no memory"}`` and
+        ``{"error": {"detail": "no memory"}}`` are two.
+
+        Raises:
+            PolicyReplyError: it does.
+        """
+        said = _said_error(reply)
+        if said:
+            raise self.connection.error_reply(said)
+
     def request_confirmed(self, message: Mapping[str, Any], key: str) -> None:
         """Send a message whose reply must have True under a key.
 
         Raises:
             PolicyReplyError: it does not.
         """
-        confirmed = self.request(message).get(key)
+        reply = self.request(message)
+        confirmed = reply.get(key)
         if confirmed is not True:
+            self.refuse_error(reply)
             request = next(iter(message))  # its first key says what it asks for
             raise PolicyReplyError(
                 f"{self.connection} did not confirm {request!r}: {key!r} in its reply is "
@@ -162,6 +186,7 @@ class RemotePolicy(ABC):
                 f"(keys {_listed(actions)})."
             )
         if "actions" not in reply:
+            self.refuse_error(reply)
             raise PolicyReplyError(
                 f"{self.connection} sent a reply without 'actions'; it holds {_listed(reply)}."
             )
@@ -180,6 +205,23 @@ class RemotePolicy(ABC):
         except Exception:
             self.connection.end(is_broken=True)
             raise
+
+
+def _said_error(reply: Mapping[str, Any]) -> str:
+    """Return what a reply says of an error, as text; empty if it says nothing.
+
+    ``{"error": "RuntimeError", "message": "no memory"}`` gives ``RuntimeError: no memory``.
+    """
+    texts: list[str] = []
+    for key in _ERROR_KEYS:
+        said = reply.get(key)
+        if isinstance(said, Mapping):
+            said = _said_error(said)
+        if isinstance(said, list | tuple):
+            said = "; ".join(map(str, said))
+        if isinstance(said, str) and said.strip():
+            texts.append(said.strip())
+    return ": ".join(dict.fromkeys(texts))
 
 
 def _listed(names: Mapping[Any, Any]) -> str:
