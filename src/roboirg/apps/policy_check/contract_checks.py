@@ -30,6 +30,7 @@ from roboirg.policies.by_name.finding import look_up, read_policy
 from roboirg.policies.contract.batch_policy import BatchedEpisode
 from roboirg.policies.contract.policy_calls import policy_metadata, policy_subgoal, policy_usage
 from roboirg.policies.contract.policy_version import read_version
+from roboirg.policies.prompt_length.tokenizer_file import prompt_limit
 
 
 def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
@@ -56,6 +57,7 @@ def check_requirements(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Read what the policy requires of an environment, and keep it for the later checks."""
     try:
         needs = PolicyNeeds.of(player.policy)
+        prompt_limit(needs)  # raises if the tokenizer cannot be read
     except RoboIRGError as error:
         raise CheckAbortedError("requirements", "fail", str(error)) from error
     player.needs = needs
