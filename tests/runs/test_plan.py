@@ -185,8 +185,64 @@ def test_an_episode_that_lacks_what_a_setting_needs_is_left_out_and_none_at_all_
     assert [job.episode for job in jobs if job.setting == "explicit"] == list(range(8))
     with pytest.raises(InvalidValueError, match="nothing to play: grounded cannot"):
         make_plan(["random"], tasks="PickXtimes", settings="grounded", episodes="1").checked()
-    with pytest.raises(InvalidValueError, match="StopCube has no spatial setting"):
-        make_plan(["random"], tasks="StopCube", settings="spatial").checked()
+
+
+WITH_SPATIAL = (
+    "PickXtimes, SwingXtimes, BinFill, VideoUnmaskSwap, VideoUnmask, ButtonUnmaskSwap, ButtonUnmask"
+)
+
+
+@pytest.mark.parametrize(
+    ("tasks", "settings", "lacking", "rest"),
+    [
+        (
+            "StopCube",
+            "explicit,spatial",
+            "StopCube has",
+            "; for the rest give --tasks StopCube --settings explicit",
+        ),
+        (
+            "StopCube,BinFill,VideoRepick",
+            "direct,spatial",
+            "StopCube, VideoRepick have",
+            (
+                "; for the rest give --tasks StopCube,BinFill,VideoRepick --settings direct and "
+                "then --tasks BinFill --settings spatial"
+            ),
+        ),
+        ("StopCube", "spatial", "StopCube has", ""),
+    ],
+)  # fmt: skip
+def test_a_setting_in_a_list_that_a_task_lacks_is_refused_with_what_plays_the_rest(
+    tasks, settings, lacking, rest
+):
+    with pytest.raises(InvalidValueError) as caught:
+        make_plan(["random"], tasks=tasks, settings=settings)
+
+    assert str(caught.value) == f"{lacking} no spatial setting (its tasks: {WITH_SPATIAL}){rest}."
+
+
+@pytest.mark.parametrize(
+    ("option", "typed"),
+    [
+        ("forms", "implicit"), ("forms", "resolved"), ("forms", "both"),
+        ("split", "train"), ("split", "val"), ("split", "test"), ("split", "random"),
+        ("episodes", "0,3,5-9"), ("episodes", "4"), ("episodes", "all"), ("episodes", "easy"),
+        ("episodes", "medium"), ("episodes", "hard"),
+        ("arms", "told,other-goal,silent,silent-empty,scrambled,paraphrase:2,again"),
+        ("stages", "1,5;1-5"), ("wordings", "train"), ("wordings", "test"),
+        ("video", "off"), ("video", "failures"), ("video", "all"),
+        ("long_prompts", "send"), ("long_prompts", "refuse"),
+    ],
+)  # fmt: skip
+def test_what_the_help_of_an_option_names_is_a_value_of_it(option, typed):
+    """Help said "implicit, resolved or both", and both was refused."""
+    assert make_plan(["random"], tasks="PickXtimes", settings="explicit", **{option: typed})
+
+
+def test_both_forms_are_the_two_that_there_are():
+    made = make_plan(["random"], tasks="PickXtimes", settings="direct", forms="both")
+    assert made.forms == ("implicit", "resolved")
 
 
 def test_episodes_are_played_in_the_given_order_with_explicit_words_last_in_each_scene():
