@@ -17,6 +17,7 @@ from planning_fakes import (
     Late,
     Status,
     check_capture,
+    check_sample,
     fake_vlm,
     golden,
     make_listener,
@@ -302,6 +303,17 @@ def test_the_version_of_a_policy_changes_with_its_options_but_not_its_address():
         assert make_listener(server, base_url="http://elsewhere/v1", timeout_s=3).version == version
         assert make_listener(server, frames=3).version != version
         assert make_listener(server, temperature=0.5).version != version
+
+
+def test_the_page_of_listeners_shows_a_request_and_the_reply_to_it():
+    episode = get_episode("PickXtimes", "test", 0)
+    with fake_vlm(answers_with_the_meant_goal(episode, "direct")) as server:
+        policy = make_listener(server)
+        policy._demonstration = video(0)
+        goal = policy.decide(stand_in(episode), instruct(episode, "direct").text)
+
+    answer = goal_schema(episode.task).answers[goal]
+    check_sample("vlm-listeners.md", server.requests[0], answer)
 
 
 def video(steps):

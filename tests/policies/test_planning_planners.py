@@ -10,6 +10,7 @@ import pytest
 from planning_fakes import (
     TOKENS,
     check_capture,
+    check_sample,
     decoded,
     fake_vlm,
     golden,
@@ -372,6 +373,15 @@ def test_options_of_the_memer_planner_limit_the_key_frames_it_keeps(option, kept
         planner = make_planner("memer", server, **option)
         play_in_chunks(planner, 96)
         assert list(planner.frames) == kept
+
+
+def test_the_page_of_planners_shows_a_request_and_the_reply_to_it():
+    with fake_vlm([REPLY]) as server:
+        planner = make_planner("qwen", server, max_output_tokens=128)
+        policy = play_in_chunks(planner, 16, instruction="Put the red one into the bin.", size=256)
+        assert policy.subgoal == "pick up the red cube at <128, 64>"
+
+    check_sample("planners.md", server.requests[1], REPLY)
 
 
 @pytest.mark.parametrize("subgoals", ["simple", "grounded"])
