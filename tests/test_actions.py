@@ -67,7 +67,7 @@ def test_a_value_that_is_nan_or_infinite_is_refused_with_its_row_and_column(bad,
     ("bad", "got"),
     [("open", "str"), (None, "NoneType"), ({"a": 1}, "dict"),
      (np.zeros(8, complex), "ndarray of dtype complex128"), (np.zeros((0, 8)), r"shape \(0, 8\)"),
-     ([[1, 2], [3]], r"rows of different lengths \(2 and 1\)"), ([10**400] * 8, "list of dtype o")],
+     ([[1, 2], [3]], "rows of different lengths"), ([10**400] * 8, "list of dtype o")],
 )  # fmt: skip
 def test_what_is_not_an_array_of_numbers_is_refused(bad, got):
     with pytest.raises(InvalidActionError, match=f"got {got}"):

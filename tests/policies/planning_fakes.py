@@ -22,7 +22,6 @@ from roboirg.language import instruct
 from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 
-DOCS = Path(__file__).parents[2] / "docs"
 TOKENS = 100, 7
 """Input and output tokens of every reply."""
 KEY_VARIABLE = "PLANNING_TEST_KEY"
@@ -239,54 +238,23 @@ def golden(body):
     return _described(found[1], found[2]) if found else body
 
 
+CAPTURES = Path(__file__).parent / "captures" / "planning"
+
+
+def check_sample(page, request, answer):
+    """Compare a request, and a reply with an answer, with the blocks of JSON on a page of docs."""
+    text = (Path(__file__).parents[2] / "docs" / page).read_text()
+    blocks = re.findall(r"```json\n(.*?)```", text, re.DOTALL)
+    assert list(map(json.loads, blocks)) == [request, openai_reply(answer)]
+
+
 def check_capture(name, body):
     """Compare with the capture of that name; written anew where ROBOIRG_CAPTURE=1 says so."""
-    file = Path(__file__).parent / "captures" / "planning" / f"{name}.json"
+    file = CAPTURES / f"{name}.json"
     if os.environ.get("ROBOIRG_CAPTURE") == "1":
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(body, indent=1, ensure_ascii=False) + "\n")
     assert body == json.loads(file.read_text())
-
-
-MOST_SAMPLED = 300
-"""Characters of a text in a sample of the documentation."""
-
-
-def check_sample(page, request, answer):
-    """Compare the request and the reply on a page of the documentation, two blocks of JSON.
-
-    The reply is that of `fake_vlm` with an answer, without what nobody reads.
-
-    Pictures and the ends of long texts are left out. Both are written anew where ROBOIRG_CAPTURE=1
-    says so.
-    """
-    blocks = []
-    reply = openai_reply(answer)
-    del reply["id"], reply["model"]
-    for body in (request | {"model": "my-model"}, reply):
-        blocks.append(f"```json\n{json.dumps(abridged(body), indent=1, ensure_ascii=False)}\n```\n")
-    file = DOCS / page
-    before, _, rest = file.read_text().partition("<!-- sample -->\n")
-    shown, _, after = rest.partition("<!-- end of sample -->\n")
-    sample = "\n" + "\n".join(blocks) + "\n"
-    if os.environ.get("ROBOIRG_CAPTURE") == "1":
-        shown = sample
-        parts = [before, "<!-- sample -->\n", shown, "<!-- end of sample -->\n", after]
-        file.write_text("".join(parts))
-    assert shown == sample
-
-
-def abridged(body):
-    """Return a request or reply without its pictures and the ends of its long texts."""
-    if isinstance(body, dict):
-        return {key: abridged(held) for key, held in body.items()}
-    if isinstance(body, list):
-        return [abridged(held) for held in body]
-    if not isinstance(body, str):
-        return body
-    if body.startswith("data:"):
-        return body.partition(",")[0] + ",…"
-    return body if len(body) <= MOST_SAMPLED else body[:MOST_SAMPLED] + "…"
 
 
 def _described(kind, data):

@@ -717,52 +717,18 @@ class It:
     assert "last words" in capfd.readouterr().err  # in a worker, of the episode's log
 
 
-# Hosts of a machine of a Ray cluster
-
-
-@pytest.fixture
-def machine_agent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[MachineAgent]:
-    """The agent of a machine, for which a client may be silent for as long as a test lasts."""
-    monkeypatch.setattr(ray_machines, "KEY_S", 3600.0)
-    monkeypatch.setattr(ray_machines, "MOST_WITHOUT_KEY", 3)
-    agent = MachineAgent(tmp_path / "agent", HostSettings())
-    yield agent
-    agent.close()
-
-
-def idle_client(agent: MachineAgent) -> socket.socket:
-    """Return a connection to the hosts of a machine that sends nothing, not even the key."""
-    address = agent.check(MachineVersions(())).hosts
-    assert address is not None
-    line = socket.socket(socket.AF_UNIX)
-    line.connect(address.path)
-    return line
-
-
-def play_as_worker(agent: MachineAgent) -> None:
-    """Ask the hosts of a machine for a policy, as a worker does."""
-    address = agent.check(MachineVersions(())).hosts
-    assert address is not None
-    with address.connect() as line:
-        HostedPolicy(line, read_policy("hosting_fakes:Dice"), 0).close()
-
-
 def test_a_worker_is_served_while_idle_clients_may_still_send_their_key(
-    machine_agent: MachineAgent,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with idle_client(machine_agent), idle_client(machine_agent):
-        play_as_worker(machine_agent)
+    """On a machine of a Ray cluster, where they may be silent for longer than this test lasts."""
+    monkeypatch.setattr(ray_machines, "KEY_S", 3600.0)
+    agent = MachineAgent(tmp_path / "agent", HostSettings())
+    address = agent.check(MachineVersions(())).hosts
+    assert address is not None
 
+    with socket.socket(socket.AF_UNIX) as idle:
+        idle.connect(address.path)
+        with address.connect() as line:
+            HostedPolicy(line, read_policy("hosting_fakes:Dice"), 0).close()
 
-def test_where_too_many_clients_are_idle_a_worker_is_served_once_one_leaves(
-    machine_agent: MachineAgent,
-) -> None:
-    idle_clients = [idle_client(machine_agent) for _ in range(3)]
-    worker = threading.Thread(target=play_as_worker, args=(machine_agent,))
-    worker.start()
-
-    idle_clients.pop().close()
-    worker.join()
-
-    for client in idle_clients:
-        client.close()
+    agent.close()

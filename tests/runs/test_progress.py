@@ -5,7 +5,6 @@ import itertools
 import re
 from types import SimpleNamespace
 
-import pytest
 from msgspec.structs import replace
 from rich.console import Console
 from run_fakes import FakePlay, small_plan
@@ -30,7 +29,7 @@ def test_a_terminal_sees_pace_time_left_and_score_in_80_columns():
     text = printed_report(FOUR_RECORDS, terminal=True)
     last = text[text.rindex("episodes") :]
     assert "6/6" in last
-    assert "0:00 left" in last
+    assert "0:00:00 left" in last
     assert "/min" in last
 
     won = {
@@ -60,52 +59,35 @@ def test_outside_a_terminal_each_episode_is_reported_in_one_plain_line():
     assert "\x1b" not in "".join(lines)
 
 
-def times_left(total: int, done: int, workers: int | None) -> list[str]:
-    """Return the time left in the line of each of six played episodes; empty where it has none.
-
-    An episode takes 100 s, and one ends each minute.
-
-    Args:
-        total: episodes of the plan.
-        done: of these, how many are stored before.
-        workers: that play side by side; None if that is not known.
-    """
+def lines_of_six_episodes(workers: int | None) -> list[str]:
+    """Return what is printed if 4 of 44 episodes are stored, and six more take 100 s each."""
     console = Console(file=io.StringIO(), width=200)
     with ConsoleReporter(console) as reporter:
-        reporter.start(total, done, workers)
+        reporter.start(44, 4, workers)
         for _ in range(6):
             reporter.advance(replace(FOUR_RECORDS[0], duration_s=100.0))
-    lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
-    found = [re.search(r"\((\S+) left\)$", line) for line in lines if line.startswith("[")]
-    return ["" if left is None else left[1] for left in found]
+    return console.file.getvalue().splitlines()[1:]  # type: ignore[attr-defined]
 
 
-@pytest.fixture
-def an_episode_a_minute(monkeypatch: pytest.MonkeyPatch) -> None:
-    minutes = itertools.count(0, 60)
-    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=minutes.__next__))
-
-
-@pytest.mark.usefixtures("an_episode_a_minute")
 def test_the_time_left_is_estimated_from_the_fifth_episode_of_a_run_on():
-    """Stored episodes do not count; 39 and 38 episodes are left, at one a minute."""
-    assert times_left(total=144, done=100, workers=None) == ["", "", "", "", "39:00", "38:00"]
+    """One worker has 35 and then 34 episodes left to play."""
+    lines = lines_of_six_episodes(1)
+
+    assert all(line.endswith("(-:--:-- left)") for line in lines[:4])
+    assert [line[-14:] for line in lines[4:]] == ["(0:58:20 left)", "(0:56:40 left)"]
 
 
-@pytest.mark.usefixtures("an_episode_a_minute")
 def test_of_several_workers_the_rest_takes_as_many_rounds_as_each_has_to_play():
-    """Four workers play 39 episodes in ten rounds of 100 s, of which the last plays three."""
-    assert times_left(total=44, done=0, workers=4)[4:] == ["16:40", "16:40"]
+    """Eight workers play 35 episodes in five rounds, of which the last plays three."""
+    assert lines_of_six_episodes(8)[4].endswith("(0:08:20 left)")
 
 
-@pytest.mark.usefixtures("an_episode_a_minute")
-def test_a_long_time_left_has_hours():
-    assert times_left(total=1005, done=0, workers=4)[4] == "6:56:40"
+def test_if_nobody_knows_how_many_workers_there_are_the_pace_goes_on(monkeypatch):
+    """An episode of 100 s ended every 50 s, so two were played side by side: 18 rounds."""
+    clock = itertools.count(0, 50)
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=clock.__next__))
 
-
-@pytest.mark.usefixtures("an_episode_a_minute")
-def test_at_the_end_of_a_short_run_nothing_is_left():
-    assert times_left(total=4, done=0, workers=4)[3] == "0:00"
+    assert lines_of_six_episodes(None)[4].endswith("(0:30:00 left)")
 
 
 def test_a_warning_is_printed_at_once_on_stderr(capsys):

@@ -161,7 +161,7 @@ def _numbers(action: ArrayLike, space: ActionSpace) -> CheckedActions:
         numbers = np.asarray(action)
     except ValueError:
         numbers = np.asarray(None)  # no number either, so it is refused below
-        got = f"rows of different lengths{_lengths_of(action)}"
+        got = "rows of different lengths"
     is_real = numbers.dtype.kind in _REAL_KINDS or numbers.dtype.name == "bfloat16"  # JAX's
     # NumPy turns the flags in a list into numbers; an array, which it returns as it is, has a type,
     # which says what is wrong unless it is the type of any Python object.
@@ -176,18 +176,6 @@ def _numbers(action: ArrayLike, space: ActionSpace) -> CheckedActions:
             f"An action ({space.name}): expected an array of {space.size} real numbers, got {got}."
         )
     return numbers.astype(np.float64)
-
-
-def _lengths_of(rows: object) -> str:
-    """Return the different lengths of rows for a message: ``[[1, 2], [3]]`` gives `` (2 and 1)``.
-
-    It is empty for what is no list, and for rows that differ only further inside.
-    """
-    lengths: dict[int, None] = {}  # a set that keeps its order
-    if isinstance(rows, list | tuple):
-        for row in rows:
-            lengths[len(row) if hasattr(row, "__len__") else 1] = None
-    return f" ({' and '.join(map(str, lengths))})" if len(lengths) > 1 else ""
 
 
 def _check_values(values: NDArray[np.object_], *, is_real: bool) -> None:

@@ -23,7 +23,7 @@ from roboirg.records.record_codec import RecordKey, identity_key, read_summary
 from roboirg.records.store import StoredRun
 from roboirg.runs.job_instruction import has_other_words
 from roboirg.runs.plan.plan import Plan
-from roboirg.runs.plan.stored_plans import read_kept_plans, read_plans, unreadable_plans
+from roboirg.runs.plan.stored_plans import read_kept_plans, read_plans
 from roboirg.tasks.splits.private_splits import check_salt
 from roboirg.util.parallel_map import parallel_map
 
@@ -118,7 +118,7 @@ def _summed_up(
         missing=completeness.missing,
         verdicts=Counter(result.replayed for result in checks),
         deviation=max(tolerated, default=0.0),
-        faults=(*_unread(folder), *_faults(kept, entries)),
+        faults=tuple(_faults(kept, entries)),
         errors=outcomes.count("error"),
         notes=(*completeness.notes, *_excuses(failed, entries)),
     )
@@ -213,12 +213,6 @@ def _slugs(plans: Sequence[Plan]) -> dict[RecordKey, str]:
         for job in plan.jobs():
             slugs[identity_key(job)] = job.slug
     return slugs
-
-
-def _unread(folder: Path) -> Iterator[str]:
-    """Yield a sentence for each plan of a run that cannot be read, so that nothing is checked."""
-    for name in unreadable_plans(folder):
-        yield f"{name} cannot be read as a plan, so its missing episodes are not known."
 
 
 def _faults(kept: Plans, entries: Sequence[Summary]) -> Iterator[str]:

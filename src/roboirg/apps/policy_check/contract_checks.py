@@ -43,8 +43,8 @@ def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
     except (Exception, SystemExit) as error:  # the policy's own code runs here
         raise CheckAbortedError("loads", "fail", describe_error(error)) from error
     if missing:
-        got = f"it has no {missing[0]}()"
-        raise CheckAbortedError("loads", "fail", f"Expected methods reset() and act(), but {got}.")
+        words = f"Expected reset() and act(), got no {missing[0]}()."
+        raise CheckAbortedError("loads", "fail", words)
     if hasattr(policy, "attach"):
         raise CheckAbortedError(
             "loads", "note", "It is privileged: it needs a simulator, which is not available here."

@@ -154,23 +154,18 @@ def are_equal(one: SyntheticRollout, other: SyntheticRollout) -> bool:
 
 
 def describe_difference(expected: SyntheticRollout, other: SyntheticRollout) -> str:
-    """Return where two rollouts differ most, with the numbers of both.
+    """Return where two rollouts first differ, with the numbers of both.
 
-    An example is ``value 3 of row 0 in answer 2: expected 0.1, got 0.112``. Where answers have
-    different numbers of actions, the first of these is named: ``answer 1: expected 5 actions, got
-    4``. Answers are counted from 1, rows and values from 0.
+    An example is ``value 3 of row 0 in answer 2: expected 0.1, got 0.112``, or where an answer has
+    another number of actions, ``answer 1: expected 5 actions, got 4``. Answers are counted from 1,
+    rows and values from 0. It is empty if they are equal.
     """
-    words = ""
-    largest = 0.0
     for answer, (chunk, got) in enumerate(zip(expected.chunks, other.chunks, strict=True), 1):
-        if chunk.shape != got.shape:
+        if len(chunk) != len(got):
             return f"answer {answer}: expected {counted(len(chunk), 'action')}, got {len(got)}"
-        difference = np.abs(chunk - got)
-        if difference.max() > largest:
-            largest = difference.max()
-            row, column = np.unravel_index(difference.argmax(), difference.shape)
-            words = (
+        for row, column in np.argwhere(chunk != got):
+            return (
                 f"value {column} of row {row} in answer {answer}: expected "
                 f"{chunk[row, column]:.6g}, got {got[row, column]:.6g}"
             )
-    return words
+    return ""

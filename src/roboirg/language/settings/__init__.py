@@ -6,10 +6,9 @@ import functools
 from collections.abc import Iterable, Mapping, Sequence
 
 from roboirg.core.errors import InvalidValueError, check_names
-from roboirg.core.plain_text import verb_for
 from roboirg.language.instruction import FORMS
 from roboirg.language.settings.setting import Setting
-from roboirg.tasks import Task, all_tasks, get_task
+from roboirg.tasks import Task, every_task
 from roboirg.util.discovery import discover
 
 __all__ = [
@@ -88,7 +87,7 @@ def find_settings(words: Iterable[str]) -> tuple[str, ...]:
 
 
 def check_named_settings(words: Sequence[str], tasks: Sequence[str]) -> None:
-    """Raise if a task lacks a setting that a list names; say which tasks have it, and what is left.
+    """Raise if a task lacks a setting that a list names; say which have it, and what the rest is.
 
     Where a word for several, such as ``all``, is in the list, it means what each task has.
 
@@ -101,27 +100,16 @@ def check_named_settings(words: Sequence[str], tasks: Sequence[str]) -> None:
     """
     if any(word.lower() in SETTING_GROUPS for word in words):
         return
-    lacking: list[str] = []  # sentences
-    settings_by_tasks: dict[tuple[str, ...], list[str]] = {}
     for name in words:
         setting = all_settings()[name]
-        having = tuple(task for task in tasks if setting.applies_to(get_task(task)))
-        settings_by_tasks.setdefault(having, []).append(name)
-        without = [task for task in tasks if task not in having]
-        if without:
-            its_tasks = [task for task in all_tasks() if setting.applies_to(get_task(task))]
-            verb = verb_for(len(without), "have")
-            lacking.append(
-                f"{', '.join(without)} {verb} no {name} setting (its tasks: {', '.join(its_tasks)})"
+        having = [task.name for task in every_task().values() if setting.applies_to(task)]
+        lacking = [task for task in tasks if task not in having]
+        if lacking:
+            others = ",".join(word for word in words if word != name)
+            raise InvalidValueError(
+                f"There is no {name} setting in {', '.join(lacking)}, but in {', '.join(having)}; "
+                f"for the rest give --settings {others or 'all'}."
             )
-    if not lacking:
-        return
-    commands: list[str] = []
-    for having, names in settings_by_tasks.items():
-        if having:
-            commands.append(f"--tasks {','.join(having)} --settings {','.join(names)}")
-    hint = f"; for the rest give {' and then '.join(commands)}" if commands else ""
-    raise InvalidValueError(f"{'; '.join(lacking)}{hint}.")
 
 
 def settings_of(task: Task) -> tuple[str, ...]:

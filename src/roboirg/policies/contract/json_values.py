@@ -103,19 +103,14 @@ def _object(value: Mapping[Any, Any], place: _Place) -> dict[str, Any]:
     """
     entries: dict[str, Any] = {}
     for key, entry in value.items():
-        name = _key(key, place)
+        if place.owner is not None and not isinstance(key, _TEXTUAL):
+            shown = clip_text(repr(key), _MAX_SHOWN)
+            where = place.key or "them"
+            raise InvalidValueError(f"{place.owner}: {shown} is a key of {where}, and no text.")
+        name = _text(key, place)
         path = f"{place.key}.{key}" if place.key else str(key)
         entries[name] = _as_json(entry, place.inside(path))
     return entries
-
-
-def _key(key: object, place: _Place) -> str:
-    """Return a key of the mapping at a place as a text; raise if an owner's is none."""
-    if place.owner is not None and not isinstance(key, _TEXTUAL):
-        where = f" of {place.key!r}" if place.key else ""
-        shown = clip_text(repr(key), _MAX_SHOWN)
-        raise InvalidValueError(f"{place.owner}: a key{where} is {shown}; keys must be texts.")
-    return _text(key, place)
 
 
 def _array(value: Any, place: _Place) -> Any:  # noqa: ANN401

@@ -77,7 +77,6 @@ class ServerConnection:
         self._options = options
         self.endpoint = endpoints[0]
         self._websocket: ClientConnection | None = None
-        self._largest_sent = 0  # bytes of the largest message to the server
         self._held = contextlib.ExitStack()
         """The lock, and connections."""
 
@@ -124,13 +123,12 @@ class ServerConnection:
                 if data is not None:
                     if not is_numbered:
                         self._refuse_surplus(websocket)
-                    self._largest_sent = max(self._largest_sent, len(data))
                     websocket.send(data)
                 if not awaited:
                     return {}
                 message = _next_message(websocket, end)
         except ConnectionClosed as error:
-            raise self._broken(error) from error
+            raise self._broken(error, len(data or b"")) from error
         if message is None:
             raise PolicyTimeoutError(f"{self} did not send {awaited} within {seconds:g} s.")
         return self._read(message)
@@ -214,9 +212,7 @@ class ServerConnection:
             status = error.response.status_code
             words = f"HTTP status {status}"
             page = (error.response.body or b"").decode(errors="replace")
-            said = " ".join(without_keys(page).split())[:_MAX_ERROR_LENGTH]
-            if said:
-                words += f": {said.rstrip('.')}"
+            words += f": {without_keys(page)[:_MAX_ERROR_LENGTH]}".rstrip(": .\n")
             if status in _RETRYABLE:
                 return words
             if status in _REFUSED_KEY:
@@ -252,18 +248,22 @@ class ServerConnection:
                 f"{data[:_MOST_SHOWN]!r}."
             ) from error
 
-    def _broken(self, error: ConnectionClosed) -> RoboIRGError:
-        """Return the error for a connection that has ended, by what the library found out of it."""
+    def _broken(self, error: ConnectionClosed, sent: int) -> RoboIRGError:
+        """Return the error for a connection that has ended, by what the library found out of it.
+
+        Args:
+            error: of the library.
+            sent: bytes of the message to the server.
+        """
         if isinstance(error.__cause__, BlockingIOError):
             seconds = self._options.timeout
             return PolicyTimeoutError(f"{self} did not take in a message within {seconds:g} s.")
         if isinstance(error.__cause__, TooManyFragments):
             return PolicyReplyError(f"{self} sent a reply in too many pieces.")
         # Whoever receives a close code sends it back, so it is that of the side that sent it first.
-        is_theirs = error.rcvd is not None and error.rcvd_then_sent is not False
-        if error.rcvd is not None and is_theirs and error.rcvd.code == _TOO_BIG:
+        if error.rcvd_then_sent and error.rcvd is not None and error.rcvd.code == _TOO_BIG:
             return PolicyReplyError(
-                f"{self} does not take messages of {self._largest_sent:,} bytes; raise its limit."
+                f"{self} does not take messages of {sent:,} bytes; raise its limit."
             )
         if error.sent is not None and error.sent.code == _TOO_BIG:
             return PolicyReplyError(
@@ -272,9 +272,7 @@ class ServerConnection:
             )
         code = "without a close code"
         if error.rcvd is not None:
-            code = f"close code {error.rcvd.code}"
-            if error.rcvd.reason:
-                code += f": {without_keys(error.rcvd.reason)}"
+            code = f"close code {error.rcvd.code}: {without_keys(error.rcvd.reason)}".rstrip(": ")
         return PolicyConnectionError(f"{self} ended the connection ({code}).")
 
 

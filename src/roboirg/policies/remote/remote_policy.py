@@ -21,8 +21,8 @@ from roboirg.policies.remote.endpoints import RemoteOptions, read_endpoints
 
 _MOST_SHOWN = 80
 """Characters of a server's value in an error message."""
-_ERROR_KEYS = ("traceback", "error", "errors", "message", "detail", "reason")
-"""Where servers say what went wrong."""
+_ERROR_KEYS = ("traceback", "message", "detail", "reason", "error")
+"""Where servers say what went wrong; the first that a reply has is shown."""
 _MOST_KEYS = 8
 """Keys of a server's reply in an error message."""
 
@@ -153,9 +153,12 @@ class RemotePolicy(ABC):
         Raises:
             PolicyReplyError: it does.
         """
-        said = _said_error(reply)
-        if said:
-            raise self.connection.error_reply(said)
+        for key in _ERROR_KEYS:
+            said = reply.get(key)
+            if isinstance(said, Mapping):
+                self.refuse_error(said)
+            elif isinstance(said, str):
+                raise self.connection.error_reply(said)
 
     def request_confirmed(self, message: Mapping[str, Any], key: str) -> None:
         """Send a message whose reply must have True under a key.
@@ -205,23 +208,6 @@ class RemotePolicy(ABC):
         except Exception:
             self.connection.end(is_broken=True)
             raise
-
-
-def _said_error(reply: Mapping[str, Any]) -> str:
-    """Return what a reply says of an error, as text; empty if it says nothing.
-
-    ``{"error": "RuntimeError", "message": "no memory"}`` gives ``RuntimeError: no memory``.
-    """
-    texts: list[str] = []
-    for key in _ERROR_KEYS:
-        said = reply.get(key)
-        if isinstance(said, Mapping):
-            said = _said_error(said)
-        if isinstance(said, list | tuple):
-            said = "; ".join(map(str, said))
-        if isinstance(said, str) and said.strip():
-            texts.append(said.strip())
-    return ": ".join(dict.fromkeys(texts))
 
 
 def _listed(names: Mapping[Any, Any]) -> str:

@@ -96,8 +96,7 @@ def parse_arms(given: object) -> Names:
 def parse_forms(given: object) -> Names:
     """Return the names of forms as typed; ``both`` means both, and so does ``all``."""
     names = parse_names("form", given)
-    words = {name.lower() for name in names}
-    return names if words.isdisjoint({"both", ALL}) else language.FORMS
+    return language.FORMS if names == ("both",) or means_all(given) else names
 
 
 def parse_policies(given: Iterable[str]) -> Names:

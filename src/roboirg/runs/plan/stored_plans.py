@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -44,15 +43,6 @@ def read_plans(folder: Path) -> tuple[Plan, ...]:
 def read_kept_plans(folder: Path) -> tuple[Plan, ...]:
     """Return the plans of all commands that wrote to a folder, as far as they are kept."""
     return tuple(_plans([folder / PLAN_FILE, *earlier_plans(folder)]))
-
-
-def unreadable_plans(folder: Path) -> tuple[str, ...]:
-    """Return the files of a folder that should be plans and are none, relative to it."""
-    found: list[str] = []
-    for path in (folder / PLAN_FILE, *earlier_plans(folder)):
-        if os.path.lexists(path) and not any(_plans([path])):
-            found.append(path.relative_to(folder).as_posix())
-    return tuple(found)
 
 
 def _plans(paths: Iterable[Path]) -> Iterator[Plan]:

@@ -6,6 +6,7 @@ import math
 import sys
 import time
 from collections import Counter
+from datetime import timedelta
 from typing import Self
 
 from rich.console import Console, Group, RenderableType
@@ -21,7 +22,7 @@ from roboirg.records.record import Record
 ESTIMATE_AFTER = 5
 """Episodes of a run after which the time left is estimated."""
 _MINUTE = 60
-_UNKNOWN = "-:--"
+_UNKNOWN = "-:--:--"
 
 
 class Reporter:
@@ -95,16 +96,18 @@ class ConsoleReporter(Reporter):
         if self._console.is_terminal:
             self._bar.update(self._task, completed=self._done, left=left, pace=pace)
             return
-        line = f"\\[{self._done}/{self._total}] {escape(printable(_summary(record)))}"
-        if left != _UNKNOWN:
-            line += f" ({left} left)"
-        self._console.print(line, soft_wrap=True, highlight=False)
+        self._console.print(
+            f"\\[{self._done}/{self._total}] {escape(printable(_summary(record)))} ({left} left)",
+            soft_wrap=True,
+            highlight=False,
+        )
 
     def _time_left(self, elapsed: float) -> str:
-        """Return the time that the rest takes, such as ``1:02:03``; unknown for the first episodes.
+        """Return the time that the rest takes, such as ``1:02:03``; unknown at first.
 
         The rest is played in rounds of one episode a worker, each as long as the episodes of this
-        run on average. How many workers there are may be unknown; then the pace so far goes on.
+        run on average. If it is not known how many workers there are, there are as many as have
+        played on average.
 
         Args:
             elapsed: seconds since the run began.
@@ -112,15 +115,9 @@ class ConsoleReporter(Reporter):
         remaining = self._total - self._done
         if remaining and self._played < ESTIMATE_AFTER:
             return _UNKNOWN
-        seconds = elapsed / self._played * remaining
-        if self._workers is not None:
-            rounds = math.ceil(remaining / self._workers)
-            seconds = self._seconds_played / self._played * rounds
-        minutes, seconds_left = divmod(round(seconds), _MINUTE)
-        hours, minutes_left = divmod(minutes, _MINUTE)
-        if hours:
-            return f"{hours}:{minutes_left:02d}:{seconds_left:02d}"
-        return f"{minutes}:{seconds_left:02d}"
+        workers = self._workers or max(1, self._seconds_played / elapsed)
+        rounds = math.ceil(remaining / workers)
+        return str(timedelta(seconds=round(self._seconds_played / self._played * rounds)))
 
     def warn(self, text: str) -> None:
         """Print a line on stderr, above the bar."""

@@ -49,14 +49,6 @@ class _Response(NamedTuple):
     headers: Mapping[str, str]
     content: bytes
 
-    def shown(self) -> str:
-        """Return the kind of content and how it begins: ``text/html that begins '<html> …'``."""
-        kind = _quote(self.headers.get("content-type", "content of no type"))
-        if not self.content.strip():
-            return f"{kind} that is empty"
-        text = self.content[:_MOST_READ].decode(errors="replace")
-        return f"{kind} that begins {_quote(text)[:_MOST_SHOWN]!r}"
-
 
 class HttpModel:
     """Posts queries as the provider's API wants them, and returns its replies.
@@ -85,7 +77,9 @@ class HttpModel:
         try:
             response = self._post(service.write(query, self.options, self._key))
             if response.status == HTTPStatus.OK:
-                came = f", {response.shown()}"
+                beginning = _quote(response.content[:_MOST_READ].decode(errors="replace"))
+                kind = response.headers.get("content-type")
+                came = f", {kind} that begins {beginning[:_MOST_SHOWN]!r}"
                 content = json.loads(response.content)
                 if content.get("error"):
                     raise ValueError("it reports an error")
