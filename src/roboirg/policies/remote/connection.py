@@ -210,14 +210,14 @@ class ServerConnection:
             )
         except InvalidStatus as error:
             status = error.response.status_code
-            words = f"HTTP status {status}"
-            page = (error.response.body or b"").decode(errors="replace")
-            words += f": {without_keys(page)[:_MAX_ERROR_LENGTH]}".rstrip(": .\n")
             if status in _RETRYABLE:
-                return words
+                return f"HTTP status {status}"
+            hint = ""
             if status in _REFUSED_KEY:
-                words += "; name the key with api_key_env=NAME"
-            raise PolicyConnectionError(f"{self} refused the connection with {words}.") from error
+                hint = "; name the key with api_key_env=NAME"
+            raise PolicyConnectionError(
+                f"{self} refused the connection with HTTP status {status}{hint}."
+            ) from error
         except socket.gaierror as error:
             raise PolicyConnectionError(
                 f"{self} cannot be reached: there is no host {endpoint.host!r}."

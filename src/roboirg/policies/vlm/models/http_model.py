@@ -78,7 +78,7 @@ class HttpModel:
             response = self._post(service.write(query, self.options, self._key))
             if response.status == HTTPStatus.OK:
                 beginning = _quote(response.content[:_MOST_READ].decode(errors="replace"))
-                kind = response.headers.get("content-type")
+                kind = _quote(response.headers.get("content-type"))
                 came = f", {kind} that begins {beginning[:_MOST_SHOWN]!r}"
                 content = json.loads(response.content)
                 if content.get("error"):
