@@ -187,6 +187,11 @@ def test_an_episode_that_lacks_what_a_setting_needs_is_left_out_and_none_at_all_
         make_plan(["random"], tasks="PickXtimes", settings="grounded", episodes="1").checked()
 
 
+def test_settings_of_a_list_are_played_in_its_order():
+    jobs = make_plan(["random"], tasks="BinFill", settings="spatial,direct", episodes="1").jobs()
+    assert [job.setting for job in jobs] == ["spatial", "direct"]
+
+
 @pytest.mark.parametrize(
     ("settings", "rest"), [("explicit,spatial,direct", "explicit,direct"), ("spatial", "all")]
 )
