@@ -399,7 +399,7 @@ def test_the_caption_of_a_table_names_the_adjustment_of_its_intervals():
         (("--by", "colour"), "colour"),
         (("--plan", plan_file(forms="implied")), "implied"),
         (("--split", "tset"), "tset"),
-        (("--tasks", "StopCube", "--settings", "spatial"), "nothing to score"),
+        (("--tasks", "StopCube", "--settings", "spatial"), "no spatial setting in StopCube"),
         (("--split", "none"), "nothing to score"),
         (("--seeds", "-1"), "seeds is -1; it must be a whole number from 0"),
         (("--learned", "--split", "val"), "choose --split test"),

@@ -12,6 +12,7 @@ import msgspec
 from roboirg.apps.grounding.items.grounding_item import GroundingItem
 from roboirg.util.atomic_write import replacing
 from roboirg.util.parquet_support import check_parquet_support
+from roboirg.util.regular_file import read_regular
 
 DATA = "data"
 ROWS_PER_GROUP = 256
@@ -70,7 +71,7 @@ class _PictureFiles:
     def value(self, path: str) -> Mapping[str, Any]:
         """Return a picture as the type Image of `datasets`."""
         if path not in self._contents:
-            self._contents[path] = (self._folder / path).read_bytes()
+            self._contents[path] = read_regular(self._folder / path)
         return {"bytes": self._contents[path], "path": path}
 
 

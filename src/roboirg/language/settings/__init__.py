@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.language.instruction import FORMS
 from roboirg.language.settings.setting import Setting
-from roboirg.tasks import Task
+from roboirg.tasks import Task, every_task
 from roboirg.util.discovery import discover
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "EXPLICIT",
     "SETTING_GROUPS",
     "all_settings",
+    "check_named_settings",
     "expand_settings",
     "find_settings",
     "get_setting",
@@ -86,6 +87,32 @@ def find_settings(words: Iterable[str]) -> tuple[str, ...]:
     for name in names:
         _check(name, *SETTING_GROUPS)
     return names
+
+
+def check_named_settings(words: Sequence[str], tasks: Sequence[str]) -> None:
+    """Raise if a task lacks a setting that a list names; say which have it, and what the rest is.
+
+    Where a word for several, such as ``all``, is in the list, it means what each task has.
+
+    Args:
+        words: the list, as in `find_settings`.
+        tasks: names.
+
+    Raises:
+        InvalidValueError: a task lacks one.
+    """
+    if any(word.lower() in SETTING_GROUPS for word in words):
+        return
+    for name in words:
+        setting = all_settings()[name]
+        having = [task.name for task in every_task().values() if setting.applies_to(task)]
+        lacking = [task for task in tasks if task not in having]
+        if lacking:
+            others = ",".join(word for word in words if word != name)
+            raise InvalidValueError(
+                f"There is no {name} setting in {', '.join(lacking)}, but in {', '.join(having)}; "
+                f"for the rest give --settings {others or 'all'}."
+            )
 
 
 def settings_of(task: Task) -> tuple[str, ...]:
