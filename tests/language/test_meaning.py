@@ -53,8 +53,9 @@ THREE_CUBES = get_episode("PickXtimes", "test", 3)
         Term("step", (6,), step=-2),
     ],
     ids=[
-        "four", "four or five, the former", "two or four, the latter", "five or four, not the former",
-        "twice as often as two", "half of eight", "two fewer than six",
+        "four", "four or five, the former", "two or four, the latter",
+        "five or four, not the former", "twice as often as two", "half of eight",
+        "two fewer than six",
     ],
 )  # fmt: skip
 def test_each_operation_on_numbers_leads_to_four_repetitions(repeats):
@@ -88,32 +89,43 @@ def every_instruction(task, step):
                 yield episode, options, instruct_with(episode, options)
 
 
+@pytest.fixture(
+    scope="module",
+    params=[
+        *(pytest.param((task, 10), id=task) for task in WRITTEN),
+        *(pytest.param((task, 1), id=f"{task}-all", marks=pytest.mark.slow) for task in WRITTEN),
+    ],
+)
+def published(request):
+    """Every instruction of every tenth published episode of a task, or (slow) of all of them.
+
+    A list of (episode, options, instruction).
+    """
+    return list(every_instruction(*request.param))
+
+
 def mean_the_right_goal(goals, episode):
     """Return whether there are goals, and all of them are the episode's as far as judged."""
     return bool(goals) and all(is_right(goal, episode) for goal in goals)
 
 
-@each_task
-@pytest.mark.parametrize("step", [10, pytest.param(1, marks=pytest.mark.slow)])
-def test_an_instruction_means_the_goal_of_its_episode_and_no_other_goal(task, step):
-    """Checked in every tenth published episode, and in all of them by the slow tests."""
-    for episode, _, said in every_instruction(task, step):
+def test_an_instruction_means_the_goal_of_its_episode_and_no_other_goal(published):
+    """The sentences together, from the introduction to the command."""
+    for episode, _, said in published:
         assert mean_the_right_goal(understood_goals(said, episode), episode), said.text
 
 
-@each_task
-def test_the_command_alone_leaves_the_right_goal_open_and_guessers_choose_among_some(task):
+def test_the_command_alone_leaves_the_right_goal_open_and_guessers_choose_among_some(published):
     """*Take the latter* alone leaves all colors, and a guesser who heard *red and blue* two."""
-    for episode, _, said in every_instruction(task, 10):
+    for episode, _, said in published:
         of_command = set(goals_of_command(said, episode))
         of_guesser = set(blind_goals(said, episode))
         assert {episode.goal} <= of_guesser <= of_command, said.text
 
 
-@each_task
-def test_explicit_and_resolved_commands_mean_the_right_goal_without_their_introduction(task):
+def test_explicit_and_resolved_commands_mean_the_right_goal_without_their_introduction(published):
     """Their last sentence states every value; only *implicit* ones point back at what was said."""
-    for episode, options, said in every_instruction(task, 10):
+    for episode, options, said in published:
         if options.setting == "explicit" or options.form == "resolved":
             goals = goals_of_command(said, episode)
             assert mean_the_right_goal(goals, episode), said.text
@@ -121,9 +133,7 @@ def test_explicit_and_resolved_commands_mean_the_right_goal_without_their_introd
 
 def test_the_command_grab_it_leaves_the_color_open_in_a_scene_with_three_cubes():
     color = Term("same", ("blue",))
-    words = Meaning(
-        {"color": color, "repeats": Term("same", (4,))}, settled=frozenset({"repeats"})
-    )
+    words = Meaning({"color": color, "repeats": Term("same", (4,))}, settled=frozenset({"repeats"}))
     assert set(meaning.command_goals(words, THREE_CUBES)) == {
         Goal.of(color="red", repeats=4),
         Goal.of(color="green", repeats=4),
@@ -131,13 +141,12 @@ def test_the_command_grab_it_leaves_the_color_open_in_a_scene_with_three_cubes()
     }
 
 
-@each_task
-def test_an_implicit_command_needs_its_introduction_unless_the_scene_has_one_choice(task):
+def test_an_implicit_command_needs_its_introduction_unless_the_scene_has_one_choice(published):
     """*Lift it twice* alone leaves the color open, unless all cubes have the same color.
 
     Left out are commands whose singular agrees with the number one only: *once for that take*.
     """
-    for episode, options, said in every_instruction(task, 10):
+    for episode, options, said in published:
         is_implicit = options.setting != "explicit" and options.form == "implicit"
         if not is_implicit or any(said.meaning.agrees.values()):
             continue
@@ -147,9 +156,8 @@ def test_an_implicit_command_needs_its_introduction_unless_the_scene_has_one_cho
                 assert len(values_possible(field, episode)) == 1, said.text
 
 
-@each_task
-def test_a_command_that_chooses_between_two_values_never_gives_a_one_away_by_its_singular(task):
-    for _, options, said in every_instruction(task, 10):
+def test_where_two_values_are_offered_no_singular_gives_the_number_one_away(published):
+    for _, options, said in published:
         if options.setting == "direct-rival" and options.form == "implicit":
             assert not any(said.meaning.agrees.values()), said.text
 
