@@ -20,7 +20,6 @@ from roboirg.language.generator import find_refusal
 from roboirg.language.instruction import Described, Meaning, Term
 from roboirg.language.landmarks import candidates_in
 from roboirg.language.request import values_of_goal
-from roboirg.language.scenarios import amounts, declared
 from roboirg.language.scenarios.scenario_file import written_words
 from roboirg.language.settings import settings_of
 from roboirg.shortcuts.command_chance import (
@@ -258,77 +257,19 @@ def test_without_the_command_a_rival_value_leaves_a_guess_between_two_goals():
             assert right_share(blind_goals(said, episode), episode) == Fraction(1, 2), said.text
 
 
-def wrapped(owner, name, made):
-    """Return a fault that puts a function in the place of another one, which it gets first."""
+def test_published_instructions_use_every_operation_and_kind_of_description():
+    """So that a fault in the computation of any of them is found by the tests of what is meant."""
+    operations = set()
+    descriptions = set()
+    for task in WRITTEN:
+        for _, _, said in every_instruction(task, 10):
+            for term in said.meaning.terms.values():
+                operations.add(term.operation)
+                described = [part for part in term.operands if isinstance(part, Described)]
+                descriptions.update(part.kind for part in described)
 
-    def put_in(monkeypatch):
-        before = getattr(owner, name)
-        monkeypatch.setattr(owner, name, lambda *given: made(before, *given))
-
-    return put_in
-
-
-def entry(table, key, value):
-    """Return a fault that changes one entry of a table."""
-    return lambda monkeypatch: monkeypatch.setitem(table, key, value)
-
-
-def another_if(kind, described_thing, described, episode):
-    """Return another thing than the one that is described, for one kind of description."""
-    thing = described_thing(described, episode)
-    if described.kind != kind:
-        return thing
-    things = candidates_in(episode.scene, get_task(episode.task).things.pointed)
-    return next((other for other in things if other != thing), None)
-
-
-PLANTED_FAULTS = {
-    "minus adds": entry(declared._STEP_SIGNS, "minus", 1),
-    "earlier is later": entry(declared._STEP_SIGNS, "earlier", 1),
-    "right after is two after": entry(declared._STEPS, "after", 2),
-    "the former is the second": entry(declared._RANK_BY_EXPRESSION, "former", 2),
-    "a rank is the next one": wrapped(declared, "_rank_of", lambda rank, *given: rank(*given) + 1),
-    "the other one is the one that was taken": wrapped(
-        declared, "_taken_rank", lambda rank, *given: 3 - rank(*given)
-    ),
-    "a remark chooses what it sets aside": wrapped(
-        amounts,
-        "chosen_term",
-        lambda term, *given: term(*given)._replace(rank=3 - term(*given).rank),
-    ),
-    "neither of them is one of them": wrapped(
-        meaning, "_values_without", lambda _left, operands, *_: frozenset(operands)
-    ),
-    "twice as often is half as often": wrapped(
-        meaning,
-        "_computed_number",
-        lambda reckon, term, number: reckon(term._replace(operation="half"), number),
-    ),
-    "a list is heard backwards": wrapped(
-        declared.SaidValues, "listed", lambda listed, *given: listed(*given)[::-1]
-    ),
-    "a place is that of another thing": wrapped(
-        meaning, "_described_thing", lambda *given: another_if("place", *given)
-    ),
-    "a clue is to another thing": wrapped(
-        meaning, "_described_thing", lambda *given: another_if("clue", *given)
-    ),
-}
-"""By what is then misunderstood: a function that puts the fault into the code."""
-
-
-@pytest.mark.parametrize("fault", PLANTED_FAULTS)
-def test_a_planted_fault_in_the_computation_of_meaning_is_detected(fault, monkeypatch):
-    """A check of the check above: with each fault, some published text must mean a wrong goal."""
-    put_in = PLANTED_FAULTS[fault]
-    put_in(monkeypatch)
-
-    texts = itertools.chain.from_iterable(every_instruction(task, 4) for task in WRITTEN)
-
-    assert any(
-        not mean_the_right_goal(understood_goals(said, episode), episode)
-        for episode, _, said in texts
-    )
+    assert operations == {"same", "rank", "other", "without", "double", "half", "step"}
+    assert descriptions == {"place", "clue"}
 
 
 def one_blue_and_three_reds(settled=()):
