@@ -39,11 +39,8 @@ def stop_cube(self):
 
 
 def picks(self, count, start):
-    colors = self.env.unwrapped.color_names
-    first = f"{start} pick up the container that hides the {colors[0]} cube"
-    if count == 1:
-        return first
-    return f"{first}, put it down, and then pick up the container that hides the {colors[1]} cube"
+    colors = " and then ".join(self.env.unwrapped.color_names[:count])
+    return f"{start} pick up the containers that hide {colors}"
 
 
 def by_difficulty(start):

@@ -9,31 +9,25 @@ import functools
 from collections import Counter, defaultdict
 
 import pytest
-from language_variants import TASKS, random_episodes
+from language_variants import TASKS, random_episodes, said_where_possible
 
 from roboirg.core.episode import ALL_COLORS
 from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language import instruct, instruct_with
-from roboirg.language.generator import find_refusal
+from roboirg.language import instruct
 from roboirg.language.instruction_row import row
 from roboirg.language.settings import settings_of
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 
 TASKS_WITH_SETTING = tuple(task for task in TASKS if "grounded" in settings_of(get_task(task)))
-OPTIONS = InstructionOptions("grounded")
 each_task = pytest.mark.parametrize("task", TASKS_WITH_SETTING)
 
 
 @functools.cache
 def grounded_instructions(task):
     """Return (episode, grounded instruction) of those of 60 random episodes that have one."""
-    return [
-        (episode, instruct_with(episode, OPTIONS))
-        for episode in random_episodes(task, 60)
-        if find_refusal(episode, OPTIONS) is None
-    ]
+    return list(said_where_possible(random_episodes(task, 60), InstructionOptions("grounded")))
 
 
 def test_a_grounded_instruction_describes_the_cube_instead_of_naming_its_color():

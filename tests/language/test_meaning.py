@@ -130,16 +130,6 @@ def test_explicit_and_resolved_commands_mean_the_right_goal_without_their_introd
             assert mean_the_right_goal(goals, episode), said.text
 
 
-def test_the_command_grab_it_leaves_the_color_open_in_a_scene_with_three_cubes():
-    color = Term("same", ("blue",))
-    words = Meaning({"color": color, "repeats": Term("same", (4,))}, settled=frozenset({"repeats"}))
-    assert set(meaning.command_goals(words, THREE_CUBES)) == {
-        Goal.of(color="red", repeats=4),
-        Goal.of(color="green", repeats=4),
-        Goal.of(color="blue", repeats=4),
-    }
-
-
 def test_an_implicit_command_needs_its_introduction_unless_the_scene_has_one_choice(published):
     """*Lift it twice* alone leaves the color open, unless all cubes have the same color.
 
@@ -245,16 +235,6 @@ def test_a_guesser_who_heard_two_values_chooses_between_two_goals():
         Goal.of(color="green", repeats=3),
     )
     assert right_share(goals_of_command(said, ONE_CUBE), ONE_CUBE) == Fraction(1, 5)
-
-
-def test_without_the_command_a_rival_value_leaves_a_guess_between_two_goals():
-    """In *direct-rival* the introduction names two values, and the command points at one."""
-    for index in range(12):
-        episode = get_episode("PickXtimes", "test", index)
-        options = InstructionOptions("direct-rival")
-        if find_refusal(episode, options) is None:
-            said = instruct_with(episode, options)
-            assert right_share(blind_goals(said, episode), episode) == Fraction(1, 2), said.text
 
 
 def test_published_instructions_use_every_operation_and_kind_of_description():

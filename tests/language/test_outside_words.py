@@ -14,49 +14,43 @@ from pathlib import Path
 
 import pytest
 
-from roboirg.core.word_pools import POOLS
 from roboirg.language.scenarios.identity import words_of
 from roboirg.tasks import all_tasks
 
 DOCS = Path(__file__).parents[2] / "docs"
-SCENARIO_HEAD = """
+SCENARIO_OF_EACH_SETTING = """
 [[scenario]]
-frame = "%s"
-pool = "%s"
-setting = "%s"
-"""
-SCENARIO_OF_EACH_SETTING = [
-    (
-        "direct",
-        """
+frame = "NOUN 0"
+pool = "POOL"
+setting = "direct"
 introduction = "{person} wants a NOUN of the {color} cube."
 reinforcement = "{he} dreams of <it color: it> as a NOUN."
 distractors = ["Every NOUN takes hours.", "A NOUN is expensive.", "My last NOUN was lost."]
 competing = ["{he} already has a NOUN of {his} {rival color} hat."]
 cue = "Okay, the NOUN begins with <it color: it>."
 say.color = ["<it color: it>", "<that color: that cube>"]
-""",
-    ),
-    (
-        "reasoning",
-        """
+
+[[scenario]]
+frame = "NOUN 1"
+pool = "POOL"
+setting = "reasoning"
 derive.pattern = "color exclusion"
 introduction = "I already have a NOUN of the {excluded} [excluded: cube|cubes]."
 say.color = ["<other excluded: the other one>"]
-""",
-    ),
-    (
-        "reasoning",
-        """
+
+[[scenario]]
+frame = "NOUN 2"
+pool = "POOL"
+setting = "reasoning"
 list = "color"
 derive.pattern = "contextual logic"
 introduction = "I need a NOUN of the {list} cubes, but {person} has the {taken} one."
 say.color = ["<other color: the other one>"]
-""",
-    ),
-    (
-        "direct-rival",
-        """
+
+[[scenario]]
+frame = "NOUN 3"
+pool = "POOL"
+setting = "direct-rival"
 list = "color"
 introduction = "The NOUN of {person} has the {list.0} cube, and mine has the {list.1} one."
 say.color = ["<it color: it>"]
@@ -64,17 +58,15 @@ remarks.former = "The NOUN is ready for <former list.0: {hers}>: "
 remarks.latter = "The NOUN is ready for <latter list.1: the latter>: "
 remarks.not_former = "The NOUN cannot have <former list.0: {hers}>: "
 remarks.not_latter = "The NOUN cannot have <latter list.1: the latter>: "
-""",
-    ),
-    (
-        "grounded",
-        """
+
+[[scenario]]
+frame = "NOUN 4"
+pool = "POOL"
+setting = "grounded"
 introduction = "{clue} is missing from the NOUN."
 say.color = ["<it clue: it>"]
-""",
-    ),
-]
-"""Of every setting of the page's task, in other words for each pool."""
+"""
+"""Of every setting of the page's task; NOUN is another word for each pool of wordings."""
 
 
 def blocks(page: str, heading: str) -> list[str]:
@@ -87,12 +79,9 @@ def blocks(page: str, heading: str) -> list[str]:
 def words_for_every_setting() -> str:
     """Return the page's file of words with scenarios of every setting instead of its own."""
     head, _, _ = TASK_WORDS.partition("[[scenario]]")
-    scenarios = []
-    for pool, noun in zip(POOLS, ("painting", "film"), strict=True):
-        for number, (setting, text) in enumerate(SCENARIO_OF_EACH_SETTING):
-            scenario = SCENARIO_HEAD % (f"{noun} {number}", pool, setting) + text.strip()
-            scenarios.append(scenario.replace("NOUN", noun))
-    return head + "\n".join(scenarios)
+    train = SCENARIO_OF_EACH_SETTING.replace("POOL", "train").replace("NOUN", "painting")
+    test = SCENARIO_OF_EACH_SETTING.replace("POOL", "test").replace("NOUN", "film")
+    return head + train + test
 
 
 TASK_PAGE = (DOCS / "add-task.md").read_text()
@@ -130,9 +119,9 @@ class InstalledPackage:
         entries = ""
         for project in (TASK_PROJECT, COLORED_PROJECT):
             for group, points in tomllib.loads(project)["project"]["entry-points"].items():
-                lines = [f"{name} = {place}" for name, place in points.items()]
-                entries += "\n".join([f"[{group}]", *lines, ""])
-        (info / "entry_points.txt").write_text(_merged(entries))
+                ((name, place),) = points.items()
+                entries += f"[{group}]\n{name} = {place}\n"
+        (info / "entry_points.txt").write_text(entries)
 
     def run(self, code: str) -> list:
         """Run a program in a process where the package is installed.
@@ -149,17 +138,6 @@ class InstalledPackage:
         )
         assert not done.returncode, done.stderr
         return json.loads(done.stdout)
-
-
-def _merged(entries: str) -> str:
-    """Return entry points with each group once."""
-    groups: dict[str, list[str]] = {}
-    for line in entries.splitlines():
-        if line.startswith("["):
-            own = groups.setdefault(line, [])
-        else:
-            own.append(line)
-    return "\n".join("\n".join([group, *lines]) for group, lines in groups.items())
 
 
 PROGRAM_HEAD = """
@@ -204,47 +182,32 @@ for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
 
 
 def test_the_setting_of_the_documentation_page_speaks_the_words_of_its_own_file(package):
-    """The page's file has the scenarios "new coat" for training and "loan" for tests."""
+    """The page's file has the scenarios "new coat" for training and "loan" for tests.
+
+    An instruction names the digest of the words.
+    """
     found = package.run(
         EACH_TASK_AND_POOL
         + """
+    assert said.metadata["words"] == words_of(task, pool, "colored")
     found.append(said.metadata["scenario"])
 """
     )
     assert found == ["new coat", "loan", "new coat", "loan"]
 
 
-def test_what_the_setting_of_the_documentation_page_says_means_the_goal(package):
+def test_the_setting_of_the_documentation_page_means_the_goal_and_states_it_when_resolved(package):
+    """The resolved form has the same introduction, and then the explicit command."""
     found = package.run(
         EACH_TASK_AND_POOL
         + """
     found.append(understood_goals(said, episode) == (episode.goal,))
-"""
-    )
-    assert found == [True, True, True, True]
-
-
-def test_the_setting_of_the_documentation_page_states_the_explicit_command_when_resolved(package):
-    """Its introduction stays."""
-    found = package.run(
-        EACH_TASK_AND_POOL
-        + """
     resolved = instruct_with(episode, replace(options, form="resolved"))
     explicit = instruct_with(episode, replace(options, setting="explicit"))
     found.append(resolved.turns == (said.turns[0], explicit.text))
 """
     )
-    assert found == [True, True, True, True]
-
-
-def test_instructions_of_an_installed_setting_name_the_digest_of_its_words(package):
-    found = package.run(
-        EACH_TASK_AND_POOL
-        + """
-    found.append(said.metadata["words"] == words_of(task, pool, "colored"))
-"""
-    )
-    assert found == [True, True, True, True]
+    assert found == [True] * 8
 
 
 def test_the_words_of_the_setting_of_the_documentation_page_break_no_rule(package):

@@ -282,24 +282,17 @@ def spots_with_fitting_things(task):
 
 
 @each_task_with_places
-def test_a_spot_such_as_on_the_left_is_true_of_its_object(task):
+def test_a_spot_such_as_on_the_left_is_true_of_one_object_only(task):
+    """Others may be *on the left*, too, if *on the far left* is said of one that stands at least
+    6 cm, twice the margin, from them."""
     for spot, thing, fitting in spots_with_fitting_things(task):
         assert thing in fitting, spot
-
-
-@each_task_with_places
-def test_a_spot_such_as_on_the_left_is_true_of_one_object_only(task):
-    """Other things may be *on the left*, too, if *on the far left* is said of one that stands at
-    least 6 cm, twice the margin, from them."""
-    for spot, thing, fitting in spots_with_fitting_things(task):
-        others = [other for other in fitting if other is not thing]
-        if "far" in spot or "all the way" in spot:
-            others = [
-                other
-                for other in others
-                if math.dist(thing.position[:2], other.position[:2]) < 2 * MARGIN
-            ]
-        assert not others, spot
+        fitting.remove(thing)
+        leads_others = "far" in spot or "all the way" in spot
+        for other in fitting:
+            distance = math.dist(thing.position[:2], other.position[:2])
+            assert leads_others, spot
+            assert distance >= 2 * MARGIN, spot
 
 
 def places_of_goal_objects(task):
@@ -366,6 +359,10 @@ def test_an_object_with_unusual_words_only_is_still_named_by_the_spatial_setting
     assert said.metadata["landmark_classes"] == [PlaceClass.UNUSUAL]
 
 
+ROW_OF_FIVE = containers([(0.0, -0.16), (0.0, -0.08), (0.0, 0.0), (0.0, 0.08), (0.0, 0.16)])
+"""container_0 stands on the robot's right, container_4 on its left, as far away."""
+
+
 @pytest.mark.parametrize(
     ("name", "phrase"),
     [
@@ -376,18 +373,15 @@ def test_an_object_with_unusual_words_only_is_still_named_by_the_spatial_setting
 )
 def test_everyday_words_for_a_row_of_five(name, phrase):
     """container_0 stands on the robot's right, container_4 on its left."""
-    row = containers([(0.0, -0.16), (0.0, -0.08), (0.0, 0.0), (0.0, 0.08), (0.0, 0.16)])
-    assert phrase in phrases_after_a_noun(row, name)
+    assert phrase in phrases_after_a_noun(ROW_OF_FIVE, name)
 
 
 def test_the_last_of_a_row_is_on_the_far_right():
-    row = containers([(0.0, -0.16), (0.0, -0.08), (0.0, 0.0), (0.0, 0.08), (0.0, 0.16)])
-    assert things_by_spot(row)["on the far right"].name == "container_0"
+    assert things_by_spot(ROW_OF_FIVE)["on the far right"].name == "container_0"
 
 
 def test_the_camera_sees_the_robot_s_leftmost_thing_on_the_right_of_the_picture():
-    row = containers([(0.0, -0.16), (0.0, -0.08), (0.0, 0.0), (0.0, 0.08), (0.0, 0.16)])
-    phrases = phrases_after_a_noun(row, "container_4", frame="camera")
+    phrases = phrases_after_a_noun(ROW_OF_FIVE, "container_4", frame="camera")
     assert phrases == {"all the way on the right of the picture"}
 
 

@@ -9,12 +9,11 @@ import itertools
 from collections import Counter
 
 import pytest
-from language_variants import TASKS, first_episodes
+from language_variants import TASKS, first_episodes, said_where_possible
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language import instruct, instruct_with
-from roboirg.language.generator import find_refusal
+from roboirg.language import instruct
 from roboirg.language.settings import settings_of
 from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.shortcuts.command_chance import blind_goals, right_share
@@ -25,23 +24,9 @@ each_task = pytest.mark.parametrize("task", TASKS)
 
 
 def instructions_with_a_rival(task, split="test", count=12):
-    """Yield the first episodes of a split that can have a rival, each with its instruction."""
-    options = InstructionOptions("direct-rival")
-    for episode in first_episodes(task, split, count):
-        if find_refusal(episode, options) is None:
-            yield episode, instruct_with(episode, options)
-
-
-def test_the_metadata_of_an_instruction_say_which_value_is_the_rival():
-    """The number four is meant, for *Nora isn't in charge*: it is not the latter."""
-    said = instruct(get_episode("PickXtimes", "test", 3), "direct-rival")
-
-    assert said.turns[0] == "Leo says four times is enough, and Nora says five times."
-    assert said.metadata["candidates"] == {"repeats": [4, 5]}
-    assert said.metadata["rival_slot"] == "repeats"
-    assert said.metadata["rival"] == 5
-    assert said.metadata["rival_position"] == "second"
-    assert said.metadata["rival_reference"] == "not_latter"
+    """Return the first episodes of a split that can have a rival, each with its instruction."""
+    episodes = first_episodes(task, split, count)
+    return said_where_possible(episodes, InstructionOptions("direct-rival"))
 
 
 def values_of(goal, slot):

@@ -9,6 +9,8 @@ from roboirg.language.settings import settings_of
 from roboirg.tasks import all_tasks, every_task
 from roboirg.tasks.splits.splits import get_episode
 
+each_task = pytest.mark.parametrize("task", every_task())
+
 
 def test_tasks_and_settings_give_the_51_pairs_of_the_paper():
     """Each of the 11 tasks has four settings; 7 tasks have places to name, and also *spatial*."""
@@ -25,13 +27,13 @@ def options_by_setting(task):
     return Counter(option.setting for option in options)
 
 
-@pytest.mark.parametrize("task", every_task())
+@each_task
 def test_no_combination_of_language_options_is_offered_twice(task):
     options = list(variants.expressible_options(get_episode(task, "test", 0)))
     assert len(set(options)) == len(options)
 
 
-@pytest.mark.parametrize("task", every_task())
+@each_task
 def test_a_task_offers_every_combination_of_language_options(task):
     """In two forms each: three settings; eight kinds of contextual dialogues, by stages and kind
     of distractor; spatial in two frames, where the task has it."""
@@ -44,7 +46,7 @@ def test_a_task_offers_every_combination_of_language_options(task):
     assert {setting: found[setting] for setting in expected} == expected
 
 
-@pytest.mark.parametrize("task", every_task())
+@each_task
 def test_the_two_harder_settings_are_offered_in_both_forms_or_not_at_all(task):
     """A scene may lack a second value, or anything to see that singles one out."""
     found = options_by_setting(task)

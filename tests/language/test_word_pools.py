@@ -11,6 +11,8 @@ from roboirg.core.word_pools import pool_of
 from roboirg.language import expressible, instruct, plain_settings
 from roboirg.tasks.splits.splits import get_episode
 
+each_pool = pytest.mark.parametrize("pool", ["train", "test"])
+
 
 def test_val_episodes_use_the_words_of_training_and_test_episodes_their_own():
     """Policies never see the words of the pool "test" in training."""
@@ -34,7 +36,7 @@ def test_choosing_a_pool_gives_the_words_of_a_split_that_uses_it(setting, pool, 
         assert said.metadata == {**of_split.metadata, "wordings": pool}
 
 
-@pytest.mark.parametrize("pool", ["train", "test"])
+@each_pool
 def test_the_metadata_of_an_instruction_name_the_chosen_pool(pool):
     """ "own" tells that its command is ours, and no whole sentence of a user's file."""
     said = instruct(get_episode("StopCube", "test", 0), wordings=pool)
@@ -44,7 +46,7 @@ def test_the_metadata_of_an_instruction_name_the_chosen_pool(pool):
     assert said.metadata["command"] == "own"
 
 
-@pytest.mark.parametrize("pool", ["train", "test"])
+@each_pool
 def test_the_command_show_accepts_a_pool_of_wordings(pool):
     said = instruct(get_episode("StopCube", "test", 0), wordings=pool)
 
@@ -53,7 +55,7 @@ def test_the_command_show_accepts_a_pool_of_wordings(pool):
     assert said.text in words(printed)
 
 
-@pytest.mark.parametrize("pool", ["train", "test"])
+@each_pool
 def test_the_command_run_accepts_a_pool_of_wordings(pool, tmp_path):
     printed = call(
         "run", "--policy", "random", "--tasks", "StopCube", "--settings", "direct",

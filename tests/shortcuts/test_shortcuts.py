@@ -48,6 +48,7 @@ from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 
 COLORS = ("blue", "green", "red")
+each_task = pytest.mark.parametrize("task", TASKS)
 
 
 @pytest.mark.parametrize(
@@ -257,7 +258,7 @@ def test_a_misspelled_rule_is_refused_with_the_right_name():
         guess_goal("first-mentoin", "Take it.", "PickXtimes")
 
 
-@pytest.mark.parametrize("task", TASKS)
+@each_task
 def test_every_goal_of_the_test_split_can_be_guessed(task):
     """Its values are in the vocabulary from which rules guess, and are not more than it allows."""
     vocabulary = goal_vocabulary(task)
@@ -285,7 +286,7 @@ def test_a_rule_is_scored_on_the_slots_of_the_goal_that_the_words_hide(task, set
             assert all(0 <= share <= 1 for share in (*score.slots.values(), score.goal))
 
 
-@pytest.mark.parametrize("task", TASKS)
+@each_task
 def test_every_rule_is_right_if_the_words_hide_nothing(task):
     for told in instructions_of(task, "explicit"):
         for rule in SURFACE_RULES:
@@ -293,7 +294,7 @@ def test_every_rule_is_right_if_the_words_hide_nothing(task):
 
 
 @pytest.mark.parametrize("setting", ["direct", "contextual"])
-@pytest.mark.parametrize("task", TASKS)
+@each_task
 def test_elimination_is_right_if_the_command_names_every_value(task, setting):
     """As it does in the form *resolved*."""
     for episode, said in instructions_of(task, setting):
