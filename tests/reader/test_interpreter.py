@@ -180,5 +180,5 @@ def test_the_documentation_quotes_eight_complaints_or_more():
 def test_the_verb_that_the_documentation_teaches_is_unknown_before():
     """The page shows how a package teaches the interpreter the verb *hoist*."""
     page = DOCUMENTATION.with_name("teach-words.md").read_text()
-    (command,) = re.findall(r'"(Hoist .*)", \("red", 2\)', page)
+    (command,) = re.findall(r'"(Hoist .*)", "red 2"', page)
     assert interpret(command, PICK_SCENE, "PickXtimes").unknown_words == ("hoist",)
