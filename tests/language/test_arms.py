@@ -25,6 +25,7 @@ each_setting = pytest.mark.parametrize("setting", ["explicit", "contextual", "re
 
 @each_task
 def test_other_goals_are_possible_in_the_scene_and_differ_from_the_episode_s_goal(task):
+    """A control run asks for one of them instead of the goal of the episode."""
     for episode in first_episodes(task, "test", 50):
         possible = set(get_task(task).goals(episode.scene))
         assert set(other_goals(episode)) <= possible - {episode.goal}, episode.key
@@ -74,6 +75,7 @@ def test_the_wrong_goal_of_a_control_run_is_drawn_evenly_over_600_seeds():
 
 
 def test_the_wrong_goal_of_an_episode_is_the_same_in_every_draw():
+    """Otherwise a run that is resumed would play another control."""
     episode = get_episode("StopCube", "test", 0)
     assert draw_other_goal(episode) == draw_other_goal(episode)
 
@@ -88,6 +90,7 @@ def test_a_scene_with_one_goal_has_no_command_for_a_wrong_one():
 
 
 def test_a_scene_with_one_goal_still_has_a_silent_control():
+    """It needs no other goal, since it states none."""
     episode = get_episode("VideoRepick", "test", 0)
 
     said = say_arm(episode, InstructionOptions(), "silent")
@@ -128,6 +131,8 @@ def test_the_words_of_a_control_run_mean_its_goal_and_no_other(task):
 
 @each_task
 def test_the_control_with_another_goal_keeps_the_scene_and_the_original_episode(task):
+    """`said.episode` is what is played and judged, `said.original` the episode as it is
+    published."""
     for episode, _, said in controls_said(task, "other-goal"):
         assert said.episode.goal != episode.goal
         assert said.episode.scene == episode.scene
@@ -146,6 +151,7 @@ def test_paraphrases_keep_the_episode_and_use_new_words_of_the_same_pool(task):
 
 @each_task
 def test_two_paraphrases_of_an_episode_differ(task):
+    """A paraphrase is another text for the same goal."""
     for episode, _, second in controls_said(task, "paraphrase-2"):
         options = InstructionOptions(second.instruction.setting)
         first = say_arm(episode, options, "paraphrase-1")
@@ -166,6 +172,7 @@ def test_the_controls_told_and_again_say_the_usual_instruction(arm, setting):
 )
 @each_setting
 def test_silent_controls_state_no_goal(setting, arm, text):
+    """*Silent* says a sentence without a goal, *silent-empty* nothing at all."""
     said = say_arm(EPISODE, InstructionOptions(setting), arm)
 
     assert said.instruction.turns == (text,)
@@ -194,6 +201,7 @@ def test_a_scrambled_control_keeps_the_number_of_utterances_but_no_mention(setti
 
 
 def test_a_scrambled_control_has_the_same_order_in_every_call():
+    """The order is drawn from the seed of the episode and the text."""
     options = InstructionOptions("contextual")
     assert say_arm(EPISODE, options, "scrambled") == say_arm(EPISODE, options, "scrambled")
 

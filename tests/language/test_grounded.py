@@ -45,6 +45,7 @@ def test_a_grounded_instruction_describes_the_cube_instead_of_naming_its_color()
 
 @each_task
 def test_every_grounded_instruction_hides_at_least_one_value(task):
+    """Otherwise it could be followed without looking."""
     for _, said in grounded_instructions(task):
         assert said.metadata["touched"], said.text
         assert said.metadata["hidden_slots"] >= 1, said.text
@@ -63,6 +64,7 @@ def test_only_values_that_must_be_seen_are_replaced_by_pointers(task):
 
 
 def test_an_exported_grounded_instruction_lists_its_hidden_slots():
+    """In the column `touched`, separated by commas if there are several."""
     episode = get_episode("PickXtimes", "test", 2)
     assert row(episode, instruct(episode, "grounded"))["touched"] == "color"
 
@@ -141,5 +143,6 @@ def test_the_color_is_hidden_only_in_scenes_with_several_colors(task):
 
 
 def test_grounded_videorepick_hides_the_number_of_repetitions():
+    """*As often as the cubes switched places*: the number is seen in the video."""
     for _, said in grounded_instructions("VideoRepick"):
         assert said.metadata["touched"] == ["repeats"]

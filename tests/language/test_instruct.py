@@ -32,6 +32,7 @@ def test_every_task_offers_the_four_settings_of_the_paper_and_some_tasks_spatial
 
 
 def test_two_harder_settings_are_made_from_the_setting_direct():
+    """`plain` names the setting that is compared with the harder one."""
     harder = {
         setting.name: setting.plain
         for setting in all_settings().values()
@@ -57,6 +58,7 @@ def test_the_instruction_of_a_task_has_the_setting_that_was_asked_for(task, sett
     ids=["setting", "form", "kind of distractor", "frame of reference"],
 )
 def test_a_misspelled_option_is_refused_with_the_nearest_valid_name(arguments, options, nearest):
+    """`instruct(episode, "directt")` asks: *Did you mean 'direct'?*"""
     with pytest.raises(UnknownNameError, match=f"Did you mean '{nearest}'"):
         instruct(EPISODE, *arguments, **options)
 
@@ -73,6 +75,7 @@ def test_stages_of_a_dialogue_that_do_not_make_one_are_refused(stages):
 
 @pytest.mark.parametrize("number", [0, True])
 def test_a_number_of_distractors_must_be_a_whole_number_from_1(number):
+    """Python takes True for the number 1; as an option it is a mistake."""
     with pytest.raises(InvalidValueError, match="distractors"):
         instruct(EPISODE, "contextual", distractors=number)
 

@@ -127,11 +127,14 @@ def test_a_lead_of_exactly_the_margin_is_enough_for_a_superlative(lead, expected
     ],
 )
 def test_every_superlative_applies_to_a_single_cube(phrase):
+    """The only cube leads all others in every direction."""
     scene = cubes((0.0, 0.0))
     assert name_called(scene, phrase, "cube") == "cube_red"
 
 
 def test_of_two_objects_equally_far_to_the_left_none_is_the_leftmost():
+    """container_0 and container_1 stand equally far to the left, container_2 to the right of
+    them."""
     scene = containers((0.0, 0.1), (0.1, 0.1), (0.05, -0.1))
 
     assert name_called(scene, "farthest to your left") is None
@@ -156,6 +159,7 @@ def test_objects_in_a_row_are_counted_from_either_side(phrase, expected):
 
 @pytest.mark.parametrize("phrase", ["fourth from your left", "fourth from your right"])
 def test_the_middle_one_of_seven_is_the_fourth_from_either_side(phrase):
+    """Seven containers stand in a row, from the robot's right to its left."""
     row = containers(
         (0.0, -0.15), (0.0, -0.1), (0.0, -0.05), (0.0, 0.0), (0.0, 0.05), (0.0, 0.1), (0.0, 0.15)
     )
@@ -274,6 +278,7 @@ def test_a_cube_that_arrives_later_is_not_compared_with_the_others():
 
 
 def test_a_cube_that_arrives_later_has_no_words_for_its_place():
+    """The motion `Away` keeps the red cube off the table for the first 50 steps."""
     scene = cubes((0.0, 0.15), (0.0, -0.15), (0.1, 0.0))
     late = Scene(scene.objects, motions=(Away("cube_red", 0, 50),))
 
@@ -292,6 +297,7 @@ def test_containers_that_appear_during_the_video_can_be_named_by_place(phrase):
 
 
 def test_cubes_can_be_named_by_their_distance_to_the_bin():
+    """The red cube stands 10 cm from the bin, the green one 30 cm."""
     scene = Scene(
         (
             SceneObject("bin", "bin", Point(-0.2, 0.0, 0.0)),

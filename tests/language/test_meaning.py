@@ -58,17 +58,20 @@ THREE_CUBES = get_episode("PickXtimes", "test", 3)
     ],
 )  # fmt: skip
 def test_each_operation_on_numbers_leads_to_four_repetitions(repeats):
+    """The words say *the blue cube*, and a number in one of seven ways; `ids` say them in words."""
     words = Meaning({"color": Term("same", ("blue",)), "repeats": repeats})
     assert meaning.meant_goals(words, THREE_CUBES) == (Goal.of(color="blue", repeats=4),)
 
 
 def test_neither_red_nor_green_means_the_blue_cube():
+    """The operation "without" leaves the colors of the scene that were not named."""
     color = Term("without", ("red", "green"))
     words = Meaning({"color": color, "repeats": Term("same", (4,))})
     assert meaning.meant_goals(words, THREE_CUBES) == (Goal.of(color="blue", repeats=4),)
 
 
 def test_a_place_that_selects_no_object_means_no_goal():
+    """Words that the scene does not bear out must not be guessed at."""
     color = Term("same", (Described("no such place", "place", "robot"),))
     words = Meaning({"color": color, "repeats": Term("same", (1,))})
     assert meaning.meant_goals(words, ONE_CUBE) == ()
@@ -146,6 +149,7 @@ def test_an_implicit_command_needs_its_introduction_unless_the_scene_has_one_cho
 
 
 def test_where_two_values_are_offered_no_singular_gives_the_number_one_away(published):
+    """After *once or twice*, *for that time* would tell that once is meant."""
     for _, options, said in published:
         if options.setting == "direct-rival" and options.form == "implicit":
             assert not any(said.meaning.agrees.values()), said.text
@@ -202,6 +206,7 @@ def test_changing_one_value_of_an_introduction_changes_the_goal_that_is_meant(ta
 
 @pytest.mark.parametrize("setting", ["direct", "spatial", "contextual", "reasoning"])
 def test_a_command_that_points_at_values_nobody_introduced_means_no_goal(setting):
+    """*Grab it* means nothing if no cube was mentioned: the terms lose what they refer to."""
     said = instruct(ONE_CUBE, setting)
     unsaid = {field: term._replace(operands=()) for field, term in said.meaning.terms.items()}
     assert meaning.meant_goals(Meaning(unsaid), ONE_CUBE) == ()
@@ -214,6 +219,7 @@ def test_a_silent_command_leaves_all_goals_open():
 
 
 def test_scrambled_words_mean_no_goal():
+    """Words in random order have no declared meaning."""
     said = say_arm(ONE_CUBE, InstructionOptions("direct"), "scrambled").instruction
 
     assert said.meaning is None
@@ -274,6 +280,7 @@ def test_amounts_of_two_colors_mean_the_same_goal_in_either_order():
 
 
 def test_a_command_that_states_no_amount_leaves_every_goal_open():
+    """*Put them into the bin* fits any number of cubes of any colors."""
     episode = get_episode("BinFill", "test", 3)
     assert meaning.command_goals(one_blue_and_three_reds(), episode) == goals_of(episode)
 

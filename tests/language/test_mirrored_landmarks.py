@@ -45,6 +45,7 @@ def test_the_mirrored_object_of_the_cube_on_the_far_left_is_the_one_on_the_far_r
 
 
 def test_a_place_without_left_or_right_has_no_mirrored_object():
+    """Who takes left for right still finds the cube that is farthest from the button."""
     episode = get_episode("PickXtimes", "test", 7)
     said = instruct(episode, "spatial")
 
@@ -53,6 +54,7 @@ def test_a_place_without_left_or_right_has_no_mirrored_object():
 
 
 def test_an_instruction_without_a_place_has_no_mirrored_object():
+    """The setting *direct* names no place."""
     episode = get_episode("PickXtimes", "test", 2)
     assert mirrored_objects(episode, instruct(episode, "direct")) == {}
 
@@ -82,6 +84,7 @@ def mirrored_places(task, frame):
 @each_frame
 @each_task_with_places
 def test_the_mirrored_object_is_the_one_selected_by_the_words_with_sides_exchanged(task, frame):
+    """If *second from the left* was said, it is what *second from the right* selects."""
     found = list(mirrored_places(task, frame))
 
     assert found
@@ -104,6 +107,7 @@ def test_a_place_has_one_mirrored_object_or_in_binfill_all_cubes_of_its_color(ta
 @each_frame
 @each_task_with_places
 def test_a_mirrored_object_is_never_a_right_one(task, frame):
+    """Otherwise picking it up would not show that left was taken for right."""
     for index in range(24):
         episode = get_episode(task, "test", index)
 

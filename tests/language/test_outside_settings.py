@@ -80,6 +80,7 @@ def printed(*tables):
 
 
 def test_a_registered_setting_is_listed_last(register):
+    """DUMMY has the order 9, and ours have lower ones."""
     register(DUMMY)
     assert setting_names()[-1] == "dummy"
 
@@ -92,12 +93,14 @@ def test_a_registered_setting_is_one_of_the_tasks_it_applies_to(register):
 
 
 def test_a_task_that_a_registered_setting_does_not_apply_to_refuses_it(register):
+    """VideoUnmask is not in the suite *counting*, for which DUMMY is."""
     register(DUMMY)
     with pytest.raises(InvalidValueError, match="has no dummy setting"):
         instruct(get_episode("VideoUnmask", "test", 0), "dummy")
 
 
 def test_a_scene_that_a_registered_setting_refuses_cannot_be_expressed_in_it(register):
+    """DUMMY refuses easy scenes."""
     register(DUMMY)
 
     assert "dummy" in expressible(HARD_EPISODE)
@@ -106,6 +109,7 @@ def test_a_scene_that_a_registered_setting_refuses_cannot_be_expressed_in_it(reg
 
 
 def test_the_reason_why_a_setting_refuses_a_scene_is_in_the_error(register):
+    """DUMMY refuses easy scenes."""
     register(DUMMY)
     complaint = "dummy setting cannot express .*the scene is too easy"
     with pytest.raises(InvalidValueError, match=complaint):
@@ -113,6 +117,7 @@ def test_the_reason_why_a_setting_refuses_a_scene_is_in_the_error(register):
 
 
 def test_the_reason_why_a_setting_refuses_a_scene_is_in_the_table_of_instructions(register):
+    """The table is that of `roboirg show --words`."""
     register(DUMMY)
     table = instructions_table(EASY_EPISODE, ["dummy"], InstructionOptions())
     assert "the scene is too easy" in printed(table)
@@ -122,6 +127,7 @@ def test_the_reason_why_a_setting_refuses_a_scene_is_in_the_table_of_instruction
 def test_a_plan_leaves_out_the_episodes_that_a_registered_setting_refuses(
     register, index, is_planned
 ):
+    """Episode 0 is easy, episode 3 hard; DUMMY refuses easy ones."""
     register(DUMMY)
     plan = make_plan(["listener"], tasks="PickXtimes", settings="all", episodes="0,3")
     assert ("dummy" in plan.settings_of("PickXtimes", index)) == is_planned
@@ -193,6 +199,7 @@ def add_copy(register, tmp_path):
 
 @EACH_SETTING_WITH_SCENARIOS
 def test_a_setting_modeled_on_ours_speaks_the_scenarios_of_its_own_file(name, add_copy):
+    """What it says means the goal, and is of a scenario for tests, since the episode is one."""
     add_copy(name)
     episode = get_episode("PickXtimes", "test", 6)
     scenarios = setting_scenarios(f"lab-{name}")["PickXtimes"].scenarios
@@ -214,6 +221,8 @@ def test_a_resolved_command_of_a_copied_setting_names_the_color(name, add_copy):
 
 @pytest.mark.parametrize("name", ["explicit", "contextual"])
 def test_copies_of_the_settings_explicit_and_contextual_give_the_same_commands(name, register):
+    """They need no scenarios of their own: *explicit* has none, *contextual* uses those of
+    *direct*."""
     register(dataclasses.replace(all_settings()[name], name=f"my-{name}"))
     assert instruct(HARD_EPISODE, f"my-{name}").turns == instruct(HARD_EPISODE, name).turns
 
@@ -256,6 +265,7 @@ def add_lab(register, tmp_path):
 
 
 def test_a_setting_s_own_file_gives_it_introduction_command_and_phrase_for_a_value(add_lab):
+    """All three are in LAB_FILE; our words would be *Grab the blue cube …*"""
     add_lab(LAB_FILE)
 
     said = instruct(HARD_EPISODE, "lab")
@@ -287,6 +297,7 @@ def test_words_of_a_user_file_win_over_those_of_a_setting(add_lab, mine, introdu
 
 
 def test_other_settings_do_not_use_a_setting_s_own_file(add_lab):
+    """Neither with our words nor with those of a user's file."""
     add_lab(LAB_FILE)
     wordings = register_wordings(parse_wordings(MY_FILE_HEAD + MY_COMMAND, "mine.toml"))
 

@@ -240,6 +240,8 @@ for task, pool, setting in itertools.product(all_tasks(), POOLS, all_settings())
 
 
 def test_the_language_label_names_an_installed_setting_after_the_words_of_its_task(package):
+    """A label has the version, the words of the task, and those of a setting with a file of
+    its own."""
     (label,) = package.run("""
 found.append(language_label(["PickXtimes"], "test", ["direct", "colored"]))
 """)
@@ -293,6 +295,7 @@ for split, index, setting in itertools.product(("train", "test"), range(12), set
 
 
 def test_a_task_of_another_package_can_be_commanded_in_every_setting(complete_package):
+    """In the words of training and of tests."""
     found = complete_package.run(
         EACH_INSTRUCTION
         + """
@@ -319,6 +322,7 @@ for report in check_scenarios(words, None, scenes_of("PlaceAndPress", 0)[::10]):
 
 
 def test_the_words_of_a_task_of_another_package_mean_the_goal_in_both_forms(complete_package):
+    """Collects the texts that mean another goal, or several."""
     wrong = complete_package.run(
         EACH_INSTRUCTION
         + """
@@ -332,6 +336,7 @@ def test_the_words_of_a_task_of_another_package_mean_the_goal_in_both_forms(comp
 
 
 def test_a_resolved_command_of_another_package_s_task_names_the_color(complete_package):
+    """Collects the commands of two settings that do not."""
     wrong = complete_package.run(
         EACH_INSTRUCTION
         + """

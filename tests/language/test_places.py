@@ -129,6 +129,7 @@ def test_each_phrase_selects_the_object_it_was_made_for(task):
 
 @each_task
 def test_everyday_phrases_have_at_most_twelve_words(task):
+    """Longer ones are no words that people say."""
     kind = get_task(task).things.pointed
     for scene, frame in itertools.product(scenes_of(task), FRAMES):
         for words, _ in words_with_things(everyday_places(scene, kind, frame)):
@@ -184,6 +185,7 @@ def test_near_and_far_are_not_said_where_depth_and_distance_from_the_robot_disag
     ("frame", "phrase"), [("robot", "closest to you"), ("camera", "closest to the robot")]
 )
 def test_closest_is_said_where_depth_and_distance_from_the_robot_agree(frame, phrase):
+    """container_0 is the nearer one by both measures."""
     scene = containers([(-0.2, 0.0), (-0.14, 0.25)])
     assert names_by_phrase(scene, frame=frame)[phrase] == "container_0"
 
@@ -197,6 +199,8 @@ def distance_to_robot(item):
 )
 @each_task_with_places
 def test_closest_to_you_is_closest_both_in_depth_and_by_distance(task, measure):
+    """The same holds for *second closest*, *in the front* and *in the back*: `ranks` counts
+    from the near end."""
     ranks = {
         "closest to you": 0,
         "all the way in the front": 0,
@@ -344,6 +348,7 @@ UNUSUAL_EPISODES = pytest.mark.parametrize(
 
 @UNUSUAL_EPISODES
 def test_an_object_with_unusual_words_only_is_refused_by_the_grounded_setting(task, index, words):
+    """The setting says only words that people would say."""
     episode = get_episode(task, "test", index)
     refusal = find_refusal(episode, InstructionOptions("grounded"))
     assert refusal == "nothing to see in this scene singles out a slot's value"
@@ -353,6 +358,7 @@ def test_an_object_with_unusual_words_only_is_refused_by_the_grounded_setting(ta
 def test_an_object_with_unusual_words_only_is_still_named_by_the_spatial_setting(
     task, index, words
 ):
+    """It has to name a place, so it takes unusual words where there are no others."""
     said = instruct(get_episode(task, "test", index), "spatial")
 
     assert words in said.text
@@ -377,6 +383,7 @@ def test_everyday_words_for_a_row_of_five(name, phrase):
 
 
 def test_the_last_of_a_row_is_on_the_far_right():
+    """A spot, for where something happens: *There's a stain on the far right.*"""
     assert things_by_spot(ROW_OF_FIVE)["on the far right"].name == "container_0"
 
 
@@ -390,6 +397,7 @@ def test_the_camera_sees_the_robot_s_leftmost_thing_on_the_right_of_the_picture(
     [("container_2", "in the back left corner"), ("container_1", "at the front right")],
 )
 def test_everyday_words_for_the_corners_of_a_square(name, phrase):
+    """container_2 stands in the back on the left, container_1 in the front on the right."""
     square = containers([(-0.15, 0.15), (-0.15, -0.15), (0.15, 0.15), (0.15, -0.15)])
     assert phrase in phrases_after_a_noun(square, name)
 
@@ -410,6 +418,7 @@ def test_everyday_words_for_things_near_a_button_or_a_target(name, phrase):
 
 
 def test_something_happens_right_by_the_button_if_a_thing_is_next_to_it():
+    """container_1 stands 9 cm to the left of the button."""
     scene = containers([(-0.05, -0.03), (-0.19, 0.09), (0.1, -0.2)], BUTTON, TARGET)
     assert things_by_spot(scene)["right by the button"].name == "container_1"
 

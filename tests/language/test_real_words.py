@@ -57,6 +57,7 @@ def test_two_boxes_or_tapes_are_told_apart_by_left_and_right_if_these_are_clear(
 
 @pytest.mark.parametrize("kind", ["box", "tape"])
 def test_left_and_right_of_two_boxes_or_tapes_depend_on_the_frame(kind):
+    """`is_sided` says that the words name left or right, so that the point of view matters."""
     left = SceneObject("left", kind, Point(0.0, 0.15, 0.03))
     right = SceneObject("right", kind, Point(0.0, -0.15, 0.03))
     for selector in selectors(Scene((left, right)), kind, "camera"):
@@ -81,5 +82,6 @@ def test_remarks_about_another_color_name_colors_of_the_scene_other_than_the_goa
 
 
 def test_pick_up_it_becomes_pick_it_up():
+    """A pronoun stands between a verb and its particle."""
     said = swap_particles((*plain("Pick up "), *anaphor("it", "it", "color", "green")))
     assert "".join(piece.text for piece in said) == "Pick it up"

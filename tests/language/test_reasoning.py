@@ -120,7 +120,10 @@ def test_a_relation_between_numbers_is_used_only_if_it_leaves_two_numbers_open()
 
 
 def test_a_relation_of_two_numbers_at_once_has_two_numbers_to_count_from():
-    """The goal is one and three: one fewer than two and four."""
+    """The goal is one and three: *one fewer than two and four*, *half of two and six*.
+
+    The second argument has all amounts that are possible in the scene. *Twice* would need a half.
+    """
     found = deductions([1, 3], [(1, 3), (2, 2), (1, 1), (3, 1)])
 
     assert [(relation.name, references) for relation, references in found] == [

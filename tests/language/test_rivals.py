@@ -72,6 +72,7 @@ def test_a_rival_value_is_that_of_another_goal_of_the_scene(task):
 
 
 def test_only_the_settings_direct_rival_and_grounded_note_a_rival_value():
+    """All other settings introduce one value, or none."""
     for task in TASKS:
         episode = get_episode(task, "test", 3)
         for setting in set(settings_of(get_task(task))) - {"direct-rival", "grounded"}:
@@ -90,6 +91,7 @@ def test_a_goal_with_several_counts_is_refused_by_the_rival_setting():
 @pytest.mark.parametrize("first", [0, 4])
 @pytest.mark.parametrize("task", ["StopCube", "VideoRepick"])
 def test_four_episodes_in_a_row_use_the_four_ways_to_point_at_the_right_value(task, first):
+    """So that each way is equally frequent."""
     used = []
     for index in range(first, first + 4):
         said = instruct(get_episode(task, "test", index), "direct-rival")
@@ -112,6 +114,7 @@ def test_the_first_and_the_second_value_are_right_equally_often():
 
 
 def test_each_way_to_point_at_the_right_value_is_used_in_a_fifth_of_training_or_more():
+    """There are four ways, so a quarter each would be even."""
     found = Counter(said.metadata["rival_reference"] for _, said in training_instructions())
 
     assert found.keys() == {"former", "latter", "not_former", "not_latter"}
@@ -119,6 +122,7 @@ def test_each_way_to_point_at_the_right_value_is_used_in_a_fifth_of_training_or_
 
 
 def test_who_guesses_between_the_two_values_is_right_in_half_of_the_cases():
+    """A few texts leave more than two goals, so that the share may be a little lower."""
     shares = [
         right_share(blind_goals(said, drawn), drawn) for drawn, said in training_instructions()
     ]

@@ -25,10 +25,12 @@ def test_eleven_tasks_have_fingerprints_of_robomme_s_sentences_all_different():
 
 @pytest.mark.parametrize("task", FINGERPRINTS)
 def test_a_task_with_robomme_s_sentences_has_published_goals(task):
+    """RoboMME's evaluation has a sentence for each of them."""
     assert published_goals(task)
 
 
 def test_a_file_that_calls_itself_robomme_with_other_sentences_is_refused():
+    """Its results would look like those of RoboMME's own words."""
     with pytest.raises(InvalidValueError, match="not those of RoboMME's published evaluation"):
         wording_file("robomme")
 

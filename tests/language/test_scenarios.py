@@ -192,7 +192,10 @@ def test_a_pointer_that_the_table_does_not_have_is_refused(text, before, after, 
 
 
 def test_an_unknown_pointer_is_refused_with_the_five_nearest_known_ones():
-    """The table has *two fewer than that*, but not *two times fewer than he did*."""
+    """A pointer, a word that refers back, must be in a table of known ones, pointers.toml.
+
+    It has *two fewer than that*, but not *two times fewer than he did*.
+    """
     unknown = "{step} fewer [step: time|times] than <that reference: {he} did>"
 
     with pytest.raises(InvalidValueError) as found:
@@ -229,6 +232,8 @@ def test_the_documentation_lists_every_pointer_of_the_table():
 
 
 def test_all_mistakes_of_a_scenario_file_are_reported_at_once():
+    """Five mistakes in the first scenario: dev, repeat, colr, them, clue; one in the second:
+    latest."""
     text = """
 tasks = ["PickXtimes"]
 [[scenario]]
@@ -271,6 +276,7 @@ remarks.latest = "Not <latter list.1: the latter>: "
 
 @pytest.mark.parametrize("text", [BIRTHDAY, TWO_CUBES, FEWER], ids=["birthday", "two", "fewer"])
 def test_the_checker_finds_nothing_wrong_with_a_good_scenario(text):
+    """The other tests put a mistake into one of these."""
     assert not report_on(text, every=10).broken
 
 
@@ -317,7 +323,11 @@ def test_the_checker_for_authors_names_the_rule_that_a_scenario_breaks(before, a
 def test_the_checker_finds_pointers_that_stand_for_another_value_or_for_none(
     text, before, after, rule
 ):
-    """*Do the latter* where the former is meant; *each of them* without any; a missing number."""
+    """TWO_CUBES: *Do the latter* where its remark `former` must point at the first of two cubes.
+
+    FEWER: *once for each of them* stands for something that was listed, and nothing was; without
+    the number of photos, *I took two* fits every goal.
+    """
     assert before in text
     broken = report_on(text.replace(before, after), every=10).broken
     assert any(rule in sentence for sentence in broken), list(broken)
@@ -434,6 +444,7 @@ def test_the_report_for_authors_shows_a_competing_remark_of_a_contextual_dialogu
 
 
 def test_the_report_for_authors_shows_no_competing_remark_if_the_setting_has_none():
+    """TWO_CUBES is a scenario of *direct-rival*, which has no such remarks."""
     lines = report_lines(report_on(TWO_CUBES), "PickXtimes")
     assert not any("competing" in line for line in lines)
 
@@ -547,6 +558,8 @@ def some_instructions(request):
 
 
 def test_no_instruction_has_marks_or_doubled_spaces_left(some_instructions):
+    """Marks are `{color}` and `<it color: it>`; doubled are spaces, a space before a comma,
+    full stops."""
     for _, _, said in some_instructions:
         assert not re.search(r"[{}<>|\[\]]|  | [.,]|[.]{2}", said.text), said.text
 
@@ -568,11 +581,13 @@ def test_metadata_of_instructions_are_plain_json_with_the_same_keys(some_instruc
 
 
 def test_only_spatial_instructions_have_a_frame_of_reference(some_instructions):
+    """The frame says whose left and right is meant."""
     for _, options, said in some_instructions:
         assert (said.metadata["frame"] is not None) == (options.setting == "spatial"), said.text
 
 
 def test_an_instruction_is_the_same_when_it_is_asked_for_again(some_instructions):
+    """Would find words that depend on what was said before."""
     for episode, options, said in some_instructions:
         assert instruct_with(episode, options) == said
 
@@ -748,12 +763,15 @@ def test_one_file_of_words_gives_a_task_its_own_phrase_for_a_number():
     ("task", "frames"), [("PickXtimes", ["here"]), ("SwingXtimes", ["here", "there"])]
 )
 def test_a_scenario_that_needs_a_task_is_said_in_that_task_only(task, frames):
+    """The file serves both tasks; its scenario "there" has the line `needs.tasks =
+    ["SwingXtimes"]`."""
     words = read_scenario_file(FILE_FOR_TWO_TASKS, task)
     assert [scenario.fields.frame for scenario in words.scenarios] == frames
 
 
 @pytest.mark.parametrize("task", ["PickXtimes", "SwingXtimes"])
 def test_a_file_without_commands_uses_our_commands_of_each_task(task):
+    """The file has one scenario, the story of a birthday, and no table `[commands]`."""
     text = BIRTHDAY.replace('tasks = ["PickXtimes"]', 'tasks = ["PickXtimes", "SwingXtimes"]')
 
     words = read_scenario_file(text, task)
@@ -890,10 +908,12 @@ def said_with_gym_reps():
 
 
 def test_a_phrase_for_several_repetitions_stands_in_the_command(said_with_gym_reps):
+    """The goal is to pick the cube up twice."""
     assert "put it back once for each rep, then" in said_with_gym_reps[2].command
 
 
 def test_a_phrase_that_is_left_out_for_once_leaves_no_gap_in_the_command(said_with_gym_reps):
+    """*Put it back once for each rep, then …* becomes *put it back, then …*"""
     said = said_with_gym_reps[1].command
     assert re.fullmatch("Pick up .* and put it back, then press the button.", said)
 
@@ -941,6 +961,7 @@ def test_introductions_do_not_mention_containers_that_are_not_there_yet(task):
 
 @pytest.mark.parametrize("task", ["ButtonUnmask", "ButtonUnmaskSwap"])
 def test_commands_for_cubes_that_will_be_covered_say_the_container_over_the_cube(task):
+    """Only the container can be lifted then."""
     for scenario in task_scenarios(task).scenarios:
         for text in scenario.texts["say.colors.0"]:
             assert literal(text).startswith("the container over ")
@@ -956,6 +977,7 @@ def test_a_place_before_containers_move_is_said_to_be_one_at_the_start():
 
 
 def test_words_of_a_task_without_moving_containers_do_not_speak_of_following_one():
+    """In ButtonUnmask containers stay where they come down."""
     moved = r"follow|keep(?:ing)? (?:up|track)|los(?:es?|t|ing) track|shell game"
     for scenario in task_scenarios("ButtonUnmask").scenarios:
         for text in itertools.chain.from_iterable(scenario.texts.values()):
@@ -963,6 +985,7 @@ def test_words_of_a_task_without_moving_containers_do_not_speak_of_following_one
 
 
 def test_the_latter_may_follow_one_cube_named_by_place_and_one_by_color():
+    """*I get the cube in the back, and Mia gets the red cube. Lift … mine, then … Mia's.*"""
     text = """
 tasks = ["ButtonUnmask"]
 [[scenario]]
@@ -982,6 +1005,7 @@ say.colors.1 = ["the one over <latter colors.1: {person.2}'s>"]
 
 
 def test_his_or_hers_may_stand_for_the_color_that_a_person_wants():
+    """*Leo wants the red cube, and Mia wants the blue one. Do his: lift it …*"""
     text = """
 tasks = ["PickXtimes"]
 [[scenario]]
@@ -1059,6 +1083,7 @@ say.relation = ["on <other taken: the other one it used>"]
 
 
 def test_the_other_one_is_refused_if_two_of_three_colors_could_be_meant():
+    """*The green cube is gone. … The other one*: of three colors two are left."""
     text = """
 tasks = ["VideoPlaceButton"]
 [[scenario]]
@@ -1081,7 +1106,10 @@ say.color = ["<other taken: the other one>"]
     ids=["a list of colors, then one by its position", "one for a cube and one for a moment"],
 )
 def test_two_pointers_of_one_scenario_of_ours_are_understood(task, frame):
-    """*It's the second one's turn, so lift the container over it*; *put the one … on that one*."""
+    """*It's the second one's turn, so lift the container over it*; *put the one … on that one*.
+
+    The checker finds scenes that the scenario fits, and in all of them its words mean the goal.
+    """
     report = report_on_ours(task, frame, scenes_of(task, 0)[::10])
     assert report.scenes
     assert not report.broken

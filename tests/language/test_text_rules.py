@@ -181,6 +181,7 @@ def test_a_place_or_color_that_no_longer_tells_which_container_it_is_is_reported
 
 
 def test_a_place_of_containers_that_move_is_right_with_at_the_start():
+    """*At the start, a fly sat on the left. Lift the container there.*"""
     text = MOVING_CONTAINERS.replace("The table wobbles", "At the start, a fly sat")
     broken = report_on(text, "VideoUnmaskSwap", every=3).broken
     assert not [rule for rule in broken if "says" in rule]
@@ -219,6 +220,7 @@ def test_a_name_or_sentence_of_the_other_pool_in_a_user_s_file_is_reported():
 
 
 def test_a_name_or_sentence_of_the_same_pool_is_no_leak():
+    """The same scenario, for tests, as StopCube's is."""
     assert not report_on(IN_BOTH_POOLS.replace('pool = "train"', 'pool = "test"')).broken
 
 
@@ -238,6 +240,7 @@ def test_our_general_remarks_break_no_rule_for_distracting_remarks(pool):
 
 
 def test_no_general_remark_is_used_both_in_training_and_in_tests():
+    """General remarks are said in any story: *Sorry, I was daydreaming.*"""
     remarks = general().distractors
     assert set(remarks["train"]).isdisjoint(remarks["test"])
 

@@ -29,6 +29,7 @@ def options_by_setting(task):
 
 @each_task
 def test_no_combination_of_language_options_is_offered_twice(task):
+    """Options are setting, form, stages, kind of distractor, and frame of reference."""
     options = list(variants.expressible_options(get_episode(task, "test", 0)))
     assert len(set(options)) == len(options)
 

@@ -48,6 +48,7 @@ def test_the_metadata_of_an_instruction_name_the_chosen_pool(pool):
 
 @each_pool
 def test_the_command_show_accepts_a_pool_of_wordings(pool):
+    """It prints the words of the pool for the same episode."""
     said = instruct(get_episode("StopCube", "test", 0), wordings=pool)
 
     printed = call("show", "StopCube", "0", "--words", "--wordings", pool)
@@ -57,6 +58,7 @@ def test_the_command_show_accepts_a_pool_of_wordings(pool):
 
 @each_pool
 def test_the_command_run_accepts_a_pool_of_wordings(pool, tmp_path):
+    """With `--dry-run` it prints what would be played: one episode."""
     printed = call(
         "run", "--policy", "random", "--tasks", "StopCube", "--settings", "direct",
         "--episodes", "1", "--policy-seeds", "0", "--wordings", pool,

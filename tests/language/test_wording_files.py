@@ -117,6 +117,7 @@ def test_a_sentence_of_a_user_s_file_is_said_in_the_explicit_setting_only():
 
 
 def test_other_settings_keep_our_words_if_a_file_has_whole_sentences():
+    """A whole sentence leaves nothing unsaid, so that only *explicit* can use it."""
     identity = identity_of(TWO_SENTENCES)
     episode = episode_with("PickXtimes", color="red", repeats=2)
     for options in options_of(episode):
@@ -143,6 +144,7 @@ def test_metadata_and_exported_rows_name_the_wording_file_and_its_sentence(setti
 
 
 def test_a_whole_sentence_hides_no_value():
+    """It states the goal, so nothing has to be found out."""
     episode = episode_with("PickXtimes", color="red", repeats=2)
     said = instruct(episode, wordings=identity_of(TWO_SENTENCES))
     assert said.metadata["hidden_slots"] == 0
@@ -159,6 +161,7 @@ def test_a_goal_without_a_sentence_in_a_user_s_file_is_refused_in_explicit():
 
 
 def test_a_goal_without_a_sentence_in_a_user_s_file_can_be_said_in_other_settings():
+    """The goal is a green cube; the file has sentences for red and blue ones."""
     episode = episode_with("PickXtimes", color="green", repeats=2)
     assert instruct(episode, "direct", wordings=identity_of(TWO_SENTENCES)).text
 
@@ -174,6 +177,7 @@ text = "go"
 
 
 def test_a_user_s_sentences_can_serve_a_task_that_has_no_words_of_ours(monkeypatch):
+    """`take_words` removes our words of VideoRepick; the file has *go* for two repetitions."""
     take_words(monkeypatch, "VideoRepick")
     identity = identity_of(SENTENCE_FOR_VIDEOREPICK)
     episode = replace(episode_with("VideoRepick"), goal=Goal.of(repeats=2))
@@ -182,6 +186,7 @@ def test_a_user_s_sentences_can_serve_a_task_that_has_no_words_of_ours(monkeypat
 
 
 def test_a_task_without_words_of_ours_can_be_said_by_whole_sentences_only(monkeypatch):
+    """The setting *direct* would need a scenario or a command."""
     take_words(monkeypatch, "VideoRepick")
     identity = identity_of(SENTENCE_FOR_VIDEOREPICK)
 
@@ -238,6 +243,7 @@ def test_the_identity_of_an_open_file_is_its_name_and_a_digest(tmp_path):
 
 
 def test_what_the_example_file_of_the_documentation_says_means_the_goal():
+    """In the settings that its command and scenarios serve, in both forms."""
     identity = identity_of(COMMAND_FILE_OF_THE_PAGE)
     for episode in train_episodes("PickXtimes", 0, 100):
         for setting, form in itertools.product(("explicit", "direct", "contextual"), FORMS):
@@ -287,6 +293,8 @@ def test_goals_without_a_sentence_are_listed_but_are_no_error(tmp_path):
 
 
 def test_at_most_ten_goals_without_a_sentence_are_listed(tmp_path):
+    """The file has two sentences, and PickXtimes fifteen goals: three colors, once to five
+    times."""
     checked = run_check(TWO_SENTENCES, tmp_path, "--seeds", "0")
     (listed,) = re.findall(r"No sentence of 13 goals, such as: (.*)\. Episodes", checked.output)
     assert len(set(listed.split("; "))) == 10
@@ -365,12 +373,15 @@ def test_the_check_reports_scenes_that_no_scenario_of_the_file_fits(tmp_path):
     ids=["no number", "no color", "too long"],
 )
 def test_the_check_reports_a_command_that_does_not_state_the_goal(tmp_path, commands, complaint):
+    """A command of PickXtimes has to say color and number; `stated.all.color` are the words
+    for a color."""
     checked = run_check(f"{HEAD}[commands]\n{commands}\n", tmp_path)
     assert complaint in checked.output
 
 
 @each_pool
 def test_a_user_s_spatial_scenario_replaces_ours_in_the_spatial_setting(pool):
+    """The file has one spatial scenario, "dusty"; where it does not fit, the episode is refused."""
     options = InstructionOptions("spatial", wordings=identity_of(DUSTY))
     said = set()
     for index in range(12):
@@ -382,6 +393,7 @@ def test_a_user_s_spatial_scenario_replaces_ours_in_the_spatial_setting(pool):
 
 @each_pool
 def test_a_user_s_spatial_scenario_leaves_the_other_settings_alone(pool):
+    """They express the same episodes, in the same words."""
     identity = identity_of(DUSTY)
     for index in range(12):
         episode = get_episode("PickXtimes", pool, index)
@@ -395,6 +407,7 @@ def test_a_user_s_spatial_scenario_leaves_the_other_settings_alone(pool):
 
 
 def test_a_scenario_for_training_is_not_said_in_test_episodes():
+    """`pool = "train"` keeps it out of the words of tests."""
     text = DUSTY.replace("setting", 'pool = "train"\nsetting')
     options = InstructionOptions("spatial", wordings=identity_of(text))
 
@@ -404,6 +417,7 @@ def test_a_scenario_for_training_is_not_said_in_test_episodes():
 
 
 def test_a_user_s_phrase_for_the_color_leaves_the_one_for_the_number():
+    """The file has `color = "our {color} cube"`, and nothing else."""
     identity = identity_of(f'{HEAD}[stated.PickXtimes]\ncolor = "our {{color}} cube"\n')
 
     said = instruct(EPISODE, wordings=identity).text
@@ -428,6 +442,7 @@ def digest_of(text):
     ids=["other introduction", "one command more", "for training only", "sentences"],
 )
 def test_the_digest_of_a_wording_file_changes_with_what_is_said(text):
+    """Compared with the file DUSTY, and with our words."""
     ours = words_digest("PickXtimes", "test")
     assert len({ours, digest_of(DUSTY), digest_of(text)}) == 3
 
@@ -443,6 +458,7 @@ def test_the_digest_of_a_wording_file_changes_with_what_is_said(text):
     ids=["comment", "one more task", "task named twice", "task needed twice"],
 )
 def test_the_digest_of_a_wording_file_changes_with_nothing_else(before, after):
+    """Each case replaces `before` by `after` in the file DUSTY."""
     assert digest_of(DUSTY.replace(before, after)) == digest_of(DUSTY)
 
 
@@ -459,6 +475,7 @@ def test_an_instruction_names_the_digest_of_the_words_of_its_wording_file():
 
 
 def test_a_task_that_the_wording_file_lacks_is_refused_with_the_option_to_use():
+    """The file serves PickXtimes."""
     identity = identity_of(DUSTY)
     lacking = f"^The wording file {identity} has no words of StopCube; name .*: --tasks PickXtimes"
     with pytest.raises(InvalidValueError, match=lacking):
@@ -466,6 +483,7 @@ def test_a_task_that_the_wording_file_lacks_is_refused_with_the_option_to_use():
 
 
 def test_wordings_that_were_never_opened_are_refused():
+    """An identity alone does not have the words."""
     with pytest.raises(InvalidValueError, match="are not open"):
         instruct(EPISODE, wordings="gone@00000000")
 
@@ -492,6 +510,7 @@ when = { colors = ["red"], counts = [1, 2] }\ntext = "x"',
     ],
 )  # fmt: skip
 def test_a_bad_name_task_or_value_in_a_wording_file_is_refused_in_one_line(text, complaint):
+    """Each case is a whole file, or its beginning."""
     check_refusal(text, complaint)
 
 
@@ -621,6 +640,7 @@ def test_two_scenarios_of_one_name_and_pool_are_refused(pool_of_the_second):
 
 
 def test_an_empty_table_of_commands_is_refused_and_not_filled_with_ours():
+    """It could be an unfinished file."""
     with pytest.raises(InvalidValueError) as caught:
         parse_wordings(f"{DUSTY}[commands.PickXtimes]\n", "words.toml")
     assert str(caught.value) == (
@@ -798,6 +818,7 @@ def changed_file(tmp_path):
 
 
 def test_a_wording_file_has_another_identity_after_a_change(changed_file):
+    """Its sentences said *lift*, and now say *take*."""
     _, before, after = changed_file
     assert before != after
 
@@ -817,6 +838,7 @@ def test_a_wording_file_that_changed_no_longer_serves_episodes_of_its_old_versio
 
 
 def test_open_wordings_may_be_named_by_their_identity(changed_file):
+    """Instead of the path of their file. Episodes that need other words are still refused."""
     _, _, after = changed_file
 
     assert open_wordings(after) == after
@@ -825,6 +847,7 @@ def test_open_wordings_may_be_named_by_their_identity(changed_file):
 
 
 def test_episodes_of_a_user_s_words_need_their_file():
+    """`open_wordings(None, …)` is a run without `--wordings` that continues one with such words."""
     with pytest.raises(InvalidValueError, match="need their file; none was given"):
         open_wordings(None, "hand@00000000")
     with pytest.raises(InvalidValueError, match="are not open"):
@@ -832,4 +855,5 @@ def test_episodes_of_a_user_s_words_need_their_file():
 
 
 def test_episodes_of_our_words_need_no_file():
+    """None stands for our words."""
     assert open_wordings(None) is None

@@ -83,11 +83,13 @@ commands.SwingXtimes.train = ["Swing {color} {repeats}."]""",
     ids=["comment", "order of fields", "needs the task anyway", "words of another task"],
 )
 def test_what_does_not_change_what_is_said_does_not_change_the_digest(digest_of, before, after):
+    """Each case replaces `before` by `after` in the file above."""
     assert before in WORDS_FILE
     assert digest_of(WORDS_FILE.replace(before, after)) == digest_of(WORDS_FILE)
 
 
 def test_the_order_of_scenarios_in_a_file_does_not_change_its_digest(digest_of):
+    """A scenario is drawn by its name, not by its place."""
     head, *scenarios = WORDS_FILE.split("\n[[scenario]]\n")
     turned = "\n[[scenario]]\n".join([head, *reversed(scenarios)])
 
@@ -116,6 +118,7 @@ def test_any_change_of_what_is_said_changes_the_digest(digest_of, before, after)
 
 
 def test_other_people_or_other_remarks_change_the_digest(digest_of):
+    """They are shared by all scenarios: `{person}` may be *Leo*, and a remark *Well.*"""
     people = {"he": ("Leo",), "she": ("Mia",)}
     remarks = {"train": ("Well.",), "test": general().distractors["test"]}
 
@@ -131,6 +134,7 @@ def test_another_order_of_the_people_in_stories_changes_the_digest(digest_of):
 
 
 def test_words_of_the_pool_test_change_the_digest_of_that_pool_only(digest_of):
+    """Two texts of the pool "test" are changed: a command and an introduction."""
     changed = WORDS_FILE.replace("Take {color}", "Grab {color}").replace("here,", "over there,")
 
     assert digest_of(changed, "test") != digest_of(WORDS_FILE, "test")
@@ -138,11 +142,13 @@ def test_words_of_the_pool_test_change_the_digest_of_that_pool_only(digest_of):
 
 
 def test_remarks_of_the_pool_test_leave_the_digest_of_the_pool_train(digest_of):
+    """The remarks of training stay as they are."""
     remarks = {"train": general().distractors["train"], "test": ("Well.",)}
     assert digest_of(WORDS_FILE, "train", distractors=remarks) == digest_of(WORDS_FILE, "train")
 
 
 def test_the_word_repeats_and_the_placeholder_repeats_have_different_digests(digest_of):
+    """A user may write *repeats* as a word of the sentence."""
     word = WORDS_FILE.replace('"{repeats:times}"', '"repeats"')
     placeholder = WORDS_FILE.replace('"{repeats:times}"', '"{repeats}"')
     assert digest_of(word) != digest_of(placeholder)
@@ -161,6 +167,7 @@ def test_a_task_without_words_has_none_in_the_place_of_the_digest():
 
 
 def test_the_language_label_lists_the_words_of_each_task_after_the_version():
+    """A task that does not exist, "Gone", stands for one without words."""
     digest = identity.words_digest("PickXtimes", "train")
 
     label = language_label(["PickXtimes", "Gone"], "train")

@@ -51,6 +51,8 @@ texts_of_command_words = st.lists(st.sampled_from(WORDS.split()), max_size=30).m
 @settings(max_examples=80)
 @given(task=each_task, text=st.one_of(st.text(max_size=200), texts_of_command_words))
 def test_any_text_gives_one_goal_of_the_scene_or_a_complaint(task, text):
+    """Random characters, and random words of commands: never an error, never both, never
+    neither."""
     scene = EPISODES[task].scene
 
     found = interpret(text, scene, task)
@@ -80,6 +82,7 @@ def test_the_same_container_over_it_still_means_the_one_shown_in_the_video():
 @pytest.mark.parametrize("text", ["", "  ", "...", "\n", "?!", "I like the red cube."])
 @pytest.mark.parametrize("task", EPISODES)
 def test_text_without_a_command_gives_no_goal(task, text):
+    """*I like the red cube* asks for nothing."""
     found = interpret(text, EPISODES[task].scene, task)
 
     assert found.goals == ()
@@ -97,6 +100,7 @@ def test_text_without_a_command_gives_no_goal(task, text):
     ],
 )
 def test_unknown_words_are_named(text, words):
+    """In lower case, in the order of the text; numbers with a point count as unknown words."""
     found = interpret(text, PICK_SCENE, "PickXtimes")
 
     assert found.goals == ()
@@ -134,6 +138,7 @@ def test_a_filler_that_is_added_anywhere_to_a_command_changes_nothing(task, fill
 @settings(max_examples=40)
 @given(task=each_task, word=unknown_words, data=st.data())
 def test_an_unknown_word_that_is_added_anywhere_to_a_command_is_reported(task, word, data):
+    """*Put the sphere red cube on the target* could mean anything."""
     episode = EPISODES[task]
     text = with_word_added(instruct(episode).text, word, data)
 
@@ -169,6 +174,7 @@ TEXTS_WITH_COMPLAINTS = re.findall(
 
 @pytest.mark.parametrize(("text", "complaint"), TEXTS_WITH_COMPLAINTS)
 def test_the_complaints_quoted_by_the_documentation_are_real(text, complaint):
+    """Each row of a table in docs/interpreter.md has a text and the complaint about it."""
     assert complaint in interpret(text, PICK_SCENE, "PickXtimes").not_understood
 
 

@@ -14,6 +14,7 @@ TEXT = "Hoist the vermilion cube and put it on the target twice, then press the 
 
 
 def test_a_word_that_is_not_registered_is_unknown():
+    """The same text is understood in the next test."""
     found = interpret(TEXT, SCENE, "PickXtimes")
 
     assert found.goals == ()
@@ -43,5 +44,6 @@ def test_the_same_words_may_be_registered_again():
     ],
 )
 def test_registering_a_known_word_or_an_unknown_meaning_is_refused(word, meaning, sentence):
+    """A known word would change its meaning; an unknown meaning says nothing."""
     with pytest.raises(InvalidValueError, match=sentence):
         register_words({word: meaning})

@@ -165,6 +165,7 @@ def test_the_facts_of_a_scene_do_not_name_its_objects(task):
 
 
 def test_two_learners_of_the_same_texts_guess_the_same():
+    """Would find a seed that is missing."""
     training = episodes_with_made_up_texts(color_given_away_by_position, 1000, 40)
     validation = episodes_with_made_up_texts(color_given_away_by_position, 5000, 15)
     tested = episodes_with_made_up_texts(color_given_away_by_position, 9000, 20)

@@ -147,6 +147,7 @@ def test_rules_guess_the_colors_of_two_containers_by_the_former_and_the_latter(r
     [("surface", ("green",), ("red",)), ("last-mention", ("blue",), ("blue",))],
 )
 def test_the_rule_surface_understands_neither_of_those_and_the_other(rule, first, second):
+    """Red and blue are named, so green is neither; blue was chosen, so the other is red."""
     text = (
         "My kitchen is painted red and blue. Of the two, I would choose blue. Lift the container "
         "over the cube that is neither of those, then lift the container over the cube in the "
@@ -156,11 +157,13 @@ def test_the_rule_surface_understands_neither_of_those_and_the_other(rule, first
 
 
 def test_rules_draw_from_all_colors_if_the_words_name_none():
+    """Two containers are to be lifted; for each, all three colors are as likely."""
     text = "Look left and right. Lift the container at the former place, then at the latter."
     assert guess_goal("surface", text, "VideoUnmask") == {"colors": (COLORS, COLORS)}
 
 
 def test_rules_guess_amounts_in_the_order_of_mention():
+    """A guess has one place for each color, and its count at the same place."""
     text = "She wants two red cubes and one blue cube. Put the former and the latter into the bin."
     assert guess_goal("first-mention", text, "BinFill") == {
         "colors": (("red",), ("blue",)),
@@ -212,6 +215,7 @@ any_task = st.sampled_from(TASKS)
 @settings(max_examples=40)
 @given(text=texts, rule=any_rule, task=any_task)
 def test_any_text_gives_a_guess_with_a_value_for_each_place_of_each_slot(text, rule, task):
+    """`vocabulary` has for each slot of the task's goals how many values it may have."""
     vocabulary = goal_vocabulary(task)
 
     guess = guess_goal(rule, text, task)
@@ -225,6 +229,7 @@ def test_any_text_gives_a_guess_with_a_value_for_each_place_of_each_slot(text, r
 @settings(max_examples=40)
 @given(text=texts, rule=any_rule, task=any_task)
 def test_what_is_drawn_from_any_guess_is_a_goal_of_the_scene_or_none(text, rule, task):
+    """None if no goal of the scene has the guessed values."""
     episode = get_episode(task, "test", 0)
     guess = guess_goal(rule, text, task)
 
@@ -237,6 +242,7 @@ def test_what_is_drawn_from_any_guess_is_a_goal_of_the_scene_or_none(text, rule,
 @settings(max_examples=40)
 @given(text=texts, rule=any_rule, task=any_task)
 def test_upper_case_and_doubled_spaces_do_not_change_a_guess(text, rule, task):
+    """Only words count."""
     shouted = text.upper().replace(" ", "  ")
     assert guess_goal(rule, shouted, task) == guess_goal(rule, text, task)
 
@@ -288,6 +294,7 @@ def test_a_rule_is_scored_on_the_slots_of_the_goal_that_the_words_hide(task, set
 
 @each_task
 def test_every_rule_is_right_if_the_words_hide_nothing(task):
+    """The explicit command states every value, and rules take what is stated."""
     for told in instructions_of(task, "explicit"):
         for rule in SURFACE_RULES:
             assert score_rule(rule, told).goal == 1, told[1].text
@@ -314,6 +321,7 @@ def test_in_a_known_episode_the_first_mention_is_right_and_elimination_wrong():
 
 
 def test_an_explicit_instruction_leaves_nothing_to_chance():
+    """No slot is scored, and a guess of the goal is right with probability 1."""
     episode = get_episode("VideoPlaceButton", "test", 0)
     assert score_chance((episode, instruct(episode, "explicit"))) == ({}, 1)
 
@@ -365,6 +373,7 @@ def test_only_the_parts_of_a_goal_that_a_text_touches_are_scored():
 
 
 def test_no_part_of_a_goal_is_scored_for_an_explicit_text():
+    """It hides none."""
     episode = get_episode("VideoPlaceButton", "test", 0)
     assert counted_slots((episode, instruct(episode, "explicit"))) == ()
 
@@ -392,6 +401,7 @@ def test_words_for_a_place_give_a_color_away_only_if_they_name_another_cube():
 
 @pytest.mark.parametrize("rule", SURFACE_RULES)
 def test_words_for_a_place_without_a_color_leave_three_colors(rule):
+    """*The cube on the left*: a rule that sees no scene draws from all three."""
     for told in spatial_instructions(names_a_color=False):
         assert score_rule(rule, told).slots == {"color": Fraction(1, 3)}
 
@@ -446,6 +456,7 @@ def shortcuts_command(*words):
     ids=" ".join,
 )
 def test_the_command_prints_a_row_for_each_setting_pattern_or_slot(words, snapshot):
+    """The whole print is compared with a stored one."""
     assert shortcuts_command("--tasks", "StopCube", *words).output == snapshot
 
 
@@ -458,6 +469,7 @@ def test_how_far_a_shortcut_exceeds_chance_is_printed_with_sign_and_interval(val
 
 
 def test_the_caption_of_a_table_names_the_adjustment_of_its_intervals():
+    """Two rows are two comparisons with chance."""
     rows = [ShortcutRow((name,), 9, {}, Excess(0.1, 0.02)) for name in ("direct", "spatial")]
     caption = str(shortcut_table(rows, "Shortcuts").caption)
     assert caption.endswith("with 95 % intervals, Bonferroni-adjusted for 2 rows.")
@@ -477,6 +489,7 @@ def test_the_caption_of_a_table_names_the_adjustment_of_its_intervals():
     ],
 )
 def test_a_wrong_option_of_the_shortcuts_command_is_one_sentence(words, sentence):
+    """It fails before anything is scored."""
     outcome = shortcuts_command("--tasks", "StopCube", *words)
     assert outcome.exit_code
     assert isinstance(outcome.exception, (InvalidValueError, UnknownNameError))

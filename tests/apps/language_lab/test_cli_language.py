@@ -31,6 +31,7 @@ def exported_rows(out, *options):
 
 
 def test_show_prints_the_words_of_a_user_s_file(stopcube_wordings):
+    """The file has this one command."""
     printed = call("show", "StopCube", "0", "--words", "--wordings", stopcube_wordings)
     assert "Press the button when the cube reaches the target" in printed
 
@@ -39,6 +40,7 @@ def test_show_prints_the_words_of_a_user_s_file(stopcube_wordings):
 def test_exported_instructions_in_words_of_a_user_s_file_are_those_of_its_tasks(
     stopcube_wordings, tmp_path
 ):
+    """Without `--tasks`, since the file serves StopCube only. *Own* means: no whole sentence."""
     plan = plan_file(wordings=str(stopcube_wordings), forms="implicit")
 
     rows = exported_rows(tmp_path / "rows.jsonl", "--plan", plan)
@@ -49,6 +51,7 @@ def test_exported_instructions_in_words_of_a_user_s_file_are_those_of_its_tasks(
 
 
 def test_a_task_that_a_user_s_file_lacks_is_refused(stopcube_wordings):
+    """The file serves StopCube only."""
     with pytest.raises(InvalidValueError, match="has no words of BinFill"):
         call("show", "BinFill", "0", "--words", "--wordings", stopcube_wordings)
 
@@ -108,6 +111,8 @@ def test_exported_instructions_follow_the_options_of_a_plan(tmp_path):
 def test_a_wrong_option_of_an_export_is_one_sentence_and_nothing_is_written(
     tmp_path, out, words, kind, sentence
 ):
+    """Cases are a misspelled setting, wrong stages, a task without places, a bad format, bad
+    paths."""
     with pytest.raises(kind, match=sentence):
         call("export", "instructions", "--out", tmp_path / out, *words)
     assert not list(tmp_path.iterdir())
@@ -149,6 +154,7 @@ def check_scenarios(folder, *options):
 
 @pytest.mark.usefixtures("in_this_process")
 def test_an_author_sees_texts_and_the_broken_rule_in_each_task(tmp_path, snapshot):
+    """The whole print is compared with a stored one; the command fails, as a rule is broken."""
     result = check_scenarios(tmp_path)
 
     assert isinstance(result.exception, RoboIRGError)
@@ -157,6 +163,7 @@ def test_an_author_sees_texts_and_the_broken_rule_in_each_task(tmp_path, snapsho
 
 @pytest.mark.usefixtures("in_this_process")
 def test_the_check_refuses_a_misspelled_scenario_with_the_right_name(tmp_path):
+    """The file has one scenario, "far"."""
     result = check_scenarios(tmp_path, "--scenario", "fear")
     assert str(result.exception) == "There is no scenario 'fear'; known: far. Did you mean 'far'?"
 
@@ -211,5 +218,6 @@ def test_raters_table_has_intervals_around_equal_ratings(rating):
 
 
 def test_an_empty_rating_is_refused_with_its_number(rating):
+    """The sheet is as it was written: no rating is filled in."""
     with pytest.raises(SystemExit, match=r"rates text \d+ ''; it must be a number"):
         rate_words.read_ratings(rating / "sheet-1.csv", read_key(rating))

@@ -25,6 +25,7 @@ def rows():
 
 
 def test_the_ids_of_exported_rows_are_unique():
+    """An id is such as `SwingXtimes/val/3/contextual/implicit`."""
     ids = [line["id"] for line in rows()]
     assert len(set(ids)) == len(ids)
 
@@ -38,6 +39,7 @@ def test_ids_are_unique_and_say_what_the_row_is(snapshot):
 
 
 def test_the_turns_of_an_exported_row_are_its_text_and_end_with_the_command():
+    """Turns are what is said one after the other; the text joins them by spaces."""
     for line in rows():
         turns = [turn["text"] for turn in line["turns"]]
         assert " ".join(turns) == line["text"]
@@ -45,6 +47,7 @@ def test_the_turns_of_an_exported_row_are_its_text_and_end_with_the_command():
 
 
 def test_the_start_of_a_turn_counts_in_the_whole_text():
+    """Spans of turns and of mentions count characters from the same place."""
     for line in rows():
         for turn in line["turns"]:
             assert line["text"][turn["start"] :].startswith(turn["text"])
@@ -67,11 +70,13 @@ def read_parquet(data):
 
 
 def test_parquet_holds_the_exported_rows():
+    """What is written and read again is equal."""
     table = read_parquet(instruction_export.encode(rows(), "parquet"))
     assert table.to_pylist() == list(rows())
 
 
 def test_two_exports_to_parquet_have_the_same_bytes():
+    """So that a dataset can be compared by its hash."""
     pytest.importorskip("pyarrow")
     first = instruction_export.encode(rows(), "parquet")
     assert instruction_export.encode(rows(), "parquet") == first
@@ -109,10 +114,12 @@ def without_pyarrow(monkeypatch):
 
 @pytest.mark.usefixtures("without_pyarrow")
 def test_json_lines_need_no_pyarrow():
+    """They are the default; only Parquet needs it."""
     assert instruction_export.format_of(Path("rows.jsonl")) == "jsonl"
 
 
 @pytest.mark.usefixtures("without_pyarrow")
 def test_without_pyarrow_one_sentence_says_what_to_do():
+    """`pip install "roboirgbench[export]"` brings it."""
     with pytest.raises(MissingDependencyError, match=r"\[export\]"):
         instruction_export.format_of(Path("rows.parquet"))

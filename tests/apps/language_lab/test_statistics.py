@@ -42,6 +42,7 @@ def test_an_expression_is_counted_in_50_scenes_of_a_task_at_most():
 
 
 def test_each_setting_has_its_expressions_and_explicit_has_none():
+    """An expression is the class of a word that refers back; *explicit* has no such words."""
     counts = corpus_statistics.expression_counts(implicit_instructions())
 
     assert {"it", "them", "that", "former", "latter", "first", "second"} <= set(counts["direct"])
@@ -51,6 +52,7 @@ def test_each_setting_has_its_expressions_and_explicit_has_none():
 
 
 def test_expressions_are_in_a_fixed_order_and_none_is_left_out():
+    """The order is that of the types, and does not depend on the counts."""
     counts = {"direct": {"there": 2, "it": 5}, "spatial": {"former": 1, "there": 1}}
     assert corpus_statistics.expression_order(counts) == ("it", "former", "there")
 

@@ -45,6 +45,7 @@ each_task = pytest.mark.parametrize("task", slow_but(["BinFill", "VideoUnmask"],
 
 @each_task
 def test_each_goal_has_the_sentence_of_the_source(task):
+    """The stand-in is asked once by the import, and once here without it."""
     sentences = imported(task).tasks[task].literals
     for goal in train_goals(task):
         assert sentences[unordered(goal)] == sentence(task, goal)
@@ -52,6 +53,7 @@ def test_each_goal_has_the_sentence_of_the_source(task):
 
 @each_task
 def test_the_explicit_setting_says_the_sentence_of_the_source(task):
+    """Two published training episodes of each task."""
     for episode in train_episodes(task, 0, 2):
         said = instruct(episode, wordings=imported(task).identity)
         assert said.text == sentence(task, episode.goal, episode.difficulty)
@@ -59,6 +61,7 @@ def test_the_explicit_setting_says_the_sentence_of_the_source(task):
 
 @each_task
 def test_imported_sentences_leave_each_other_setting_as_it_is(task):
+    """Whole sentences are said in *explicit* only."""
     for episode in train_episodes(task, 0, 2):
         assert expressible(episode, wordings=imported(task).identity) == expressible(episode)
 
@@ -71,6 +74,7 @@ def import_command(folder, *options):
 
 
 def test_the_command_writes_a_file_that_is_read_again(one_task, tmp_path):
+    """The name and a digest make the identity of the words."""
     outcome = import_command(tmp_path, "--name", "stand-in")
 
     out = tmp_path / "out.toml"
