@@ -114,7 +114,7 @@ def without_pyarrow(monkeypatch):
 
 @pytest.mark.usefixtures("without_pyarrow")
 def test_json_lines_need_no_pyarrow():
-    """They are the default; only Parquet needs it."""
+    """Only Parquet needs it."""
     assert instruction_export.format_of(Path("rows.jsonl")) == "jsonl"
 
 
