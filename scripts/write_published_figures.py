@@ -15,25 +15,25 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from written_parts import table
 
 from roboirg.analysis.published import (
     TRIALS,
     PublishedRow,
     RateTable,
+    published_gap_interval,
     published_rows,
     published_tasks,
+    unpaired_rates,
 )
 from roboirg.analysis.results.option_labels import staged_options
 from roboirg.language.settings import EXPLICIT
 from roboirg.stats.intervals import (
-    SEED,
-    Z_95,
     Interval,
-    percentile_interval,
-    resampled_rates,
-    wilson_interval,
+    TaskRates,
+    critical_value,
+    mean_interval,
+    ratio_interval,
 )
 
 PAGE = Path(__file__).parent.parent / "docs" / "published-figures.md"
@@ -107,34 +107,32 @@ class Comparison(NamedTuple):
 
 
 def compare(first: PublishedRow, second: PublishedRow, tasks: Collection[str]) -> Comparison:
-    """Compare two rows over tasks, with the bootstrap of our tables.
+    """Compare two rows over tasks, with the intervals of our tables.
 
-    Single trials are not published, so that the two rows are resampled apart, and every trial
-    counts as an episode of its own.
+    Single trials are not published, so that every trial counts as an episode of its own.
     """
-    rng = np.random.default_rng(SEED)
-    first_rates = 100 * resampled_rates(_trials(first, tasks), rng)[:, 0]
-    second_rates = 100 * resampled_rates(_trials(second, tasks), rng)[:, 0]
-    sizes = [CELL] * len(tasks)
-    change = percentile_interval(second_rates - first_rates, sizes)
-    kept_interval = percentile_interval(100 * second_rates / first_rates, sizes)
+    change = published_gap_interval(second.rates, first.rates, tasks, CELL)
+    kept_interval = ratio_interval(unpaired_rates(second.rates, first.rates, tasks, CELL))
     if change is None or kept_interval is None:
         raise ValueError("a cell has too few trials for an interval")
     first_mean = average(first, tasks)
     second_mean = average(second, tasks)
     kept = 100 * float(second_mean / first_mean)
-    return Comparison(first_mean, second_mean, change, kept, kept_interval)
+    return Comparison(first_mean, second_mean, _percent(change), kept, _percent(kept_interval))
 
 
-def _trials(row: PublishedRow, tasks: Collection[str]) -> list[NDArray[np.int64]]:
-    """Return a line for each trial of each task, (trials, 2): its success, and 1."""
-    found = []
-    for task in tasks:
-        rate = row.rates[task] or Fraction(0)
-        won = round(Fraction(rate) * CELL / 100)
-        successes = np.arange(CELL) < won
-        found.append(np.column_stack([successes, np.ones(CELL)]).astype(np.int64))
-    return found
+def _percent(interval: Interval) -> Interval:
+    return Interval(100 * interval.low, 100 * interval.high)
+
+
+def _of_cell(rate: Decimal | int, trials: int) -> Interval:
+    """Return the interval of a published rate, which is in percent."""
+    rows = np.ones((trials, 2), dtype=np.int64)
+    rows[round(Fraction(rate) * trials / 100) :, 0] = 0
+    interval = mean_interval([TaskRates.of(rows).combined(1)])
+    if interval is None:
+        raise ValueError("a cell has too few trials for an interval")
+    return interval
 
 
 def printed_drops() -> dict[str, Decimal]:
@@ -220,7 +218,7 @@ def half_widths() -> list[float]:
     for row in published_rows("main"):
         for rate in row.rates.values():
             if rate is not None and 10 <= rate <= 90:  # noqa: PLR2004 - percent
-                low, high = wilson_interval(round(Fraction(rate) * CELL / 100), CELL)
+                low, high = _of_cell(rate, CELL)
                 widths.append(50 * (high - low))
     return widths
 
@@ -244,7 +242,7 @@ those who build on a number need to know how firm it is. The rates are the paper
 in its simulator; all are in the
 [published results](../src/roboirg/analysis/published_results/README.md).
 
-Intervals are 95 %, by the [bootstrap](statistics.md) of our tables. Single trials are not
+Intervals are 95 %, the [score intervals](statistics.md) of our tables. Single trials are not
 published, so rows are compared unpaired, and the 150 trials of a cell (50 episodes, each with three
 seeds) count as independent. The seeds of an episode are alike, so true intervals are wider, up to
 1.7 times if all seeds agree; pairing would narrow them. **Bold** changes have an interval without
@@ -403,16 +401,16 @@ def _by_setting(texts: Mapping[tuple[str, str], str]) -> str:
 def _widths() -> Iterator[str]:
     usual = half_widths()
     real, _ = TRIALS["real"]
-    low, high = wilson_interval(real // 2, real)
+    low, high = _of_cell(50, real)
     yield "## How wide is a cell?"
     yield table(
-        ("table", "trials of a cell", "half the 95 % interval (Wilson), points"),
+        ("table", "trials of a cell", "half the 95 % interval, points"),
         [
             ("main, planner, context", CELL, f"{min(usual):.0f} to {max(usual):.0f} (10 to 90 %)"),
             ("real world", real, f"{50 * (high - low):.0f} (50 %)"),
         ],
     )
-    apart = 100 * Z_95 * math.sqrt(2 * 0.25 / CELL)
+    apart = 100 * critical_value() * math.sqrt(2 * 0.25 / CELL)
     yield _text(
         f"Two cells of {CELL} trials near 50 % differ by chance alone by up to {apart:.0f} points",
         "in 95 of 100 cases.",

@@ -33,12 +33,12 @@ CHANGES_THAT_ADD_THE_OPTION = {
     ],
     "language/scenarios/spoken.py": [
         (
-            '    utterances = [UtteranceSpec("introduction", speech.phrase(',
+            '    utterances = [UtteranceSpec("introduction", introduction)]',
             (
                 "    first: Phrase = ()\n"
                 '    if request.options.greeting == "hello":\n'
                 '        first = plain("Hello, robot. ")\n'
-                '    utterances = [UtteranceSpec("introduction", first + speech.phrase('
+                '    utterances = [UtteranceSpec("introduction", first + introduction)]'
             ),
         ),
         ("phrases import Phrase", "phrases import Phrase, plain"),

@@ -10,6 +10,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from msgspec import inspect
 
 import roboirg
 from roboirg.analysis.measures.chance import floor_level
@@ -45,6 +46,28 @@ def test_the_page_about_records_lists_exactly_the_keys_of_a_record():
     table = (ROOT / "docs" / "record.md").read_text().split("## In Python")[0]
     keys = " ".join(line.split("|")[1] for line in table.splitlines() if line.startswith("| "))
     assert set(re.findall(r"`(\w+)`", keys)) == {*Record.__struct_fields__, "schema_version"}
+
+
+def fields_of(kind: inspect.Type) -> list[str]:
+    """Return the fields of the object that a type is, may be, or lists; empty if it is none."""
+    for part in getattr(kind, "types", (kind,)):  # of a union, such as `Attribution | None`
+        item = getattr(part, "item_type", part)  # of a tuple
+        if hasattr(item, "fields"):
+            return [field.encode_name for field in item.fields]
+    return []
+
+
+def test_the_page_about_records_lists_exactly_the_fields_of_objects_in_a_record():
+    """They stand in braces: ``list of `{stage, text, step}```."""
+    table = (ROOT / "docs" / "record.md").read_text().split("## In Python")[0]
+    row = r"^\| \*?`(\w+)`\*? \| [^|]*\{([\w, ]+)\}"
+    listed = dict(re.findall(row, table, flags=re.MULTILINE))
+
+    in_record = {
+        field.encode_name: fields_of(field.type) for field in inspect.type_info(Record).fields
+    }
+
+    assert listed == {key: ", ".join(names) for key, names in in_record.items() if names}
 
 
 def test_every_dependency_is_explained_once_on_the_page_of_dependencies():

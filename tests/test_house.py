@@ -21,8 +21,8 @@ ALL_SOURCE_FILES = [
 """The benchmark's files and those of the packages next to it."""
 
 MOST_ROOMS = 21
-MOST_ARROWS = 99
-MOST_NAMES = 51
+MOST_ARROWS = 100
+MOST_NAMES = 53
 """Of the benchmark, that the packages next to it import."""
 
 MAY_IMPORT = {"reader": {"core", "tasks"}, "records": {"core", "util"}, "stats": {"core"}}

@@ -226,3 +226,33 @@ def test_results_in_simulation_are_marked_and_kept_apart_from_those_of_a_real_ro
         "listener, on a robot (privileged)": "0.00",
     }
     assert "(twin): the study's twin, in simulation" in " ".join(table.notes)
+
+
+def test_the_note_on_averages_counts_the_tasks_of_the_run_next_to_published_rows():
+    """Two tasks were played, and one of them has no spatial setting; the paper has 7 of 11."""
+    results = []
+    for task, settings in (("StopCube", ["explicit"]), ("PickXtimes", ["explicit", "spatial"])):
+        for setting in settings:
+            results += make_results("10", setting, task=task)
+
+    notes = make_table("main", RunData(frame_of(results)), published=True).notes
+
+    (note,) = [note for note in notes if note.startswith("Averages of spatial")]
+    assert "over the 1 of 2 tasks that have it" in note
+
+
+@pytest.mark.parametrize(
+    "difference",
+    [{"split": "val"}, {"max_steps": 900}, {"language_version": "2"}, {"episode": 5}],
+    ids=lambda difference: next(iter(difference)),
+)
+def test_no_rate_is_bold_against_one_of_another_split_limit_version_or_other_episodes(difference):
+    good = [make_result("success", policy="good"), make_result("success", 1, policy="good")]
+    poor = [make_result("failure", policy="poor"), make_result("failure", 1, policy="poor")]
+    others = [make_result(**{"outcome": "failure", "policy": "poor", **difference})]
+
+    alike = table_of("main", good, poor)
+    apart = table_of("main", good, others)
+
+    assert "**100.00**" in get_format("markdown").draw(alike)
+    assert "**" not in get_format("markdown").draw(apart)

@@ -7,6 +7,9 @@ from made_records import make_record
 from msgspec.structs import replace
 
 from roboirg.analysis.measures.planner_failures import IDLE_STEPS, planner_failure
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.results.frame import make_frame
+from roboirg.analysis.tables.subgoal_table import make_subgoal_table
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.subgoal_text import UNKNOWN_WORDS
 from roboirg.records.record import Attribution, Job, Record, SubgoalRecord
@@ -85,3 +88,21 @@ def test_an_episode_without_an_end_is_named_by_what_became_of_the_last_subgoal(
     )
 
     assert planner_failure(record) == named
+
+
+def test_what_models_cost_is_in_the_table_of_a_policy_that_names_no_subgoal():
+    """A listener that asked a model four times, at a price that is not known."""
+    options = InstructionOptions("explicit")
+    job = Job(policy="random", task="PickXtimes", split="test", episode=0, options=options)
+    usage = {"calls": 4.0, "input_tokens": 1200.0}
+    record = replace(make_record(job, "success", None), usage=usage)
+    data = RunData(make_frame([("run", [record])], ()), [record])
+
+    table = make_subgoal_table(data)
+
+    cells = {
+        column.name: str(entry)
+        for column, entry in zip(table.columns, table.rows[0].entries, strict=True)
+    }
+    assert (cells["subgoals"], cells["calls"], cells["tokens in"]) == ("0", "4", "1200")
+    assert "US$" not in cells

@@ -238,3 +238,23 @@ def test_a_gap_is_printed_in_points_with_its_sign():
     """-0.5 is −50 points. What rounds to zero is ±0, with no sign of its own."""
     assert [points(gap) for gap in (-0.5, 0.25, 0.0, -0.001)] == ["−50", "+25", "±0", "±0"]
     assert [points(gap, 1) for gap in (-0.5, 0.0004, 0.0006)] == ["−50.0", "±0.0", "+0.1"]
+
+
+def test_a_suite_that_was_played_in_part_is_marked_in_the_table_of_forms():
+    """One of the four tasks of counting was played in both forms."""
+    results = [*play("10", "direct"), *play("11", "direct", form="resolved")]
+
+    table = diagnostic_tables()["forms"].make(RunData(frame_of(results)))
+
+    assert [row.group for row in table.rows] == ["listener, counting *"]
+    assert "* a partial average: a task is incomplete or was not played." in table.notes
+
+
+def test_results_have_what_the_calls_of_models_cost_and_none_where_it_is_unknown():
+    asked = make_result(usage={"calls": 3.0, "input_tokens": 1200.0, "cost_usd": 0.25})
+    frame = frame_of([asked, make_result(episode=1)])
+
+    assert frame["model_calls"].tolist() == [3, None]
+    assert frame["input_tokens"].tolist() == [1200, None]
+    assert frame["output_tokens"].tolist() == [None, None]
+    assert frame["cost_usd"].tolist() == [0.25, None]

@@ -17,7 +17,7 @@ from cause_making import Course, read_courses
 
 from roboirg.core.failures import FAILURE_KINDS, FAILURES
 from roboirg.judging import DeclaredIntent, FailureAttribution, attribute_failure
-from roboirg.stats.intervals import without_spread
+from roboirg.stats.intervals import interval_of_values
 from roboirg.tasks import get_task
 
 HERE = Path(__file__).parent
@@ -113,7 +113,7 @@ def scores(courses: Sequence[Course]) -> Scores:
     drawn = [share(rng.choice(causes, len(causes))) for _ in range(1000)]
     low, high = np.percentile(drawn, [2.5, 97.5])
     if low == high:
-        low, high = without_spread(low, len(causes))
+        low, high = interval_of_values([[low] * len(causes)])
     by_cause = [np.mean([pair.is_right for pair in shown[cause]]) for cause in causes]
     return Scores(
         share(causes),

@@ -1,9 +1,13 @@
 """Episodes for the language tests."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from roboirg.core.episode import SPLITS, Episode, Point
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language import instruct_with
+from roboirg.language.generator import find_refusal
+from roboirg.language.instruction import Instruction
 from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import every_task
 from roboirg.tasks.splits import splits
@@ -34,6 +38,15 @@ def random_episodes(task: str, count: int) -> Iterator[Episode]:
     """Episodes of seeds that no split uses, with all patterns and difficulties."""
     for index in range(count):
         yield get_episode(task, "random", 700_000 + index)
+
+
+def said_where_possible(
+    episodes: Iterable[Episode], options: InstructionOptions
+) -> Iterator[tuple[Episode, Instruction]]:
+    """Yield (episode, instruction) for the episodes that these options can express."""
+    for episode in episodes:
+        if find_refusal(episode, options) is None:
+            yield episode, instruct_with(episode, options)
 
 
 def without_landmark(episode: Episode) -> Episode:

@@ -11,35 +11,25 @@ def get_language_goal(self, env):
 
 def bin_fill(self):
     world = self.env.unwrapped
-    parts = []
-    for color in ("red", "blue", "green"):
-        count = getattr(world, f"{color}_cubes_target_number")
-        if count:
-            parts.append(f"{NUMBERS[count]} {color} cube{'s' if count > 1 else ''}")
-    items = parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
-    return f"drop {items} into the bin, then press the button to stop"
+    return (
+        f"drop {world.red_cubes_target_number} red, {world.blue_cubes_target_number} blue and "
+        f"{world.green_cubes_target_number} green cubes into the bin, then press the button to stop"
+    )
 
 
 def pick_x_times(self):
     world = self.env.unwrapped
-    color = world.target_color_name
-    count = world.num_repeats
-    if count == 1:
-        return f"grab the {color} cube and set it on the target, then press the button to stop"
     return (
-        f"grab the {color} cube and set it on the target, repeating this action "
-        f"{NUMBERS[count]} times, then press the button to stop"
+        f"set the {world.target_color_name} cube on the target {NUMBERS[world.num_repeats]} times, "
+        "then press the button to stop"
     )
 
 
 def swing_x_times(self):
     world = self.env.unwrapped
-    color = world.target_color_name
-    count = world.num_repeats
-    again = "" if count == 1 else f", doing this {NUMBERS[count]} times"
     return (
-        f"grab the {color} cube, swing it from above the right-side target to above the left-side "
-        f"target{again}, then lower it to the table and press the button"
+        f"swing the {world.target_color_name} cube from the right-side to the left-side target "
+        f"{NUMBERS[world.num_repeats]} times, then lower it to the table and press the button"
     )
 
 
@@ -49,11 +39,8 @@ def stop_cube(self):
 
 
 def picks(self, count, start):
-    colors = self.env.unwrapped.color_names
-    first = f"{start} pick up the container that hides the {colors[0]} cube"
-    if count == 1:
-        return first
-    return f"{first}, put it down, and then pick up the container that hides the {colors[1]} cube"
+    colors = " and then ".join(self.env.unwrapped.color_names[:count])
+    return f"{start} pick up the containers that hide {colors}"
 
 
 def by_difficulty(start):
@@ -68,10 +55,10 @@ def by_picks(start):
 
 
 def video_repick(self):
-    cube = "watch the video, then lift and put down the same cube that was picked up there"
-    if self.num_repeats == 1:
-        return f"{cube}, and press the button to stop"
-    return f"{cube}, {NUMBERS[self.num_repeats]} times in all, and press the button to stop"
+    return (
+        "watch the video, then lift and put down the same cube that was picked up there, "
+        f"{NUMBERS[self.num_repeats]} times in all, and press the button to stop"
+    )
 
 
 def video_place_button(self):

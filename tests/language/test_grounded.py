@@ -1,62 +1,106 @@
-"""The grounded setting: what decides is seen, the words alone give nothing away."""
+"""The setting *grounded*: a value has to be seen in the scene; the words do not give it away.
+
+Instead of *the red cube*, the words say *the cube nearest to the back left corner*. The metadata
+of the instruction lists the slots (parts of the goal, such as its color) that are hidden in this
+way under the key "touched".
+"""
 
 import functools
 from collections import Counter, defaultdict
 
 import pytest
-from language_variants import TASKS, random_episodes
+from language_variants import TASKS, random_episodes, said_where_possible
 
 from roboirg.core.episode import ALL_COLORS
 from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language import instruct_with
-from roboirg.language.generator import find_refusal
+from roboirg.language import instruct
 from roboirg.language.instruction_row import row
-from roboirg.language.request import values_of_goal
 from roboirg.language.settings import settings_of
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 
 TASKS_WITH_SETTING = tuple(task for task in TASKS if "grounded" in settings_of(get_task(task)))
-SCENES = 60
-OPTIONS = InstructionOptions("grounded")
+each_task = pytest.mark.parametrize("task", TASKS_WITH_SETTING)
 
 
 @functools.cache
 def grounded_instructions(task):
-    """The grounded instructions of random scenes with their episodes."""
-    return [
-        (episode, instruct_with(episode, OPTIONS))
-        for episode in random_episodes(task, SCENES)
-        if find_refusal(episode, OPTIONS) is None
-    ]
+    """Return (episode, grounded instruction) of those of 60 random episodes that have one."""
+    return list(said_where_possible(random_episodes(task, 60), InstructionOptions("grounded")))
 
 
-@pytest.mark.parametrize("task", TASKS_WITH_SETTING)
+def test_a_grounded_instruction_describes_the_cube_instead_of_naming_its_color():
+    """The goal is the blue cube. *It* in the command refers back to the described cube."""
+    episode = get_episode("PickXtimes", "test", 2)
+
+    said = instruct(episode, "grounded")
+
+    assert said.turns == (
+        "The cube nearest to the back left corner is new.",
+        "Let's try it out: grab it and place it on the target once, then press the button.",
+    )
+    assert said.metadata["touched"] == ["color"]
+
+
+@each_task
+def test_every_grounded_instruction_hides_at_least_one_value(task):
+    """Otherwise it could be followed without looking."""
+    for _, said in grounded_instructions(task):
+        assert said.metadata["touched"], said.text
+        assert said.metadata["hidden_slots"] >= 1, said.text
+
+
+@each_task
 def test_only_values_that_must_be_seen_are_replaced_by_pointers(task):
-    """In the setting *grounded*, a value of the goal (its slot) is left out and has to be seen.
+    """A pointer is a word that refers back, such as *it*: a mention with the role "anaphor".
 
-    The command refers back to it with a word such as *it*: a mention with the role "anaphor".
+    A pointer may also stand for one of several colors, or for a value that only leads to the goal,
+    the slot "reference".
+    """
+    for _, said in grounded_instructions(task):
+        pointed = {mention.slot for mention in said.mentions if mention.role == "anaphor"}
+        assert pointed <= {*said.metadata["touched"], "colors", "reference"}, said.text
+
+
+def test_an_exported_grounded_instruction_lists_its_hidden_slots():
+    """In the column `touched`, separated by commas if there are several."""
+    episode = get_episode("PickXtimes", "test", 2)
+    assert row(episode, instruct(episode, "grounded"))["touched"] == "color"
+
+
+@each_task
+def test_grounded_instructions_never_name_the_hidden_color(task):
+    """*The red cube on the left* would tell the color to a policy that does not look.
+
+    A goal with two colors is left out, since the words state one of them.
     """
     for episode, said in grounded_instructions(task):
-        touched = said.metadata["touched"]
-        assert touched
-        pointed = {mention.slot for mention in said.mentions if mention.role == "anaphor"}
-        assert pointed - {"reference"} <= {*touched, "colors"}
-        assert said.metadata["hidden_slots"] >= 1
-        assert row(episode, said)["touched"] == ", ".join(touched)
-
-
-@pytest.mark.parametrize("task", TASKS_WITH_SETTING)
-def test_grounded_instructions_never_name_the_hidden_color(task):
-    """The policy has to see which color is meant, so the words about it must not contain one."""
-    for episode, said in grounded_instructions(task):
-        colors = [value for value in values_of_goal(episode.goal) if value.slot in COLOR_SLOTS]
+        if len(episode.goal.as_mapping().get("colors", ())) > 1:
+            continue
         for mention in said.mentions:
-            # Of two things the words state one.
-            is_described = mention.slot in said.metadata["touched"] and len(colors) == 1
-            if mention.slot in COLOR_SLOTS and is_described:
-                assert not set(said.span(mention).split()) & set(ALL_COLORS)
+            if mention.slot in COLOR_SLOTS and mention.slot in said.metadata["touched"]:
+                assert set(ALL_COLORS).isdisjoint(said.span(mention).split()), said.text
+
+
+def values_by_description(task, slot):
+    """Count the values that each description of a hidden slot stands for in random episodes.
+
+    ``{"the cube nearest to": {"red": 7, "blue": 9}}``: colors, left and right are left out of
+    descriptions, and what follows the 24th character, so that more of them are alike.
+    """
+    exchangeable = {"red", "green", "blue", "left", "right"}
+    found = defaultdict(Counter)
+    for episode, said in grounded_instructions(task):
+        if slot in said.metadata["touched"]:
+            spans = [
+                said.span(mention)
+                for mention in said.mentions
+                if mention.utterance == 0 and mention.slot == slot
+            ]
+            kept = [word for word in " ".join(spans).split() if word not in exchangeable]
+            found[" ".join(kept)[:24]][str(episode.goal[slot])] += 1
+    return found
 
 
 @pytest.mark.parametrize(
@@ -68,39 +112,37 @@ def test_grounded_instructions_never_name_the_hidden_color(task):
     ],
 )
 def test_the_description_of_a_hidden_value_does_not_give_the_value_away(task, slot):
-    """Guess each value from its description by the most frequent pair, with hindsight:
+    """Who guesses the value that is most frequent for a description is right no more often than
+    who always guesses the value that is most frequent overall.
 
-    this must hardly be better than always guessing the value that is most frequent overall.
+    Descriptions of fewer than 20 episodes are left out. Allowed for chance are four standard
+    deviations; the seeds are fixed.
     """
-    values = defaultdict(Counter)
-    prior = Counter()
-    for episode, said in grounded_instructions(task):
-        if slot in said.metadata["touched"]:
-            spans = [
-                said.span(mention)
-                for mention in said.mentions
-                if mention.utterance == 0 and mention.slot == slot
-            ]
-            # Left and right, and colors are exchangeable; many texts are rare.
-            exchangeable = {"red", "green", "blue", "left", "right"}
-            kept = [word for word in " ".join(spans).split() if word not in exchangeable]
-            values[" ".join(kept)[:24]][str(episode.goal[slot])] += 1
-            prior[str(episode.goal[slot])] += 1
-    for group in values.values():
-        size = group.total()
-        expected = max(prior.values()) / prior.total()
-        # Four standard deviations: fixed seeds, and the same for all groups.
-        room = 4 * (expected * (1 - expected) / size) ** 0.5
-        assert size < 20 or max(group.values()) / size <= expected + room
+    groups = values_by_description(task, slot)
+    overall = sum(groups.values(), Counter())
+
+    for description, values in groups.items():
+        size = values.total()
+        expected = max(overall.values()) / overall.total()
+        deviation = (expected * (1 - expected) / size) ** 0.5
+        is_too_small = size < 20
+        assert is_too_small or max(values.values()) / size <= expected + 4 * deviation, description
 
 
-def test_grounded_instructions_exist_only_where_a_value_can_be_seen():
-    """StopCube has nothing to see. A color can be hidden where there are several (not in easy
-    scenes), and VideoRepick hides only the number of repetitions."""
+def test_stopcube_has_no_grounded_setting():
+    """Its goal is a number of visits, and nothing in the scene shows a number."""
     assert "grounded" not in settings_of(get_task("StopCube"))
-    for task in ("PickXtimes", "SwingXtimes"):
-        for episode, said in grounded_instructions(task):
-            assert said.metadata["touched"] == ["color"]
-            assert episode.difficulty != "easy"
+
+
+@pytest.mark.parametrize("task", ["PickXtimes", "SwingXtimes"])
+def test_the_color_is_hidden_only_in_scenes_with_several_colors(task):
+    """Easy scenes have one cube, so that its color is no choice."""
+    for episode, said in grounded_instructions(task):
+        assert said.metadata["touched"] == ["color"]
+        assert episode.difficulty != "easy"
+
+
+def test_grounded_videorepick_hides_the_number_of_repetitions():
+    """*As often as the cubes switched places*: the number is seen in the video."""
     for _, said in grounded_instructions("VideoRepick"):
         assert said.metadata["touched"] == ["repeats"]

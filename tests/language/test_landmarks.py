@@ -1,318 +1,336 @@
-"""Landmarks: clear margins and mirrored frames. tests/reader/test_places.py reads them."""
+"""Landmarks: phrases for where an object stands, such as *closest to the button*.
+
+A phrase is said only of an object that leads all others by the margin of 3 cm. In the scenes here,
+places are points (x, y) in meters on the table: x grows away from the robot, y to the robot's left.
+"""
 
 import itertools
 import math
-from collections import defaultdict
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from language_variants import SPATIAL_TASKS, random_episodes
+from language_variants import SPATIAL_TASKS, random_episodes, said_where_possible
 
 from roboirg.core.episode import COLORS, SPLITS, Point, Scene, SceneObject
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.motions import Away
-from roboirg.language import instruct_with
 from roboirg.language.generator import find_refusal
-from roboirg.language.landmarks import (
-    FRAMES,
-    MARGIN,
-    candidates_in,
-    selectors,
-)
+from roboirg.language.landmarks import FRAMES, MARGIN, selectors, things_of_color
 from roboirg.language.places import things_at
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.published_episodes import published_episode
 from roboirg.tasks.splits.splits import get_episode
 
-GRID = st.integers(-17, 17).map(lambda step: step / 100)
-PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=8, unique=True)
-"""Centimeter grid: ties, exact margins and collinear rows are common."""
-FAR_SIDES = {"at your far left", "at your far right"}
-EXTREMES = {
-    "farthest to your left",
-    "farthest to your right",
-    "closest to you",
-    "farthest from you",
-}
+each_task_with_places = pytest.mark.parametrize("task", SPATIAL_TASKS)
+coordinates = st.integers(-17, 17).map(lambda centimeters: centimeters / 100)
+two_to_eight_places = st.lists(
+    st.tuples(coordinates, coordinates), min_size=2, max_size=8, unique=True
+)
+"""Points of a grid of centimeters, on which ties and leads of exactly the margin are common."""
 
 
-def containers(places):
-    return Scene(
-        tuple(
-            SceneObject(f"container_{index}", "container", Point(x, y, 0.05))
-            for index, (x, y) in enumerate(places)
-        )
-    )
+def containers(*places):
+    """Return a scene with container_0, container_1 … at these places."""
+    objects = []
+    for index, (x, y) in enumerate(places):
+        objects.append(SceneObject(f"container_{index}", "container", Point(x, y, 0.05)))
+    return Scene(tuple(objects))
 
 
-def with_button(places, button):
-    fixture = SceneObject("button", "button", Point(*button, 0.0))
-    return Scene((fixture, *containers(places).objects))
+def cubes(*places):
+    """Return a scene with cube_red, cube_green, cube_blue at these places, button and target."""
+    button = SceneObject("button", "button", Point(-0.2, 0.0, 0.0))
+    target = SceneObject("target", "target", Point(0.0, 0.1, 0.0))
+    objects = [button, target]
+    for color, (x, y) in zip(COLORS, places, strict=False):
+        objects.append(SceneObject(f"cube_{color}", "cube", Point(x, y, 0.02), color=color))
+    return Scene(tuple(objects))
 
 
-def cubes(places, button=(-0.2, 0.0), target=(0.0, 0.1)):
-    things = [
-        SceneObject(f"cube_{color}", "cube", Point(x, y, 0.02), color=color)
-        for color, (x, y) in zip(COLORS, places, strict=False)
-    ]
-    fixtures = [
-        SceneObject(kind, kind, Point(*place, 0.0))
-        for kind, place in (("button", button), ("target", target))
-    ]
-    return Scene((*fixtures, *things))
-
-
-def landmarks_of(scene, thing, target, frame="robot"):
-    """The landmarks that single out a thing."""
-    return [
-        selector.landmark
-        for selector in selectors(scene, thing, frame)
-        if selector.select() is target
-    ]
-
-
-def phrases_that_select(scene, target, thing="container", frame="robot"):
-    return {selector.phrase for selector in landmarks_of(scene, thing, scene[target], frame)}
+def name_called(scene, phrase, kind="container", frame="robot"):
+    """Return the name of the object of a kind that a phrase singles out; None if there is none."""
+    for selector in selectors(scene, kind, frame):
+        thing = selector.select()
+        if selector.landmark.phrase == phrase and thing is not None:
+            return thing.name
+    return None
 
 
 @pytest.mark.parametrize("frame", FRAMES)
-@pytest.mark.parametrize("task", SPATIAL_TASKS)
+@each_task_with_places
 def test_in_published_scenes_words_of_place_single_out_a_goal_object(task, frame):
-    """A landmark phrase, such as *closest to the button*, selects one object or none.
+    """In every seventh published scene, some phrase singles out an object of a goal's color.
 
-    In each scene at least one cube (or its container) of the goal's colors must be selectable.
+    The object is a cube or the container over it. Without one, the spatial setting has no words.
     """
+    kind = get_task(task).things.pointed
     for split, index in itertools.product(SPLITS, range(FRAMES.index(frame), 100, 7)):
-        found = published_episode(task, split, index)
-        if found is None:
+        published = published_episode(task, split, index)
+        if published is None:
             continue
-        named = set(slot_colors(found.goal))
-        scene = found.scene
-        thing = get_task(task).things.pointed
-        told = set()
-        for cube in (*candidates_in(scene, "cube"), *scene.of_kind("hidden_cube")):
-            place = scene[cube.inside] if thing == "container" else cube
-            if cube.color in named and place in things_at(scene, thing, frame).values():
-                told.add(cube.color)
-        assert told, (task, split, index)
-
-
-def slot_colors(goal):
-    return goal.texts("colors") if "colors" in dict(goal.slots) else (goal.text("color"),)
-
-
-@settings(max_examples=40)
-@given(PLACES)
-def test_a_superlative_is_used_only_if_it_is_true_by_the_margin(places):
-    """*Farthest to your left* is said of a container only if every other one is at least `MARGIN`
-    less far to the left; the robot's left is positive y, and far from it is positive x."""
-    scene = containers(places)
-    for index, (x, y) in enumerate(places):
-        others = [*places[:index], *places[index + 1 :]]
-        found = phrases_that_select(scene, f"container_{index}")
-        holds = {
-            "farthest to your left": all(y - left >= MARGIN for _, left in others),
-            "farthest to your right": all(left - y >= MARGIN for _, left in others),
-            "closest to you": all(ahead - x >= MARGIN for ahead, _ in others),
-            "farthest from you": all(x - ahead >= MARGIN for ahead, _ in others),
-        }
-        assert set(holds) == EXTREMES
-        for phrase in EXTREMES:
-            assert (phrase in found) == holds[phrase], phrase
-
-
-def test_every_superlative_applies_to_a_single_cube():
-    scene = cubes([(0.0, 0.0)])
-    assert phrases_that_select(scene, "cube_red", "cube") >= EXTREMES | FAR_SIDES
-
-
-FIVE_IN_A_ROW = [(0.0, y) for y in (-0.16, -0.08, 0.0, 0.08, 0.16)]
-TWO_EQUALLY_FAR_LEFT = [(0.0, 0.1), (0.1, 0.1), (0.05, -0.1)]
-ONE_LEFT_ONE_RIGHT = [(0.0, 0.15), (0.0, -0.15)]
-ONE_NEAR_ONE_FAR = [(-0.15, 0.0), (0.15, 0.0)]
+        goal = published.goal.as_mapping()
+        objects = []
+        for color in goal.get("colors") or [goal["color"]]:
+            objects += things_of_color(published.scene, kind, color)
+        singled_out = things_at(published.scene, kind, frame).values()
+        assert any(item in singled_out for item in objects), (task, split, index)
 
 
 @pytest.mark.parametrize(
-    ("places", "index", "frame", "words"),
+    ("phrase", "how_far"),
     [
-        # Ties have no landmark of that direction.
-        (TWO_EQUALLY_FAR_LEFT, 0, "robot", {"closest to you"}),
-        (TWO_EQUALLY_FAR_LEFT, 2, "robot", {"farthest to your right", "at your far right"}),
-        (FIVE_IN_A_ROW, 2, "robot", {"third from your left", "third from your right"}),
-        (FIVE_IN_A_ROW, 3, "robot", {"second from your left"}),
-        # Left is mirrored for the camera; near and far are the robot's in both frames.
-        (ONE_LEFT_ONE_RIGHT, 0, "robot", {"farthest to your left", "at your far left"}),
-        (ONE_LEFT_ONE_RIGHT, 0, "camera", {"farthest to the camera's right"}),
-        (ONE_NEAR_ONE_FAR, 0, "robot", {"closest to you"}),
-        (ONE_NEAR_ONE_FAR, 0, "camera", {"closest to the robot"}),
+        ("farthest to your left", lambda x, y: y),
+        ("farthest to your right", lambda x, y: -y),
+        ("closest to you", lambda x, y: -x),
+        ("farthest from you", lambda x, y: x),
+    ],
+    ids=["left", "right", "near", "far"],
+)
+@settings(max_examples=40)
+@given(places=two_to_eight_places)
+def test_a_superlative_is_used_only_if_it_is_true_by_the_margin(phrase, how_far, places):
+    """*Farthest to your left* is said of the container with the largest y, if no other one's is
+    less than 3 cm smaller. `how_far` is how far a place lies in the direction of the phrase."""
+    distances = [how_far(*place) for place in places]
+    second, first = sorted(distances)[-2:]
+    expected = f"container_{distances.index(first)}" if first - second >= MARGIN else None
+
+    assert name_called(containers(*places), phrase) == expected
+
+
+@pytest.mark.parametrize(
+    ("lead", "expected"),
+    [
+        (0.0, None),
+        (0.015, None),
+        (math.nextafter(0.03, 0.0), None),
+        (0.03, "container_0"),
+    ],
+    ids=["no lead", "half the margin", "hardly less than the margin", "the margin"],
+)
+def test_a_lead_of_exactly_the_margin_is_enough_for_a_superlative(lead, expected):
+    """`lead` is how much farther to the left container_0 stands, in meters."""
+    scene = containers((0.0, lead), (0.0, 0.0))
+    assert name_called(scene, "farthest to your left") == expected
+
+
+@pytest.mark.parametrize(
+    "phrase",
+    [
+        "farthest to your left",
+        "farthest to your right",
+        "at your far left",
+        "at your far right",
+        "closest to you",
+        "farthest from you",
     ],
 )
-def test_examples_of_phrases_for_the_place_of_a_container(places, index, frame, words):
-    """`places` are points (x, y) in meters: x points away from the robot, y to its left.
+def test_every_superlative_applies_to_a_single_cube(phrase):
+    """The only cube leads all others in every direction."""
+    scene = cubes((0.0, 0.0))
+    assert name_called(scene, phrase, "cube") == "cube_red"
 
-    Words for the camera mirror left and right, since it looks back at the robot.
-    """
-    assert phrases_that_select(containers(places), f"container_{index}", frame=frame) >= words
+
+def test_of_two_objects_equally_far_to_the_left_none_is_the_leftmost():
+    """container_0 and container_1 stand equally far to the left, container_2 to the right of
+    them."""
+    scene = containers((0.0, 0.1), (0.1, 0.1), (0.05, -0.1))
+
+    assert name_called(scene, "farthest to your left") is None
+    assert name_called(scene, "farthest to your right") == "container_2"
+    assert name_called(scene, "at your far right") == "container_2"
+    assert name_called(scene, "closest to you") == "container_0"
+
+
+@pytest.mark.parametrize(
+    ("phrase", "expected"),
+    [
+        ("second from your left", "container_3"),
+        ("third from your left", "container_2"),
+        ("third from your right", "container_2"),
+    ],
+)
+def test_objects_in_a_row_are_counted_from_either_side(phrase, expected):
+    """Five containers stand in a row, container_0 on the robot's right, container_4 on its left."""
+    row = containers((0.0, -0.16), (0.0, -0.08), (0.0, 0.0), (0.0, 0.08), (0.0, 0.16))
+    assert name_called(row, phrase) == expected
+
+
+@pytest.mark.parametrize("phrase", ["fourth from your left", "fourth from your right"])
+def test_the_middle_one_of_seven_is_the_fourth_from_either_side(phrase):
+    """Seven containers stand in a row, from the robot's right to its left."""
+    row = containers(
+        (0.0, -0.15), (0.0, -0.1), (0.0, -0.05), (0.0, 0.0), (0.0, 0.05), (0.0, 0.1), (0.0, 0.15)
+    )
+    assert name_called(row, phrase) == "container_3"
+
+
+@pytest.mark.parametrize(
+    ("frame", "phrase"),
+    [
+        ("robot", "farthest to your left"),
+        ("robot", "at your far left"),
+        ("camera", "farthest to the camera's right"),
+    ],
+)
+def test_the_robot_s_left_is_the_right_of_the_camera_that_faces_it(frame, phrase):
+    """container_0 stands 15 cm to the robot's left, container_1 as far to its right."""
+    scene = containers((0.0, 0.15), (0.0, -0.15))
+    assert name_called(scene, phrase, frame=frame) == "container_0"
+
+
+@pytest.mark.parametrize(
+    ("frame", "phrase"), [("robot", "closest to you"), ("camera", "closest to the robot")]
+)
+def test_near_and_far_are_the_robot_s_in_both_frames(frame, phrase):
+    """The camera on the other side of the table is nearer to container_1."""
+    scene = containers((-0.15, 0.0), (0.15, 0.0))
+    assert name_called(scene, phrase, frame=frame) == "container_0"
 
 
 def test_at_your_far_right_is_not_said_of_a_thing_in_the_near_right_corner():
-    """*At your far right* could be heard as the far corner; container_1 is in the near one."""
-    scene = containers([(0.1, 0.0), (-0.2, -0.15)])
-    assert "farthest to your right" in phrases_that_select(scene, "container_1")
-    assert "at your far right" not in phrases_that_select(
-        scene, "container_1"
-    )  # perhaps the far corner
+    """container_1 is the rightmost one, but *at your far right* could mean the far corner."""
+    scene = containers((0.1, 0.0), (-0.2, -0.15))
+
+    assert name_called(scene, "farthest to your right") == "container_1"
+    assert name_called(scene, "at your far right") is None
 
 
-def test_the_middle_one_of_seven_is_the_fourth_from_either_side():
-    scene = containers([(0.0, y) for y in (-0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15)])
-    by_rank = {"fourth from your left", "fourth from your right"}
-
-    every = {
-        selector.landmark.phrase: selector for selector in selectors(scene, "container", "robot")
-    }
-
-    assert all(every[words].select() is scene["container_3"] for words in by_rank)
-
-
-@pytest.mark.parametrize("count", [3, 4, 6])
-def test_a_place_has_these_words_and_no_others(count, snapshot):
+@pytest.mark.parametrize(
+    ("kind", "count"), [("cube", 3), ("container", 4), ("container", 6)], ids=["3", "4", "6"]
+)
+def test_a_place_has_these_words_and_no_others(kind, count, snapshot):
     """The full list of phrases for 3, 4 and 6 objects, compared with a stored one.
 
     A phrase that is lost or added changes no published text as long as others can be said.
     """
     places = [(-0.15, 0.02), (0.12, -0.14), (0.04, 0.16), (-0.05, -0.09), (0.16, 0.07), (0.0, 0.0)]
-    thing = "container" if count > len(COLORS) else "cube"
-    scene = with_button(places[:count], (-0.2, 0)) if thing == "container" else cubes(places)
+    if kind == "cube":
+        scene = cubes(*places[:count])
+    else:
+        button = SceneObject("button", "button", Point(-0.2, 0.0, 0.0))
+        scene = Scene((button, *containers(*places[:count]).objects))
 
-    found = [
-        (selector.landmark, selector.select()) for selector in selectors(scene, thing, "robot")
-    ]
+    found = []
+    for selector in selectors(scene, kind, "robot"):
+        thing = selector.select()
+        if thing is not None:
+            found.append(f"{selector.landmark.phrase}: {thing.name}")
 
-    assert [f"{mark.phrase}: {item.name}" for mark, item in found if item] == snapshot
-
-
-def selected(scene):
-    """What each of the words selects, if anything."""
-    found = {
-        selector.landmark.phrase: selector.select()
-        for selector in selectors(scene, "container", "robot")
-    }
-    return {words: item for words, item in found.items() if item is not None}
+    assert found == snapshot
 
 
 def test_left_and_right_of_the_camera_follow_its_picture_and_not_the_table():
-    """Perspective: a thing farther to the side appears nearer to the middle if it is far away."""
-    # The second one stands farther to the side, but so far from the camera that the picture shows
-    # it farther in.
-    near_camera = (0.2, 0.135)
-    far_away = (-0.2, 0.165)
+    """Perspective: what is farther away appears nearer to the middle of the picture.
 
-    scene = containers([near_camera, far_away])
+    container_1 stands 3 cm farther to the robot's left than container_0, but so much farther from
+    the camera that the picture shows container_0 farther to the right.
+    """
+    scene = containers((0.2, 0.135), (-0.2, 0.165))
 
-    assert phrases_that_select(scene, "container_1") >= {"farthest to your left"}
-    assert phrases_that_select(scene, "container_0", frame="camera") >= {
-        "farthest to the camera's right"
-    }
-    assert "farthest to the camera's right" not in phrases_that_select(
-        scene, "container_1", frame="camera"
-    )
+    assert name_called(scene, "farthest to your left") == "container_1"
+    assert name_called(scene, "farthest to the camera's right", frame="camera") == "container_0"
+
+
+def test_a_thing_is_in_a_corner_if_work_area_and_table_agree():
+    """A listener may think of the corner of the table or of the area where things stand."""
+    clear = containers((-0.15, 0.15), (-0.15, -0.15), (0.15, 0.15), (0.15, -0.15))
+    assert name_called(clear, "closest to your near left corner") == "container_0"
 
 
 def test_a_corner_phrase_is_dropped_if_work_area_and_table_corner_disagree():
-    """A listener may take *your near left corner* for that of the table or of the work area."""
-    # Extremes are blocked by ties; seen from the work area's corner (-0.3, 0.25) container_0 is the
-    # nearest, seen from the table's (-0.74, 1.20) it is container_1.
-    scene = containers([(-0.11, 0.06), (0.0, 0.17), (-0.11, -0.2), (0.0, -0.2), (0.1, 0.17)])
+    """The near left corner of the work area is at (-0.3, 0.25), that of the table at (-0.74, 1.2).
+
+    container_0 is the nearest to the first, and container_1 to the second.
+    """
     words = "closest to your near left corner"
-    corner = next(
-        selector
-        for selector in selectors(scene, "container", "robot")
-        if selector.landmark[0] == words
-    )
-    work_area, table = (ranking.select(corner.candidates, 0) for ranking in corner.rankings)
+    scene = containers((-0.11, 0.06), (0.0, 0.17), (-0.11, -0.2), (0.0, -0.2), (0.1, 0.17))
+    by_phrase = {
+        selector.landmark.phrase: selector for selector in selectors(scene, "container", "robot")
+    }
+    corner = by_phrase[words]
+    nearest = [ranking.select(corner.candidates, 0).name for ranking in corner.rankings]
 
-    assert work_area is scene["container_0"]
-    assert table is scene["container_1"]
-    assert corner.select() is None
-
-    clear = containers([(-0.15, 0.15), (-0.15, -0.15), (0.15, 0.15), (0.15, -0.15)])
-    assert words in phrases_that_select(clear, "container_0")
+    assert nearest == ["container_0", "container_1"]
+    assert name_called(scene, words) is None
 
 
-@pytest.mark.parametrize("task", SPATIAL_TASKS)
+@each_task_with_places
 def test_places_in_the_camera_frame_never_say_you(task):
     """The robot is *you*; words from the camera's point of view must not mix in the robot's."""
     options = InstructionOptions("spatial", frame="camera")
-    for episode in random_episodes(task, 40):
-        if find_refusal(episode, options) is None:
-            (place,) = instruct_with(episode, options).metadata["landmarks"]
-            assert not {"you", "your"} & set(place.split())
+    for _, said in said_where_possible(random_episodes(task, 40), options):
+        (place,) = said.metadata["landmarks"]
+        assert {"you", "your"}.isdisjoint(place.split()), place
 
 
 def test_a_cube_that_arrives_later_is_not_compared_with_the_others():
-    """The motion `Away` keeps cube_red off the table for the first 50 steps."""
-    scene = cubes([(0.0, 0.15), (0.0, -0.15), (0.1, 0.0)])
+    """The red cube stands farthest to the left, but only from step 50 on.
+
+    The motion `Away` keeps it off the table before, and then the green cube is the leftmost one.
+    """
+    scene = cubes((0.1, 0.15), (0.0, 0.0), (0.0, -0.15))
     late = Scene(scene.objects, motions=(Away("cube_red", 0, 50),))
 
-    assert phrases_that_select(scene, "cube_red", "cube") >= {
-        "farthest to your left",
-        "at your far left",
-    }
-    assert not phrases_that_select(late, "cube_red", "cube")
-    assert "farthest to your left" in phrases_that_select(late, "cube_blue", "cube")
+    assert name_called(scene, "farthest to your left", "cube") == "cube_red"
+    assert name_called(late, "farthest to your left", "cube") == "cube_green"
 
 
-def test_containers_that_appear_during_the_video_can_be_named_by_place():
-    """Unlike cubes, containers all come up at the same time, so they are compared."""
-    scene = containers([(0.0, 0.15), (0.0, -0.15)])
-    appearing = tuple(Away(thing.name, 0, 32) for thing in scene.objects)
-    assert phrases_that_select(Scene(scene.objects, motions=appearing), "container_0") >= {
-        "farthest to your left", "at your far left",
-    }  # fmt: skip
+def test_a_cube_that_arrives_later_has_no_words_for_its_place():
+    """The motion `Away` keeps the red cube off the table for the first 50 steps."""
+    scene = cubes((0.0, 0.15), (0.0, -0.15), (0.1, 0.0))
+    late = Scene(scene.objects, motions=(Away("cube_red", 0, 50),))
+
+    selected = [selector.select() for selector in selectors(late, "cube", "robot")]
+
+    assert late["cube_red"] not in selected
+
+
+@pytest.mark.parametrize("phrase", ["farthest to your left", "at your far left"])
+def test_containers_that_appear_during_the_video_can_be_named_by_place(phrase):
+    """Unlike cubes, containers all come up at the same time, here at step 32."""
+    scene = containers((0.0, 0.15), (0.0, -0.15))
+    motions = (Away("container_0", 0, 32), Away("container_1", 0, 32))
+
+    assert name_called(Scene(scene.objects, motions=motions), phrase) == "container_0"
 
 
 def test_cubes_can_be_named_by_their_distance_to_the_bin():
-    bin_ = SceneObject("bin", "bin", Point(-0.2, 0.0, 0.0))
-    scene = Scene((*cubes([(-0.1, 0.0), (0.1, 0.0)]).of_kind("cube"), bin_))
-
-    found = {
-        selector.landmark.phrase: selector.select()
-        for selector in selectors(scene, "cube", "robot")
-    }
-
-    assert found["closest to the bin"] is scene["cube_red"]
-    assert found["farthest from the bin"] is scene["cube_green"]
+    """The red cube stands 10 cm from the bin, the green one 30 cm."""
+    scene = Scene(
+        (
+            SceneObject("bin", "bin", Point(-0.2, 0.0, 0.0)),
+            SceneObject("cube_red", "cube", Point(-0.1, 0.0, 0.02), color="red"),
+            SceneObject("cube_green", "cube", Point(0.1, 0.0, 0.02), color="green"),
+        )
+    )
+    assert name_called(scene, "closest to the bin", "cube") == "cube_red"
+    assert name_called(scene, "farthest from the bin", "cube") == "cube_green"
 
 
 def test_in_binfill_the_place_that_is_said_has_a_cube_of_a_goal_color():
-    for episode in random_episodes("BinFill", 30):
-        if find_refusal(episode, InstructionOptions("spatial")):
-            continue
-        (place,) = instruct_with(episode, InstructionOptions("spatial")).metadata["landmarks"]
-        thing = things_at(episode.scene, "cube", "robot")[place]
-        assert thing.color in episode.goal.texts("colors")
+    """*My boss hates the color of the cube second from the right* must lead to a goal's color."""
+    options = InstructionOptions("spatial")
+    for episode, said in said_where_possible(random_episodes("BinFill", 30), options):
+        (place,) = said.metadata["landmarks"]
+        cube = things_at(episode.scene, "cube", "robot")[place]
+        assert cube.color in episode.goal.texts("colors"), said.text
 
 
-@pytest.mark.parametrize("task", SPATIAL_TASKS)
+@each_task_with_places
 def test_at_most_a_few_percent_of_scenes_have_no_phrase_for_the_goal_object(task):
-    """Such an episode is left out of the spatial setting, so they must be rare."""
-    found: dict[str, list[bool]] = defaultdict(list)
+    """Such an episode is left out of the spatial setting, so they must be rare.
+
+    BinFill's hard scenes have most: 5.1 % of 10,000 seeds. Of the 80 seeds here at most 5 % may
+    lack one, and of those of each difficulty at most 10 %.
+    """
+    lacking = {"easy": [], "medium": [], "hard": []}
     for index in range(80):
         episode = get_episode(task, "random", index)
-        is_told = find_refusal(episode, InstructionOptions("spatial")) is None
-        found[episode.difficulty].append(is_told)
-    # 5.1 % of hard BinFill scenes on 10,000 seeds; room for chance on few.
-    for told in found.values():
-        assert told.count(False) < 0.10 * len(told)
+        refusal = find_refusal(episode, InstructionOptions("spatial"))
+        lacking[episode.difficulty].append(refusal is not None)
 
-    everywhere = list(itertools.chain.from_iterable(found.values()))
-    assert everywhere.count(False) < 0.05 * len(everywhere)
-
-
-@pytest.mark.parametrize("gap", [0.0, MARGIN / 2, math.nextafter(MARGIN, 0.0), MARGIN])
-def test_a_lead_of_exactly_the_margin_is_enough_for_a_superlative(gap):
-    """`gap` is how much farther to the left container_0 stands, in meters."""
-    scene = containers([(0.0, gap), (0.0, 0.0)])
-    assert bool(phrases_that_select(scene, "container_0")) == (gap >= MARGIN)
+    for is_lacking in lacking.values():
+        assert sum(is_lacking) <= 0.10 * len(is_lacking)
+    assert sum(map(sum, lacking.values())) < 0.05 * 80

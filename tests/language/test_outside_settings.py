@@ -1,4 +1,7 @@
-"""A setting from outside: one file is enough for lists, plans, statistics and export."""
+"""Settings that another package brings: they appear in lists, plans, statistics and exports.
+
+A setting is a way to leave values of a goal unsaid, such as *direct*, which says *it* for a cube.
+"""
 
 import dataclasses
 import io
@@ -22,7 +25,6 @@ from roboirg.language import (
 )
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction_row import row
-from roboirg.language.number_words import times
 from roboirg.language.scenarios import spoken
 from roboirg.language.scenarios.scenario_file import FOLDER, setting_scenarios
 from roboirg.language.scenarios.wording_file import parse_wordings
@@ -35,135 +37,194 @@ from roboirg.shortcuts.command_chance import understood_goals
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
-EASY_EPISODE = get_episode("PickXtimes", "test", 0)  # easy
+EASY_EPISODE = get_episode("PickXtimes", "test", 0)
 HARD_EPISODE = get_episode("PickXtimes", "test", 3)
+"""Its goal is to put the blue cube on the target four times."""
 TOO_EASY = "the scene is too easy"
-
-NOT_FOR_EASY_SCENES = Setting(
+DUMMY = Setting(
     name="dummy",
     order=9,
     summary="direct, but not in easy scenes",
     color="#123456",
-    offers="contextual",
+    content_plans="contextual",
     applies_to=lambda task: task.suite == "counting",
     refusal=lambda request: TOO_EASY if request.episode.difficulty == "easy" else None,
     example=0,
 )
+"""A setting for the tasks of one suite, which refuses easy scenes."""
 
 
 @pytest.fixture
 def register(monkeypatch):
-    """Adds settings to those of the language for the length of a test."""
+    """A function that adds settings to those of the language for the length of a test."""
     found = dict(all_settings())
 
     def add(*more):
         added = {setting.name: setting for setting in more}
         monkeypatch.setattr(settings, "discover", lambda *_: {**found, **added})
         all_settings.cache_clear()
+        setting_scenarios.cache_clear()
 
     yield add
     monkeypatch.undo()
     all_settings.cache_clear()
+    setting_scenarios.cache_clear()
 
 
 def printed(*tables):
+    """Return what is printed of tables."""
     console = Console(width=200, file=io.StringIO())
     for table in tables:
         console.print(table)
     return console.file.getvalue()
 
 
-def test_a_registered_setting_is_listed_for_the_tasks_it_applies_to(register):
-    """A setting is a way of giving commands; this one, "dummy", applies to the suite *counting*."""
-    register(NOT_FOR_EASY_SCENES)
-    counting = [task.name for task in all_tasks().values() if task.suite == "counting"]
-
+def test_a_registered_setting_is_listed_last(register):
+    """DUMMY has the order 9, and ours have lower ones."""
+    register(DUMMY)
     assert setting_names()[-1] == "dummy"
-    assert [name for name, task in all_tasks().items() if "dummy" in settings_of(task)] == counting
+
+
+def test_a_registered_setting_is_one_of_the_tasks_it_applies_to(register):
+    """DUMMY applies to the four tasks of the suite *counting*."""
+    register(DUMMY)
+    tasks = [name for name, task in all_tasks().items() if "dummy" in settings_of(task)]
+    assert sorted(tasks) == ["BinFill", "PickXtimes", "StopCube", "SwingXtimes"]
+
+
+def test_a_task_that_a_registered_setting_does_not_apply_to_refuses_it(register):
+    """VideoUnmask is not in the suite *counting*, for which DUMMY is."""
+    register(DUMMY)
     with pytest.raises(InvalidValueError, match="has no dummy setting"):
         instruct(get_episode("VideoUnmask", "test", 0), "dummy")
 
 
-def test_the_reason_why_a_setting_refuses_a_scene_is_shown_everywhere(register):
-    """The setting "dummy" refuses easy scenes; lists, errors, tables and plans must show that."""
-    register(NOT_FOR_EASY_SCENES)
-    assert "dummy" not in expressible(EASY_EPISODE)
+def test_a_scene_that_a_registered_setting_refuses_cannot_be_expressed_in_it(register):
+    """DUMMY refuses easy scenes."""
+    register(DUMMY)
+
     assert "dummy" in expressible(HARD_EPISODE)
-    assert find_refusals(EASY_EPISODE)["dummy"] == TOO_EASY
-    with pytest.raises(InvalidValueError, match=f"dummy setting cannot express .*{TOO_EASY}"):
+    assert "dummy" not in expressible(EASY_EPISODE)
+    assert find_refusals(EASY_EPISODE)["dummy"] == "the scene is too easy"
+
+
+def test_the_reason_why_a_setting_refuses_a_scene_is_in_the_error(register):
+    """DUMMY refuses easy scenes."""
+    register(DUMMY)
+    complaint = "dummy setting cannot express .*the scene is too easy"
+    with pytest.raises(InvalidValueError, match=complaint):
         instruct(EASY_EPISODE, "dummy")
-    assert TOO_EASY in printed(instructions_table(EASY_EPISODE, ["dummy"], InstructionOptions()))
 
+
+def test_the_reason_why_a_setting_refuses_a_scene_is_in_the_table_of_instructions(register):
+    """The table is that of `roboirg show --words`."""
+    register(DUMMY)
+    table = instructions_table(EASY_EPISODE, ["dummy"], InstructionOptions())
+    assert "the scene is too easy" in printed(table)
+
+
+@pytest.mark.parametrize(("index", "is_planned"), [(0, False), (3, True)], ids=["easy", "hard"])
+def test_a_plan_leaves_out_the_episodes_that_a_registered_setting_refuses(
+    register, index, is_planned
+):
+    """Episode 0 is easy, episode 3 hard; DUMMY refuses easy ones."""
+    register(DUMMY)
     plan = make_plan(["listener"], tasks="PickXtimes", settings="all", episodes="0,3")
-    assert ["dummy" in plan.settings_of("PickXtimes", index) for index in (0, 3)] == [False, True]
+    assert ("dummy" in plan.settings_of("PickXtimes", index)) == is_planned
 
 
-def test_a_registered_setting_does_not_change_which_episodes_are_published(register, monkeypatch):
+def test_a_registered_setting_does_not_change_which_episodes_are_published(register):
     """Episodes were accepted if our own settings can express them; a new one has no say in this."""
-    slot = EpisodeSlot("PickXtimes", "test", 0)
-    register(NOT_FOR_EASY_SCENES)
-    assert check_words(slot, EASY_EPISODE.seed) is None
+    register(DUMMY)
+    assert check_words(EpisodeSlot("PickXtimes", "test", 0), EASY_EPISODE.seed) is None
 
+
+def test_an_episode_that_one_of_our_settings_refuses_would_not_be_published(register, monkeypatch):
+    """As if DUMMY were one of ours."""
+    register(DUMMY)
     monkeypatch.setattr(seed_selection, "ACCEPTANCE_SETTINGS", ("direct", "dummy"))
-    rejection = check_words(slot, EASY_EPISODE.seed)
-    assert (rejection.reason, rejection.cause) == ("not expressible", f"dummy: {TOO_EASY}")
+
+    rejection = check_words(EpisodeSlot("PickXtimes", "test", 0), EASY_EPISODE.seed)
+
+    assert rejection.reason == "not expressible"
+    assert rejection.cause == "dummy: the scene is too easy"
 
 
-def test_statistics_and_exported_rows_include_a_registered_setting(register):
-    """It refuses easy episodes, so it has two instructions (forms) for each of the others."""
-    register(NOT_FOR_EASY_SCENES)
-    episodes = [get_episode("PickXtimes", "test", index) for index in range(12)]
+def test_exported_rows_include_a_registered_setting_in_both_forms(register):
+    """It refuses the easy one of the two episodes, so both rows are those of the hard one."""
+    register(DUMMY)
+    told = instructions([EASY_EPISODE, HARD_EPISODE], setting_names(), FORMS)
 
-    jobs = list(instructions(episodes, setting_names(), FORMS))
+    rows = [row(*job) for job in told]
 
-    settings = [row(*job)["setting"] for job in jobs]
-    harder = [episode for episode in episodes if episode.difficulty != "easy"]
-    assert settings.count("dummy") == 2 * len(harder)
-    said = [instruction for _, instruction in jobs if instruction.form == "implicit"]
+    forms = [exported["form"] for exported in rows if exported["setting"] == "dummy"]
+    assert forms == ["implicit", "resolved"]
+
+
+def test_statistics_include_a_registered_setting(register):
+    register(DUMMY)
+    said = [said for _, said in instructions([HARD_EPISODE], setting_names(), ["implicit"])]
     assert "dummy" in printed(*statistics_tables.overview_tables(said))
 
 
-@pytest.mark.parametrize("name", ["direct", "reasoning", "spatial", "grounded", "direct-rival"])
-def test_a_setting_modeled_on_ours_speaks_the_scenarios_of_its_own_file(name, register, tmp_path):
-    """Scenarios are little stories around a command. A copy of one of our settings has none under
-    its new name, until it names a file that has some."""
-    add_lab = f"lab-{name}"
-    episode = get_episode("PickXtimes", "test", 6)
-    ours = (FOLDER / "color_and_number.toml").read_text()
-    path = tmp_path / "lab.toml"
-    path.write_text(ours.replace(f'setting = "{name}"', f'setting = "{add_lab}"'))
-    setting = dataclasses.replace(all_settings()[name], name=add_lab)
-    register(setting)
-    unwritten = r"\): color_and_number\.toml has no lab-\S+ scenario for it in the pool test; leave"
-    with pytest.raises(InvalidValueError, match=unwritten):
-        instruct(episode, add_lab)
+EACH_SETTING_WITH_SCENARIOS = pytest.mark.parametrize(
+    "name", ["direct", "reasoning", "spatial", "grounded", "direct-rival"]
+)
 
-    register(dataclasses.replace(setting, words=str(path)))
-    setting_scenarios.cache_clear()
-    scenarios = setting_scenarios(add_lab)["PickXtimes"].scenarios
-    of_the_pool = [scenario for scenario in scenarios if scenario.fields.pool == "test"]
+
+@EACH_SETTING_WITH_SCENARIOS
+def test_a_copy_of_a_setting_without_a_file_of_words_is_refused(name, register):
+    """Scenarios, templates of texts, are for one setting; ours are not for the copy."""
+    register(dataclasses.replace(all_settings()[name], name=f"lab-{name}"))
+    lacking = r"\): color_and_number\.toml has no lab-\S+ scenario for it in the pool test; leave"
+    with pytest.raises(InvalidValueError, match=lacking):
+        instruct(get_episode("PickXtimes", "test", 6), f"lab-{name}")
+
+
+@pytest.fixture
+def add_copy(register, tmp_path):
+    """A function that adds a copy of one of our settings, `lab-NAME`, with a file of its own.
+
+    The file is a copy of ours, with the name of the copied setting in its scenarios.
+    """
+
+    def add(name):
+        path = tmp_path / "lab.toml"
+        ours = (FOLDER / "color_and_number.toml").read_text()
+        path.write_text(ours.replace(f'setting = "{name}"', f'setting = "lab-{name}"'))
+        register(dataclasses.replace(all_settings()[name], name=f"lab-{name}", words=str(path)))
+
+    return add
+
+
+@EACH_SETTING_WITH_SCENARIOS
+def test_a_setting_modeled_on_ours_speaks_the_scenarios_of_its_own_file(name, add_copy):
+    """What it says means the goal, and is of a scenario for tests, since the episode is one."""
+    add_copy(name)
+    episode = get_episode("PickXtimes", "test", 6)
+    scenarios = setting_scenarios(f"lab-{name}")["PickXtimes"].scenarios
+    for_tests = [found.fields.frame for found in scenarios if found.fields.pool == "test"]
 
     for form in FORMS:
-        said = instruct(episode, add_lab, form)
-        assert understood_goals(said, episode) == (episode.goal,)
-        frame = said.metadata["scenario"]
-        (scenario,) = [found for found in of_the_pool if found.fields.frame == frame]
-        assert scenario.fields.setting == add_lab
-    states_color = episode.goal.text("color") in said.command
-    assert states_color or name not in ("direct", "direct-rival")
-
-    setting_scenarios.cache_clear()
+        said = instruct(episode, f"lab-{name}", form)
+        assert understood_goals(said, episode) == (episode.goal,), said.text
+        assert said.metadata["scenario"] in for_tests, said.text
 
 
-def test_copies_of_the_settings_explicit_and_contextual_give_the_same_commands(register):
-    made = [
-        dataclasses.replace(all_settings()[name], name=f"my-{name}")
-        for name in ("explicit", "contextual")
-    ]
-    register(*made)
-    for setting in made:
-        usual = instruct(HARD_EPISODE, setting.name.removeprefix("my-"))
-        assert instruct(HARD_EPISODE, setting.name).turns == usual.turns
+@pytest.mark.parametrize("name", ["direct", "direct-rival"])
+def test_a_resolved_command_of_a_copied_setting_names_the_color(name, add_copy):
+    """Its goal is a green cube."""
+    add_copy(name)
+    said = instruct(get_episode("PickXtimes", "test", 6), f"lab-{name}", "resolved")
+    assert "green" in said.command
+
+
+@pytest.mark.parametrize("name", ["explicit", "contextual"])
+def test_copies_of_the_settings_explicit_and_contextual_give_the_same_commands(name, register):
+    """They need no scenarios of their own: *explicit* has none, *contextual* uses those of
+    *direct*."""
+    register(dataclasses.replace(all_settings()[name], name=f"my-{name}"))
+    assert instruct(HARD_EPISODE, f"my-{name}").turns == instruct(HARD_EPISODE, name).turns
 
 
 LAB_FILE = """
@@ -193,71 +254,87 @@ say.repeats = ["<each repeats: [repeats: once for that lap|once for each of them
 
 @pytest.fixture
 def add_lab(register, tmp_path):
-    """A setting with a file of its own, of which the test gives the text."""
+    """A function that adds a setting "lab", like *direct*, with a file of this text."""
 
-    def add(text, **changes):
+    def add(text):
         path = tmp_path / "lab.toml"
         path.write_text(text)
-        made = dataclasses.replace(direct.SETTING, name="lab", words=str(path), **changes)
-        register(made)
-        setting_scenarios.cache_clear()
-        return made
+        register(dataclasses.replace(direct.SETTING, name="lab", words=str(path)))
 
-    yield add
-    setting_scenarios.cache_clear()
+    return add
+
+
+def test_a_setting_s_own_file_gives_it_introduction_command_and_phrase_for_a_value(add_lab):
+    """All three are in LAB_FILE; our words would be *Grab the blue cube …*"""
+    add_lab(LAB_FILE)
+
+    said = instruct(HARD_EPISODE, "lab")
+
+    assert said.turns[0] == "The lab says four times."
+    assert said.command.startswith("Lab: lift the lab's blue cube ")
 
 
 @pytest.mark.parametrize(
     ("mine", "introduction", "command"),
     [
-        ("", "The lab says {}.", "Lab: lift the lab's {} cube "),
-        (MY_COMMAND, "The lab says {}.", "Mine: lift the lab's {} cube "),
-        (MY_VALUE, "The lab says {}.", "Lab: lift my {} cube "),
-        (MY_SCENARIO, "I say {}.", "Lab: lift the lab's {} cube "),
-        (MY_COMMAND + MY_VALUE + MY_SCENARIO, "I say {}.", "Mine: lift my {} cube "),
+        (MY_COMMAND, "The lab says four times.", "Mine: lift the lab's blue cube "),
+        (MY_VALUE, "The lab says four times.", "Lab: lift my blue cube "),
+        (MY_SCENARIO, "I say four times.", "Lab: lift the lab's blue cube "),
+        (MY_COMMAND + MY_VALUE + MY_SCENARIO, "I say four times.", "Mine: lift my blue cube "),
     ],
+    ids=["command", "phrase", "introduction", "all"],
 )
-def test_words_of_a_user_file_win_over_those_of_a_setting_and_these_over_the_task_s(
-    add_lab, mine, introduction, command
-):
-    """A user's file ("mine") may bring a command, a phrase for a value, or an introduction; what it
-    lacks is taken from the setting's file ("lab"). Other settings ignore the lab's."""
+def test_words_of_a_user_file_win_over_those_of_a_setting(add_lab, mine, introduction, command):
+    """A user's file may bring a command, a phrase for a value, or an introduction; what it lacks is
+    taken from the setting's file."""
     add_lab(LAB_FILE)
-    wordings = register_wordings(parse_wordings(MY_FILE_HEAD + mine, "mine.toml")) if mine else None
+    wordings = register_wordings(parse_wordings(MY_FILE_HEAD + mine, "mine.toml"))
+
     said = instruct(HARD_EPISODE, "lab", wordings=wordings)
-    color = HARD_EPISODE.goal.text("color")
 
-    assert said.turns[0] == introduction.format(times(HARD_EPISODE.goal["repeats"]))
-    assert said.command.startswith(command.format(color))
+    assert said.turns[0] == introduction
+    assert said.command.startswith(command)
 
-    explicit = instruct(HARD_EPISODE, wordings=wordings).command
-    assert "Lab" not in explicit
-    assert explicit.startswith("Mine: ") == (MY_COMMAND in mine)
+
+def test_other_settings_do_not_use_a_setting_s_own_file(add_lab):
+    """Neither with our words nor with those of a user's file."""
+    add_lab(LAB_FILE)
+    wordings = register_wordings(parse_wordings(MY_FILE_HEAD + MY_COMMAND, "mine.toml"))
+
+    assert "Lab" not in instruct(HARD_EPISODE).text
+    assert instruct(HARD_EPISODE, wordings=wordings).text == "Mine: lift the blue cube four times."
 
 
 @pytest.mark.parametrize(
-    "wrong", ['name = "lab"\n', '[[literal]]\ntask = "PickXtimes"\ntext = "x"\n']
+    "text",
+    [f'name = "lab"\n{LAB_FILE}', f'{LAB_FILE}[[literal]]\ntask = "PickXtimes"\ntext = "x"\n'],
+    ids=["name", "whole sentence"],
 )
-def test_the_word_file_of_a_setting_with_a_name_or_a_whole_sentence_is_refused(add_lab, wrong):
+def test_the_word_file_of_a_setting_with_a_name_or_a_whole_sentence_is_refused(add_lab, text):
     """Both belong into files of users only."""
-    add_lab(wrong + LAB_FILE if "name" in wrong else LAB_FILE + wrong)
+    add_lab(text)
     with pytest.raises(InvalidValueError, match=r"^lab\.toml has a name or a \[\[literal"):
         instruct(HARD_EPISODE, "lab")
 
 
-def test_a_cached_choice_of_one_setting_does_not_answer_for_another(register):
+@pytest.mark.parametrize("first", ["direct", "calm"])
+def test_a_cached_choice_of_one_setting_does_not_answer_for_another(register, first):
     """ "calm" is a copy of *contextual* with its own refusal; *direct* shares the cache with it."""
     calm = dataclasses.replace(contextual.SETTING, name="calm", refusal=lambda _: "never calm")
     register(calm)
-    options = {name: InstructionOptions(name) for name in ("direct", "calm")}
-    for names in (("direct", "calm", "direct"), ("calm", "direct", "calm")):
-        spoken._CHOICES.clear()
-        refused = {name: find_refusal(HARD_EPISODE, options[name]) for name in names}
-        assert refused == {"direct": None, "calm": "never calm"}
+    spoken._CHOICES.clear()
+
+    find_refusal(HARD_EPISODE, InstructionOptions(first))
+
+    assert find_refusal(HARD_EPISODE, InstructionOptions("calm")) == "never calm"
+    assert find_refusal(HARD_EPISODE, InstructionOptions("direct")) is None
 
 
 def test_direct_and_contextual_share_one_cached_choice_of_scenario():
+    """The private cache is looked into, since only time would show a second choice."""
     spoken._CHOICES.clear()
-    for name in ("direct", "contextual"):
-        instruct(HARD_EPISODE, name)
-        assert len(spoken._CHOICES) == 1
+
+    instruct(HARD_EPISODE, "direct")
+    instruct(HARD_EPISODE, "contextual")
+
+    assert len(spoken._CHOICES) == 1

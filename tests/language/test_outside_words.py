@@ -1,4 +1,8 @@
-"""Words from another package, in a process where it is installed."""
+"""Words that another package brings, for a setting or a task of its own.
+
+The package is installed in a folder; a second process imports it from there, runs a short program,
+and prints what the program adds to the list `found`.
+"""
 
 import json
 import os
@@ -10,49 +14,43 @@ from pathlib import Path
 
 import pytest
 
-from roboirg.core.word_pools import POOLS
 from roboirg.language.scenarios.identity import words_of
 from roboirg.tasks import all_tasks
 
 DOCS = Path(__file__).parents[2] / "docs"
-SCENARIO_HEAD = """
+SCENARIO_OF_EACH_SETTING = """
 [[scenario]]
-frame = "%s"
-pool = "%s"
-setting = "%s"
-"""
-SCENARIO_OF_EACH_SETTING = [
-    (
-        "direct",
-        """
+frame = "NOUN 0"
+pool = "POOL"
+setting = "direct"
 introduction = "{person} wants a NOUN of the {color} cube."
 reinforcement = "{he} dreams of <it color: it> as a NOUN."
 distractors = ["Every NOUN takes hours.", "A NOUN is expensive.", "My last NOUN was lost."]
 competing = ["{he} already has a NOUN of {his} {rival color} hat."]
 cue = "Okay, the NOUN begins with <it color: it>."
 say.color = ["<it color: it>", "<that color: that cube>"]
-""",
-    ),
-    (
-        "reasoning",
-        """
+
+[[scenario]]
+frame = "NOUN 1"
+pool = "POOL"
+setting = "reasoning"
 derive.pattern = "color exclusion"
 introduction = "I already have a NOUN of the {excluded} [excluded: cube|cubes]."
 say.color = ["<other excluded: the other one>"]
-""",
-    ),
-    (
-        "reasoning",
-        """
+
+[[scenario]]
+frame = "NOUN 2"
+pool = "POOL"
+setting = "reasoning"
 list = "color"
 derive.pattern = "contextual logic"
 introduction = "I need a NOUN of the {list} cubes, but {person} has the {taken} one."
 say.color = ["<other color: the other one>"]
-""",
-    ),
-    (
-        "direct-rival",
-        """
+
+[[scenario]]
+frame = "NOUN 3"
+pool = "POOL"
+setting = "direct-rival"
 list = "color"
 introduction = "The NOUN of {person} has the {list.0} cube, and mine has the {list.1} one."
 say.color = ["<it color: it>"]
@@ -60,17 +58,15 @@ remarks.former = "The NOUN is ready for <former list.0: {hers}>: "
 remarks.latter = "The NOUN is ready for <latter list.1: the latter>: "
 remarks.not_former = "The NOUN cannot have <former list.0: {hers}>: "
 remarks.not_latter = "The NOUN cannot have <latter list.1: the latter>: "
-""",
-    ),
-    (
-        "grounded",
-        """
+
+[[scenario]]
+frame = "NOUN 4"
+pool = "POOL"
+setting = "grounded"
 introduction = "{clue} is missing from the NOUN."
 say.color = ["<it clue: it>"]
-""",
-    ),
-]
-"""Of every setting of the page's task, in other words for each pool."""
+"""
+"""Of every setting of the page's task; NOUN is another word for each pool of wordings."""
 
 
 def blocks(page: str, heading: str) -> list[str]:
@@ -83,12 +79,9 @@ def blocks(page: str, heading: str) -> list[str]:
 def words_for_every_setting() -> str:
     """Return the page's file of words with scenarios of every setting instead of its own."""
     head, _, _ = TASK_WORDS.partition("[[scenario]]")
-    scenarios = []
-    for pool, noun in zip(POOLS, ("painting", "film"), strict=True):
-        for number, (setting, text) in enumerate(SCENARIO_OF_EACH_SETTING):
-            scenario = SCENARIO_HEAD % (f"{noun} {number}", pool, setting) + text.strip()
-            scenarios.append(scenario.replace("NOUN", noun))
-    return head + "\n".join(scenarios)
+    train = SCENARIO_OF_EACH_SETTING.replace("POOL", "train").replace("NOUN", "painting")
+    test = SCENARIO_OF_EACH_SETTING.replace("POOL", "test").replace("NOUN", "film")
+    return head + train + test
 
 
 TASK_PAGE = (DOCS / "add-task.md").read_text()
@@ -99,7 +92,9 @@ COLORED, COLORED_PROJECT, COLORED_WORDS = blocks("add-setting.md", "Add a settin
 
 
 class InstalledPackage:
-    """A package as if it were installed.
+    """A package as if it were installed, with the code and words of two documentation pages.
+
+    It adds the task PlaceAndPress with words.toml, and the setting "colored" with colored.toml.
 
     Args:
         folder: where it lies.
@@ -124,15 +119,18 @@ class InstalledPackage:
         entries = ""
         for project in (TASK_PROJECT, COLORED_PROJECT):
             for group, points in tomllib.loads(project)["project"]["entry-points"].items():
-                lines = [f"{name} = {place}" for name, place in points.items()]
-                entries += "\n".join([f"[{group}]", *lines, ""])
-        (info / "entry_points.txt").write_text(_merged(entries))
+                ((name, place),) = points.items()
+                entries += f"[{group}]\n{name} = {place}\n"
+        (info / "entry_points.txt").write_text(entries)
 
     def run(self, code: str) -> list:
-        """Return what a program yields with `found`, where the package is installed."""
+        """Run a program in a process where the package is installed.
+
+        It may use the names that PROGRAM_HEAD imports. Returns what it adds to the list `found`.
+        """
         path = os.pathsep.join([str(self.folder), *sys.path])
         done = subprocess.run(
-            [sys.executable, "-c", IMPORTS + code + "\nprint(json.dumps(found))"],
+            [sys.executable, "-c", PROGRAM_HEAD + code + "\nprint(json.dumps(found))"],
             env={**os.environ, "PYTHONPATH": path},
             capture_output=True,
             text=True,
@@ -142,18 +140,7 @@ class InstalledPackage:
         return json.loads(done.stdout)
 
 
-def _merged(entries: str) -> str:
-    """Return entry points with each group once."""
-    groups: dict[str, list[str]] = {}
-    for line in entries.splitlines():
-        if line.startswith("["):
-            own = groups.setdefault(line, [])
-        else:
-            own.append(line)
-    return "\n".join("\n".join([group, *lines]) for group, lines in groups.items())
-
-
-IMPORTS = """
+PROGRAM_HEAD = """
 import itertools, json
 from dataclasses import replace
 from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
@@ -171,7 +158,7 @@ from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 found = []
 
-def refused(task, setting):
+def said_or_refused(task, setting):
     try:
         return instruct(get_episode(task, "test", 0), setting).text
     except InvalidValueError as error:
@@ -181,26 +168,55 @@ def refused(task, setting):
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory):
+    """The package of the documentation pages, installed."""
     return InstalledPackage(tmp_path_factory.mktemp("package"))
 
 
-def test_the_setting_of_the_documentation_page_speaks_the_words_of_its_own_file(package):
-    """Runs the page's code for a new setting, "colored", in a process where it is installed."""
-    found = package.run("""
+EACH_TASK_AND_POOL = """
 for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
     episode = get_episode(task, "test", 1)
     options = InstructionOptions("colored", wordings=pool)
     said = instruct_with(episode, options)
-    stated = instruct_with(episode, replace(options, form="resolved"))
-    explicit = instruct_with(episode, replace(options, setting="explicit"))
-    assert stated.turns == (said.turns[0], explicit.text)
+"""
+"""Says an episode of both tasks of the setting "colored", in the words of training and of tests."""
+
+
+def test_the_setting_of_the_documentation_page_speaks_the_words_of_its_own_file(package):
+    """The page's file has the scenarios "new coat" for training and "loan" for tests.
+
+    An instruction names the digest of the words.
+    """
+    found = package.run(
+        EACH_TASK_AND_POOL
+        + """
     assert said.metadata["words"] == words_of(task, pool, "colored")
-    assert understood_goals(said, episode) == (episode.goal,)
     found.append(said.metadata["scenario"])
-    reports = check_scenarios(setting_scenarios("colored")[task], None, scenes_of(task, 0)[::20])
-    found += [rule for report in reports for rule in report.broken]
+"""
+    )
+    assert found == ["new coat", "loan", "new coat", "loan"]
+
+
+def test_the_setting_of_the_documentation_page_means_the_goal_and_states_it_when_resolved(package):
+    """The resolved form has the same introduction, and then the explicit command."""
+    found = package.run(
+        EACH_TASK_AND_POOL
+        + """
+    found.append(understood_goals(said, episode) == (episode.goal,))
+    resolved = instruct_with(episode, replace(options, form="resolved"))
+    explicit = instruct_with(episode, replace(options, setting="explicit"))
+    found.append(resolved.turns == (said.turns[0], explicit.text))
+"""
+    )
+    assert found == [True] * 8
+
+
+def test_the_words_of_the_setting_of_the_documentation_page_break_no_rule(package):
+    found = package.run("""
+for task, words in setting_scenarios("colored").items():
+    for report in check_scenarios(words, None, scenes_of(task, 0)[::20]):
+        found += report.broken
 """)
-    assert found == ["new coat", "loan"] * 2
+    assert found == []
 
 
 def test_the_words_of_an_installed_setting_change_the_digest_of_that_setting_only(package):
@@ -208,70 +224,147 @@ def test_the_words_of_an_installed_setting_change_the_digest_of_that_setting_onl
     found = package.run("""
 for task, pool, setting in itertools.product(all_tasks(), POOLS, all_settings()):
     found.append([task, pool, setting, words_of(task, pool, setting)])
-found.append(language_label(["PickXtimes"], "test", ["direct", "colored"]))
 """)
-    label = found.pop()
-    own = [row for row in found if row[-1] != words_of(row[0], row[1])]
-    assert [row[:3] for row in own] == [
-        [task, pool, "colored"] for task in ("PickXtimes", "SwingXtimes") for pool in POOLS
+    changed = []
+    for task, pool, setting, words in found:
+        if words != words_of(task, pool):
+            changed.append((task, pool, setting))
+
+    assert {task for task, *_ in found} == set(all_tasks())
+    assert changed == [
+        ("PickXtimes", "train", "colored"),
+        ("PickXtimes", "test", "colored"),
+        ("SwingXtimes", "train", "colored"),
+        ("SwingXtimes", "test", "colored"),
     ]
 
-    name = r"PickXtimes/test/colored@[0-9a-f]{12}"
-    assert re.fullmatch(name, own[1][-1])
-    assert label.split()[1:] == [words_of("PickXtimes", "test"), own[1][-1]]
-    assert {task for task, *_ in found} == set(all_tasks())
+
+def test_the_language_label_names_an_installed_setting_after_the_words_of_its_task(package):
+    """A label has the version, the words of the task, and those of a setting with a file of
+    its own."""
+    (label,) = package.run("""
+found.append(language_label(["PickXtimes"], "test", ["direct", "colored"]))
+""")
+    _, ours, colored = label.split()
+    assert ours == words_of("PickXtimes", "test")
+    assert re.fullmatch("PickXtimes/test/colored@[0-9a-f]{12}", colored)
 
 
-def test_the_task_of_the_documentation_page_speaks_the_words_of_its_own_file(package):
+@pytest.mark.parametrize(
+    ("setting", "pattern"),
+    [
+        ("explicit", r"Place the \w+ cube on the target, then push the button\."),
+        ("contextual", r"[\w ]+ wants a photo of the \w+ cube on the target\. .*"),
+        ("reasoning", ".*: words.toml has no reasoning scenario for it in the pool test; leave.*"),
+    ],
+)
+def test_the_task_of_the_documentation_page_speaks_the_words_of_its_own_file(
+    package, setting, pattern
+):
     """The page's file has no scenario for *reasoning*, and the refusal names that file."""
-    explicit, introduction, spatial, *rest = package.run("""
+    (text,) = package.run(f'found.append(said_or_refused("PlaceAndPress", "{setting}"))')
+    assert re.fullmatch(pattern, text)
+
+
+def test_the_words_of_the_task_of_the_documentation_page_break_no_rule(package):
+    found = package.run("""
 words = task_scenarios("PlaceAndPress")
-found += [refused("PlaceAndPress", "explicit"), refused("PlaceAndPress", "contextual")]
-found += [refused("PlaceAndPress", "reasoning")]
 for report in check_scenarios(words, None, scenes_of("PlaceAndPress", 0)[::20]):
     found += report.broken
 """)
-    assert re.fullmatch(r"Place the \w+ cube on the target, then push the button\.", explicit)
-    assert re.match(r"[\w ]+ wants a photo of the \w+ cube on the target\. ", introduction)
-    assert ": words.toml has no reasoning scenario for it in the pool test; leave" in spatial
-    assert not rest
+    assert found == []
 
 
-def test_a_task_of_another_package_can_be_commanded_in_every_setting(tmp_path):
-    """With a file that has words for each setting, all forms and all control runs work, and the
-    words mean the goal. `found` collects what is wrong, then the settings."""
-    outside = InstalledPackage(tmp_path)
+@pytest.fixture(scope="module")
+def complete_package(tmp_path_factory):
+    """An installed package whose task has words for each setting."""
+    outside = InstalledPackage(tmp_path_factory.mktemp("complete"))
     (outside.files / "words.toml").write_text(words_for_every_setting())
-    *found, settings = outside.run("""
+    return outside
+
+
+EACH_INSTRUCTION = """
 task = get_task("PlaceAndPress")
-arms = ("paraphrase-1", "other-goal", "silent", "scrambled", "again")
-for report in check_scenarios(task_scenarios(task.name), None, scenes_of(task.name, 0)[::10]):
-    found += [f"{report.scenario.fields.frame}: {rule}" for rule in report.broken]
-spoken = set()
-for split, index, name in itertools.product(("train", "test"), range(12), settings_of(task)):
+for split, index, setting in itertools.product(("train", "test"), range(12), settings_of(task)):
     episode = get_episode(task.name, split, index)
-    options = InstructionOptions(name)
+    options = InstructionOptions(setting)
     if find_refusal(episode, options) is not None:
         continue
-    spoken.add((name, split))
+"""
+"""Goes through twelve episodes of each split in every setting that can express them."""
+
+
+def test_a_task_of_another_package_can_be_commanded_in_every_setting(complete_package):
+    """In the words of training and of tests."""
+    found = complete_package.run(
+        EACH_INSTRUCTION
+        + """
+    found.append(f"{setting} in {split}")
+"""
+    )
+    assert sorted(set(found)) == [
+        "contextual in test", "contextual in train",
+        "direct in test", "direct in train",
+        "direct-rival in test", "direct-rival in train",
+        "explicit in test", "explicit in train",
+        "grounded in test", "grounded in train",
+        "reasoning in test", "reasoning in train",
+    ]  # fmt: skip
+
+
+def test_the_words_of_a_task_of_another_package_break_no_rule(complete_package):
+    found = complete_package.run("""
+words = task_scenarios("PlaceAndPress")
+for report in check_scenarios(words, None, scenes_of("PlaceAndPress", 0)[::10]):
+    found += report.broken
+""")
+    assert found == []
+
+
+def test_the_words_of_a_task_of_another_package_mean_the_goal_in_both_forms(complete_package):
+    """Collects the texts that mean another goal, or several."""
+    wrong = complete_package.run(
+        EACH_INSTRUCTION
+        + """
     for form in FORMS:
         said = instruct_with(episode, replace(options, form=form))
         if understood_goals(said, episode) != (episode.goal,):
             found.append(said.text)
-    if name in ("direct", "direct-rival") and episode.goal.text("color") not in said.command:
-        found.append(said.text)
-    for arm in arms if index < 2 else ():
-        try:
-            say_arm(episode, options, arm)
-        except InvalidValueError as error:
-            if "has no paraphrase" not in str(error):
-                raise
-found.append(sorted(spoken))
-""")
-    assert not found
+"""
+    )
+    assert wrong == []
 
-    names = ("contextual", "direct", "direct-rival", "explicit", "grounded", "reasoning")
-    assert settings == [[name, split] for name in names for split in ("test", "train")]
+
+def test_a_resolved_command_of_another_package_s_task_names_the_color(complete_package):
+    """Collects the commands of two settings that do not."""
+    wrong = complete_package.run(
+        EACH_INSTRUCTION
+        + """
+    said = instruct_with(episode, replace(options, form="resolved"))
+    if setting in ("direct", "direct-rival") and episode.goal.text("color") not in said.command:
+        found.append(said.text)
+"""
+    )
+    assert wrong == []
+
+
+def test_a_task_of_another_package_has_every_control_run(complete_package):
+    """A control run ("arm") says other words, or those of another goal.
+
+    Only a paraphrase may lack, where a setting has one text for an episode.
+    """
+    refusals = complete_package.run(
+        EACH_INSTRUCTION
+        + """
+    for arm in ("paraphrase-1", "other-goal", "silent", "scrambled", "again"):
+        try:
+            said = index < 2 and say_arm(episode, options, arm)
+        except InvalidValueError as error:
+            found.append(str(error))
+"""
+    )
+    for refusal in refusals:
+        assert "has no paraphrase" in refusal
 
 
 @pytest.mark.parametrize(
@@ -298,8 +391,9 @@ found.append(sorted(spoken))
             " 'new coat': There is no setting 'colorful'; known: colored, direct, direct-rival, ",
         ),
         (
-            "colored.py", "offers=offers", 'offers="drect"', "PickXtimes", "colored",
-            "There is no way to the goal for the offers of colored, named 'drect'; known: direct, ",
+            "colored.py", "content_plans=content_plans", 'content_plans="drect"', "PickXtimes",
+            "colored",
+            "There is no setting for the content_plans of colored, named 'drect'; known: direct, ",
         ),
         (
             "colored.toml", 'say.color = ["<it color: it>"]', "", "PickXtimes", "colored",
@@ -322,11 +416,14 @@ found.append(sorted(spoken))
 def test_a_mistake_in_the_words_of_a_package_is_reported_with_file_and_cure(
     tmp_path, file, before, after, task, setting, sentence
 ):
-    """Replaces `before` by `after` in one file of an installed package, then asks for a command."""
+    """Replaces `before` by `after` in one file of a package, then asks for a command.
+
+    ``{}`` in the sentence stands for the folder of the package.
+    """
     outside = InstalledPackage(tmp_path)
     text = (outside.files / file).read_text()
     assert before in text
 
     (outside.files / file).write_text(text.replace(before, after))
-    (printed,) = outside.run(f"found.append(refused({task!r}, {setting!r}))")
+    (printed,) = outside.run(f"found.append(said_or_refused({task!r}, {setting!r}))")
     assert sentence.format(outside.files).rstrip(".") in printed

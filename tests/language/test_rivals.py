@@ -1,113 +1,139 @@
-"""Rivals: a second value on equal terms, and words that single one of the two out."""
+"""The setting *direct-rival*: two values are introduced on equal terms, and one of them is meant.
+
+*Leo says four times is enough, and Nora says five times. … Let's do what Leo says.* Here the number
+four is meant, and five is its rival.
+"""
 
 import functools
 import itertools
 from collections import Counter
 
 import pytest
-from language_variants import TASKS, first_episodes
+from language_variants import TASKS, first_episodes, said_where_possible
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language import instruct, instruct_with
-from roboirg.language.generator import find_refusal
+from roboirg.language import instruct
 from roboirg.language.settings import settings_of
 from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.shortcuts.command_chance import blind_goals, right_share
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 
-RIVAL_SETTING = InstructionOptions("direct-rival")
+each_task = pytest.mark.parametrize("task", TASKS)
 
 
 def instructions_with_a_rival(task, split="test", count=12):
-    """Episodes with a rival, each with its instruction."""
-    for episode in first_episodes(task, split, count):
-        if find_refusal(episode, RIVAL_SETTING) is None:
-            yield episode, instruct_with(episode, RIVAL_SETTING)
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_the_metadata_about_a_rival_value_agree_with_the_text(task):
-    """The introduction names two values, the right one and its rival; the command points at one by
-    *the former*, *the latter* or what it is not. Rules that guess are scored by this metadata."""
-    for episode, said in instructions_with_a_rival(task):
-        notes = said.metadata
-        slot = notes["rival_slot"]
-        meant = values_of(episode.goal, slot)[0]
-        introduced = [mention.value for mention in said.mentions if mention.utterance == 0]
-        values = [value for value in introduced if value in (meant, notes["rival"])][:2]
-        assert notes["candidates"] == {slot: values}
-        assert set(values) == {meant, notes["rival"]}
-        at = ("first", "second").index(notes["rival_position"])
-        assert values[at] == notes["rival"]
-        points_at_former = notes["rival_reference"] in ("former", "not_latter")
-        assert points_at_former == (at == 1)
-        goals = get_task(task).goals(episode.scene)
-        assert any(
-            goal != episode.goal and notes["rival"] in values_of(goal, slot) for goal in goals
-        )
+    """Return the first episodes of a split that can have a rival, each with its instruction."""
+    episodes = first_episodes(task, split, count)
+    return said_where_possible(episodes, InstructionOptions("direct-rival"))
 
 
 def values_of(goal, slot):
+    """Return the values of a slot of a goal: ``("red", "blue")`` for two colors."""
     value = goal[slot]
     return value if isinstance(value, tuple) else (value,)
 
 
+@each_task
+def test_the_metadata_about_a_rival_value_agree_with_the_text(task):
+    """Rules that guess are scored by this metadata: the two values in the order of the text."""
+    for episode, said in instructions_with_a_rival(task):
+        slot = said.metadata["rival_slot"]
+        rival = said.metadata["rival"]
+        pair = [rival, values_of(episode.goal, slot)[0]]
+        if said.metadata["rival_position"] == "second":
+            pair.reverse()
+        introduced = [mention.value for mention in said.mentions if mention.utterance == 0]
+        in_text = [value for value in introduced if value in pair]
+
+        assert said.metadata["candidates"] == {slot: pair}, said.text
+        assert in_text[:2] == pair, said.text
+
+
+@each_task
+def test_the_command_points_at_the_value_that_is_not_the_rival(task):
+    """*The former* and *not the latter* point at the first value, so that the rival is second."""
+    position_of = {
+        "former": "second", "not_latter": "second", "latter": "first", "not_former": "first"
+    }  # fmt: skip
+    for _, said in instructions_with_a_rival(task):
+        position = position_of[said.metadata["rival_reference"]]
+        assert said.metadata["rival_position"] == position, said.text
+
+
+@each_task
+def test_a_rival_value_is_that_of_another_goal_of_the_scene(task):
+    """Otherwise who sees the scene need not understand which value is meant."""
+    for episode, said in instructions_with_a_rival(task):
+        others = [goal for goal in get_task(task).goals(episode.scene) if goal != episode.goal]
+        slot = said.metadata["rival_slot"]
+        assert any(said.metadata["rival"] in values_of(goal, slot) for goal in others), said.text
+
+
 def test_only_the_settings_direct_rival_and_grounded_note_a_rival_value():
-    """A rival is a second, wrong value that the introduction names like the right one."""
+    """All other settings introduce one value, or none."""
     for task in TASKS:
         episode = get_episode(task, "test", 3)
         for setting in set(settings_of(get_task(task))) - {"direct-rival", "grounded"}:
-            assert instruct(episode, setting).metadata["rival"] is None
+            assert instruct(episode, setting).metadata["rival"] is None, (task, setting)
 
 
 def test_a_goal_with_several_counts_is_refused_by_the_rival_setting():
-    """No second value can be named on equal terms there; hard BinFill goals are of this kind."""
-    episodes = (get_episode("BinFill", "test", index) for index in itertools.count())
-    episode = next(episode for episode in episodes if episode.difficulty == "hard")
+    """*Three red cubes and one green cube*: no second value can be named on equal terms."""
+    episode = get_episode("BinFill", "test", 3)
     reason = "The direct-rival setting cannot express .*counts cubes of several colors"
 
     with pytest.raises(InvalidValueError, match=reason):
         instruct(episode, "direct-rival")
 
 
-@functools.cache
-def training_instructions_with_a_rival():
-    return [said for task in all_tasks() for said in instructions_with_a_rival(task, "train", 60)]
-
-
+@pytest.mark.parametrize("first", [0, 4])
 @pytest.mark.parametrize("task", ["StopCube", "VideoRepick"])
-def test_four_episodes_in_a_row_use_the_four_ways_to_point_at_the_right_value(task):
-    """The former, the latter, not the former, not the latter."""
-    drawn = [instruct(get_episode(task, "test", index), "direct-rival") for index in range(8)]
-    for block in (drawn[:4], drawn[4:]):
-        assert len({said.metadata["rival_reference"] for said in block}) == 4
+def test_four_episodes_in_a_row_use_the_four_ways_to_point_at_the_right_value(task, first):
+    """So that each way is equally frequent."""
+    used = []
+    for index in range(first, first + 4):
+        said = instruct(get_episode(task, "test", index), "direct-rival")
+        used.append(said.metadata["rival_reference"])
+
+    assert sorted(used) == ["former", "latter", "not_former", "not_latter"]
+
+
+@functools.cache
+def training_instructions():
+    """Return (episode, instruction) of all tasks, from 60 training episodes of each."""
+    by_task = [instructions_with_a_rival(task, "train", 60) for task in all_tasks()]
+    return list(itertools.chain.from_iterable(by_task))
 
 
 def test_the_first_and_the_second_value_are_right_equally_often():
     """Otherwise, who always takes the first value would be better than chance."""
-    found = Counter(
-        said.metadata["rival_position"] for _, said in training_instructions_with_a_rival()
-    )
+    found = Counter(said.metadata["rival_position"] for _, said in training_instructions())
     assert abs(found["first"] / found.total() - 0.5) < 0.01
 
-    kinds = Counter(
-        said.metadata["rival_reference"] for _, said in training_instructions_with_a_rival()
-    )
-    assert set(kinds) == {"former", "latter", "not_former", "not_latter"}
-    assert min(kinds.values()) > 0.2 * kinds.total()
+
+def test_each_way_to_point_at_the_right_value_is_used_in_a_fifth_of_training_or_more():
+    """There are four ways, so a quarter each would be even."""
+    found = Counter(said.metadata["rival_reference"] for _, said in training_instructions())
+
+    assert found.keys() == {"former", "latter", "not_former", "not_latter"}
+    assert min(found.values()) > 0.2 * found.total()
 
 
-def test_simple_rules_on_the_text_guess_the_right_value_no_better_than_chance():
-    """Two values are named in each text, so chance is one half."""
-    episodes = training_instructions_with_a_rival()
-    chance = sum(right_share(blind_goals(said, episode), episode) for episode, said in episodes)
+def test_who_guesses_between_the_two_values_is_right_in_half_of_the_cases():
+    """A few texts leave more than two goals, so that the share may be a little lower."""
+    shares = [
+        right_share(blind_goals(said, drawn), drawn) for drawn, said in training_instructions()
+    ]
+    assert 0.49 < sum(shares) / len(shares) <= 0.5
 
-    assert 0.49 < chance / len(episodes) <= 0.5  # two values are named
-    for rule in SURFACE_RULES:
-        right = sum(
-            goal_share(guess_goal(rule, said.text, episode.task), episode)
-            for episode, said in episodes
-        )
-        assert right / len(episodes) < 0.55, rule
+
+@pytest.mark.parametrize("rule", SURFACE_RULES)
+def test_simple_rules_on_the_text_guess_the_right_value_no_better_than_chance(rule):
+    """Such as always to take the value that was mentioned first. Chance is one half."""
+    shares = []
+    for episode, said in training_instructions():
+        guess = guess_goal(rule, said.text, episode.task)
+        shares.append(goal_share(guess, episode))
+    assert sum(shares) / len(shares) < 0.55

@@ -4,90 +4,115 @@ import json
 import re
 
 import pytest
-from test_scenarios import BIRTHDAY, read_scenario_file
-from wording_stand_ins import WOBBLY
+from wording_stand_ins import BIRTHDAY, WOBBLY, report_on
 
-from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
 from roboirg.apps.language_lab.scenarios.text_rules import GRAMMAR
 from roboirg.core.word_pools import POOLS
 from roboirg.language.scenarios.scenario_file import general, pointer_table
 
-LAST_SENTENCE = "{he} keeps talking about <it color: it>."
-WITH_NUMBER = "turns {repeats} today"
-WITH_COLOR = "wants to see the {color} cube"
-COMMAND_PUT = '[commands]\nall = ["Put {color} {repeats}."]\n'
-CONTAINER_FILE = (
-    WOBBLY.replace("PickXtimes", "VideoUnmaskSwap")
-    .replace("introduction", "needs.colors = [1]\nintroduction")
-    .replace('say.color = ["the cube', 'say.colors.0 = ["the container')
-)
+MOVING_CONTAINERS = """
+tasks = ["VideoUnmaskSwap"]
+[[scenario]]
+frame = "wobbly"
+pool = "train"
+setting = "spatial"
+needs.colors = [1]
+introduction = "The table wobbles {place:spot}."
+say.colors.0 = ["the container <there place: there>"]
+"""
 
 
-FILE_WITH_A_LIST = BIRTHDAY.replace("{color} cube", "{list} cubes").replace(
-    'say.color = ["<it color: it>"]',
-    'list = "color"\nneeds.list = [2, 3]\nsay.color = ["<rank color: {rank}>"]',
-)
-
-
-def broken_rules(text, task="PickXtimes", step=20):
-    """Return the rules that the only scenario of a file breaks."""
-    (report,) = check_scenarios(read_scenario_file(text, task), None, scenes_of(task, 0)[::step])
-    return list(report.broken)
+def check_that_a_rule_is_broken(rule, text, task="PickXtimes", every=20):
+    """Check that a rule is among those that the only scenario of a file breaks."""
+    broken = list(report_on(text, task, every).broken)
+    assert any(rule in sentence for sentence in broken), broken
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "rule"),
+    ("sentence", "rule"),
     [
-        (LAST_SENTENCE, "{he} keeps keeps talking.", "says 'keeps keeps'; a word is doubled"),
-        (LAST_SENTENCE, "{he} wants a orange.", "says 'a orange'; 'an' is right"),
-        (LAST_SENTENCE, "{he} waited an year.", "says 'an year'; 'a' is right"),
-        (LAST_SENTENCE, "It's for the my aunt.", "says 'the my'; these are two articles"),
-        (LAST_SENTENCE, "{person.2} and {person} wants that.", "several take a plural"),
-        (LAST_SENTENCE, "They is happy.", "says 'They is'; several take a plural"),
-        (LAST_SENTENCE, "{he} don't care.", "one takes a singular"),
-        (LAST_SENTENCE, "{he} has two kid.", "says 'two kid'; several take a plural"),
-        (LAST_SENTENCE, "{he} talks about <it color: it>", "the sentence does not end"),
-        (LAST_SENTENCE, "{he} keeps talking .", "says ' .'; a space or mark is too many"),
-        (LAST_SENTENCE, "{he} talks,all day.", "says 's,a'; a space lacks"),
-        (LAST_SENTENCE, "Let's surprise {him} with the cube.", "the sentence stands twice"),
-        (LAST_SENTENCE, "{he} bought <it color: it>{color}.", "is joined to another word"),
-        (WITH_NUMBER, "has {repeats} candles today", "says '<None 1:one> candles'; one takes"),
-        (WITH_NUMBER, "has {repeats:try} today", "trys'; wrong plural"),
-        (WITH_NUMBER, "turns {repeats:times} times today", "it is a number already"),
-        (WITH_COLOR, "sees the {color} cube and the {color} cube", "it is named twice"),
-        (WITH_COLOR, "sees the {color} cube and {list} is here", "several take a plural"),
-        ('say.color', 'lead = "So"\nsay.color', "lead: must end with a space: 'So'"),
-        ('say.color', 'lead = "On the target on "\nsay.color', "must not follow 'on the target'"),
-        ('say.color', 'resolved.color = "the {color} cube, ' + "it's so very nice, " * 9
-         + '"\nsay.color', "tokens; only 64 are heard"),
+        ("{he} keeps keeps talking.", "says 'keeps keeps'; a word is doubled"),
+        ("{he} wants a orange.", "says 'a orange'; 'an' is right"),
+        ("{he} waited an year.", "says 'an year'; 'a' is right"),
+        ("It's for the my aunt.", "says 'the my'; these are two articles"),
+        ("{person.2} and {person} wants that.", "several take a plural"),
+        ("They is happy.", "says 'They is'; several take a plural"),
+        ("{he} don't care.", "one takes a singular"),
+        ("{he} has two kid.", "says 'two kid'; several take a plural"),
+        ("{he} talks about <it color: it>", "the sentence does not end"),
+        ("{he} keeps talking .", "says ' .'; a space or mark is too many"),
+        ("{he} talks,all day.", "says 's,a'; a space lacks"),
+        ("Let's surprise {him} with the cube.", "the sentence stands twice"),
+        ("{he} bought <it color: it>{color}.", "is joined to another word"),
     ],
-)  # fmt: skip
-def test_a_grammar_mistake_is_reported_with_the_wrong_words(before, after, rule):
-    """Each case puts a mistake into a scenario that has none, a birthday story."""
-    text = BIRTHDAY
-    if "{list}" in after:
+)
+def test_a_grammar_mistake_is_reported_with_the_wrong_words(sentence, rule):
+    """Each sentence takes the place of one in a scenario without a mistake, a birthday story."""
+    right = "{he} keeps talking about <it color: it>."
+    assert right in BIRTHDAY
+    check_that_a_rule_is_broken(rule, BIRTHDAY.replace(right, sentence))
+
+
+@pytest.mark.parametrize(
+    ("introduction", "rule"),
+    [
+        ("{person} has {repeats} candles.", "says '<None 1:one> candles'; one takes"),
+        ("{person} has {repeats:try}.", "trys'; wrong plural"),
+        ("{person} turns {repeats:times} times.", "it is a number already"),
+        ("{person} sees the {color} cube and the {color} cube.", "it is named twice"),
+        ("{person} sees the {color} cube and {list} is here.", "several take a plural"),
+    ],
+)
+def test_a_grammar_mistake_with_a_value_of_the_goal_is_reported(introduction, rule):
+    """``{repeats}`` can be one, ``{list}`` two colors."""
+    text = re.sub('introduction = ".*"', f'introduction = "{introduction}"', BIRTHDAY)
+    if "{list}" in introduction:
         text = text.replace("setting =", 'list = "color"\nneeds.list = [2]\nsetting =')
-    assert before in text
-
-    found = broken_rules(text.replace(before, after))
-    assert any(rule in sentence for sentence in found), found
+    check_that_a_rule_is_broken(rule, text)
 
 
-def test_on_the_left_may_follow_on_the_target_but_on_the_next_one_may_not():
+@pytest.mark.parametrize(
+    ("line", "rule"),
+    [
+        ('lead = "So"', "lead: must end with a space: 'So'"),
+        ('lead = "On the target on "', "must not follow 'on the target'"),
+        (
+            'resolved.color = "the {color} cube, ' + "it's so very nice, " * 9 + '"',
+            "tokens; only 64 are heard",
+        ),
+    ],
+    ids=["no space", "on the target on", "too long"],
+)
+def test_a_mistake_in_the_command_is_reported(line, rule):
+    """Each line is added to the birthday story, which has no mistake."""
+    check_that_a_rule_is_broken(rule, f"{BIRTHDAY}{line}\n")
+
+
+def pattern_of(rule):
+    """Return the regular expression that finds what breaks a rule."""
+    (pattern,) = [pattern for pattern, named in GRAMMAR.items() if named == rule]
+    return pattern
+
+
+@pytest.mark.parametrize(
+    ("sentence", "is_wrong"),
+    [
+        ("Stop it on the target on the next one.", True),
+        ("Put it on the target on the left.", False),
+    ],
+)
+def test_on_the_left_may_follow_on_the_target_but_on_the_next_one_may_not(sentence, is_wrong):
     """*Put it on the target on the next one* leaves open what stands on what."""
-    reason = "what points back must not follow 'on the target'"
-    (pattern,) = (pattern for pattern, found in GRAMMAR.items() if found == reason)
-
-    assert re.search(pattern, "Stop it on the target on the next one.")
-    assert not re.search(pattern, "Put it on the target on the left.")
+    pattern = pattern_of("what points back must not follow 'on the target'")
+    assert bool(re.search(pattern, sentence)) == is_wrong
 
 
-def test_a_sentence_that_begins_in_lower_case_is_found():
-    reason = "a sentence begins with a capital letter"
-    (pattern,) = (pattern for pattern, found in GRAMMAR.items() if found == reason)
-
-    assert re.search(pattern, "Lift it.\nthen stop.")
-    assert not re.search(pattern, "Lift it. Then stop.")
+@pytest.mark.parametrize(
+    ("text", "is_wrong"), [("Lift it.\nthen stop.", True), ("Lift it. Then stop.", False)]
+)
+def test_a_sentence_that_begins_in_lower_case_is_found(text, is_wrong):
+    pattern = pattern_of("a sentence begins with a capital letter")
+    assert bool(re.search(pattern, text)) == is_wrong
 
 
 @pytest.mark.parametrize(
@@ -108,88 +133,136 @@ def test_a_sentence_that_begins_in_lower_case_is_found():
     ],
 )
 def test_sentences_that_could_be_false_in_some_scene_are_reported_with_the_reason(words, reason):
-    """Fixed words for a color or a place, or *as I said*, are not true of all episodes."""
-    found = broken_rules(BIRTHDAY.replace(WITH_COLOR, f"{WITH_COLOR}. {words}"), step=150)
+    """Fixed words for a color or a place, or *as I said*, are not true of all episodes.
+
+    Each sentence is added to the introduction of the birthday story.
+    """
+    text = BIRTHDAY.replace("the {color} cube.", f"the {{color}} cube. {words}.")
+    broken = list(report_on(text, every=150).broken)
     assert any(
         sentence.startswith("introduction: has the words") and reason in sentence
-        for sentence in found
-    )
+        for sentence in broken
+    ), broken
 
 
 @pytest.mark.parametrize(
-    ("text", "before", "after", "rule"),
+    ("before", "after", "rule"),
     [
-        (WOBBLY, "[[scenario]]", COMMAND_PUT + "[[scenario]]", "the verb is 'pick up' or 'move'"),
-        (WOBBLY, "cube <there", "one <there", "name the thing, 'the cube there'"),
-        (WOBBLY, "wobbles {place:spot}", "wobbles at the cap {place}", "follows 'cube' or 'one'"),
-        (WOBBLY, "<there place: there>", "over <there place: there>", "people say 'there' alone"),
-        (CONTAINER_FILE, "table", "table", "things change places; say when they are there"),
-        (CONTAINER_FILE, "The table", "Watch the {colors.0} cube. It", "is under a container"),
-        (FILE_WITH_A_LIST, "needs.list = [2, 3]", "needs.list = [1]", "the list has one value"),
         (
-            FILE_WITH_A_LIST,
-            "<rank color: {rank}>",
-            "<former color: the former>",
-            "the list has three values",
+            "[[scenario]]",
+            '[commands]\nall = ["Put {color} {repeats}."]\n[[scenario]]',
+            "the verb is 'pick up' or 'move'",
         ),
+        ("cube <there", "one <there", "name the thing, 'the cube there'"),
+        ("wobbles {place:spot}", "wobbles at the cap {place}", "follows 'cube' or 'one'"),
+        ("<there place: there>", "over <there place: there>", "people say 'there' alone"),
     ],
 )
-def test_a_misused_place_or_list_of_values_is_reported(text, before, after, rule):
-    """Each case replaces a part of a scenario that breaks no rule."""
-    task = "VideoUnmaskSwap" if text is CONTAINER_FILE else "PickXtimes"
-    assert before in text
+def test_a_misused_place_is_reported(before, after, rule):
+    """Each case replaces `before` by `after` in a good scenario: *The table wobbles on the left.
+    Lift the cube there.*"""
+    assert before in WOBBLY
+    check_that_a_rule_is_broken(rule, WOBBLY.replace(before, after), every=3)
 
-    found = broken_rules(text.replace(before, after), task, 3)
-    assert any(rule in sentence for sentence in found), found
+
+@pytest.mark.parametrize(
+    ("introduction", "rule"),
+    [
+        ("The table wobbles {place:spot}.", "things change places; say when they are there"),
+        ("Watch the {colors.0} cube. It wobbles {place:spot}.", "is under a container"),
+    ],
+)
+def test_a_place_or_color_that_no_longer_tells_which_container_it_is_is_reported(
+    introduction, rule
+):
+    """The containers cover the cubes and then change places."""
+    text = MOVING_CONTAINERS.replace("The table wobbles {place:spot}.", introduction)
+    check_that_a_rule_is_broken(rule, text, "VideoUnmaskSwap", every=3)
+
+
+def test_a_place_of_containers_that_move_is_right_with_at_the_start():
+    """*At the start, a fly sat on the left. Lift the container there.*"""
+    text = MOVING_CONTAINERS.replace("The table wobbles", "At the start, a fly sat")
+    broken = report_on(text, "VideoUnmaskSwap", every=3).broken
+    assert not [rule for rule in broken if "says" in rule]
+
+
+@pytest.mark.parametrize(
+    ("sizes", "pointer", "rule"),
+    [
+        ("[1]", "<rank color: {rank}>", "the list has one value"),
+        ("[2, 3]", "<former color: the former>", "the list has three values"),
+    ],
+)
+def test_a_word_that_chooses_from_a_list_of_another_length_is_reported(sizes, pointer, rule):
+    """*The former* needs two values; `sizes` are the lengths that a scenario allows."""
+    text = BIRTHDAY.replace("{color} cube", "{list} cubes")
+    text = text.replace('["<it color: it>"]', f'["{pointer}"]')
+    check_that_a_rule_is_broken(rule, f'{text}list = "color"\nneeds.list = {sizes}\n', every=3)
 
 
 def test_a_correct_scenario_about_a_place_breaks_no_rule():
-    """Where containers change places, saying *at the start* makes a place correct."""
-    assert not broken_rules(WOBBLY)
-    begun = CONTAINER_FILE.replace("The table wobbles", "At the start, a fly sat")
-    assert not [
-        sentence for sentence in broken_rules(begun, "VideoUnmaskSwap", 3) if "says" in sentence
-    ]
+    assert not report_on(WOBBLY).broken
+
+
+IN_BOTH_POOLS = BIRTHDAY.replace('"birthday"', '"doubter"').replace(
+    "I forgot the candles.", "This happens to me every time."
+)
+"""A scenario for training, with the name and a sentence of one of StopCube's in the pool test."""
 
 
 def test_a_name_or_sentence_of_the_other_pool_in_a_user_s_file_is_reported():
-    """Pools are the words of training and of tests; what is in both would leak into training."""
-    own = BIRTHDAY.replace('"birthday"', '"doubter"')  # StopCube's, in the pool test
-    own = own.replace("I forgot the candles.", "This happens to me every time.")
-
-    assert sorted(broken_rules(own)) == [
+    """What is in both pools, those of training and of tests, would leak into training."""
+    assert sorted(report_on(IN_BOTH_POOLS).broken) == [
         "the other pool has 'frame doubter', too",
         "the other pool has 'this happens to me every time.', too",
     ]
-    assert not broken_rules(own.replace('pool = "train"', 'pool = "test"'))
+
+
+def test_a_name_or_sentence_of_the_same_pool_is_no_leak():
+    """The same scenario, for tests, as StopCube's is."""
+    assert not report_on(IN_BOTH_POOLS.replace('pool = "train"', 'pool = "test"')).broken
 
 
 @pytest.mark.parametrize("pool", POOLS)
 def test_our_general_remarks_break_no_rule_for_distracting_remarks(pool):
     """They are inserted into a scenario that breaks no rule by itself."""
-    head, _, rest = BIRTHDAY.replace('"train"', f'"{pool}"').partition("distractors = ")
-    _, _, rest = rest.partition("\n")
     remarks = json.dumps(general().distractors[pool], ensure_ascii=False)
+    text = BIRTHDAY.replace('pool = "train"', f'pool = "{pool}"')
+    text = "\n".join(
+        f"distractors = {remarks}" if line.startswith("distractors") else line
+        for line in text.splitlines()
+    )
 
-    found = broken_rules(f"{head}distractors = {remarks}\n{rest}", step=5)
+    broken = report_on(text, every=5).broken
 
-    assert not [rule for rule in found if not rule.startswith("needs ")]
+    assert not [rule for rule in broken if not rule.startswith("needs ")]
 
 
 def test_no_general_remark_is_used_both_in_training_and_in_tests():
-    train, test = (set(general().distractors[pool]) for pool in POOLS)
-    assert not train & test
+    """General remarks are said in any story: *Sorry, I was daydreaming.*"""
+    remarks = general().distractors
+    assert set(remarks["train"]).isdisjoint(remarks["test"])
 
 
 def test_a_plural_pointer_is_never_used_where_the_number_may_be_one():
-    """Sums and doubles are never one; of two numbers, listed or possible, singular would choose."""
-    several = [row for row in pointer_table() if re.search(r"\b(?:many|often|each)\b", row.words)]
-    may_be_one = [row for row in several if row.operation in ("same", "minus", "half")]
-    assert len(may_be_one) > 4
+    """Sums and doubles are never one, so *once for each photo* is right there. Elsewhere words
+    agree, *[repeats: once for that photo|once for each photo]*, but for those that stand for one
+    of two numbers, where singular and plural would tell which."""
+    of_two_numbers = {
+        "once for each *",
+        "that many times",
+        "as many times as {he} * for",
+        "as many times as {he} *",
+        "as many times as it *",
+        "as many times as they *",
+    }
+    may_be_one = set()
+    for row in pointer_table():
+        is_plural = re.search(r"\b(?:many|often|each)\b", row.words)
+        if is_plural and row.operation in ("same", "minus", "half"):
+            may_be_one.add(row.words)
 
-    of_two = {"once for each *", "that many times", "as many times as {he} * for"}
-    of_two |= {f"as many times as {who} *" for who in ("{he}", "it", "they")}
-    assert of_two <= {row.words for row in may_be_one}
-
-    agreeing = [row for row in may_be_one if row.words not in of_two]
-    assert all(row.words.startswith("[repeats: ") for row in agreeing)
+    agreeing = may_be_one - of_two_numbers
+    assert of_two_numbers < may_be_one
+    assert all(words.startswith("[repeats: ") for words in agreeing)

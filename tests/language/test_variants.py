@@ -1,4 +1,4 @@
-"""The variants, counted from the registry."""
+"""The combinations of language options that a task offers."""
 
 from collections import Counter
 
@@ -9,24 +9,49 @@ from roboirg.language.settings import settings_of
 from roboirg.tasks import all_tasks, every_task
 from roboirg.tasks.splits.splits import get_episode
 
+each_task = pytest.mark.parametrize("task", every_task())
+
 
 def test_tasks_and_settings_give_the_51_pairs_of_the_paper():
-    """A setting is a way of speaking; all tasks have four, seven tasks also have *spatial*."""
-    found = [setting for task in all_tasks().values() for setting in plain_settings(task)]
-    # The paper's numbers: four settings of 11 tasks, and spatial of 7.
-    assert [found.count(setting) for setting in plain_settings()] == [11, 11, 11, 11, 7]
+    """Each of the 11 tasks has four settings; 7 tasks have places to name, and also *spatial*."""
+    pairs = Counter()
+    for task in all_tasks().values():
+        pairs.update(plain_settings(task))
+
+    assert pairs == {"explicit": 11, "direct": 11, "reasoning": 11, "contextual": 11, "spatial": 7}
 
 
-@pytest.mark.parametrize("task", every_task())
-def test_a_task_offers_every_combination_of_language_options_once(task):
-    """6 without context, 16 with distracting remarks, and 4 of places where the task has them."""
-    told = list(variants.expressible_options(get_episode(task, "test", 0)))
+def options_by_setting(task):
+    """Count the combinations of options with which a task's first test episode can be said."""
+    options = variants.expressible_options(get_episode(task, "test", 0))
+    return Counter(option.setting for option in options)
 
-    assert len(set(told)) == len(told)
-    counts = Counter(options.setting for options in told)
-    # A scene may lack a second value, or anything to see that singles one out.
-    assert counts.pop("direct-rival", 0) in (0, 2)
-    assert counts.pop("grounded", 0) in (0, 2)
-    assert counts.keys() <= set(plain_settings())
-    spatial = 4 if "spatial" in settings_of(every_task()[task]) else 0
-    assert counts.total() == 6 + 16 + spatial
+
+@each_task
+def test_no_combination_of_language_options_is_offered_twice(task):
+    """Options are setting, form, stages, kind of distractor, and frame of reference."""
+    options = list(variants.expressible_options(get_episode(task, "test", 0)))
+    assert len(set(options)) == len(options)
+
+
+@each_task
+def test_a_task_offers_every_combination_of_language_options(task):
+    """In two forms each: three settings; eight kinds of contextual dialogues, by stages and kind
+    of distractor; spatial in two frames, where the task has it."""
+    expected = {"explicit": 2, "direct": 2, "reasoning": 2, "contextual": 16}
+    if "spatial" in settings_of(every_task()[task]):
+        expected["spatial"] = 4
+
+    found = options_by_setting(task)
+
+    assert {setting: found[setting] for setting in expected} == expected
+
+
+@each_task
+def test_the_two_harder_settings_are_offered_in_both_forms_or_not_at_all(task):
+    """A scene may lack a second value, or anything to see that singles one out."""
+    found = options_by_setting(task)
+
+    assert found["direct-rival"] in (0, 2)
+    assert found["grounded"] in (0, 2)
+    assert found.keys() <= {*plain_settings(), "direct-rival", "grounded"}

@@ -1,4 +1,4 @@
-"""Pools of words: chosen by the split or by an option."""
+"""Pools of words: those of training and those of tests, chosen by the split or by an option."""
 
 from dataclasses import replace
 
@@ -7,46 +7,61 @@ from language_variants import TASKS
 from page_text import call, words
 
 from roboirg.core.episode import SPLITS
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.word_pools import POOLS, pool_of
-from roboirg.language import expressible, instruct, instruct_with, plain_settings
+from roboirg.core.word_pools import pool_of
+from roboirg.language import expressible, instruct, plain_settings
 from roboirg.tasks.splits.splits import get_episode
+
+each_pool = pytest.mark.parametrize("pool", ["train", "test"])
 
 
 def test_val_episodes_use_the_words_of_training_and_test_episodes_their_own():
-    """A pool is a set of wordings; policies never see the words of the pool "test" in training."""
-    assert {split: pool_of(split) for split in SPLITS} == {
-        "train": "train",
-        "val": "train",
-        "test": "test",
-    }
+    """Policies never see the words of the pool "test" in training."""
+    pools = {split: pool_of(split) for split in SPLITS}
+    assert pools == {"train": "train", "val": "train", "test": "test"}
 
 
-@pytest.mark.parametrize("pool", POOLS)
+@pytest.mark.parametrize(("pool", "split"), [("train", "val"), ("test", "test")])
 @pytest.mark.parametrize("setting", plain_settings())
-def test_choosing_a_pool_gives_the_words_of_a_split_that_uses_it(setting, pool):
-    """A pool is a set of wordings, "train" or "test"; the scene of the episode stays."""
-    split = {"train": "val", "test": "test"}[pool]
+def test_choosing_a_pool_gives_the_words_of_a_split_that_uses_it(setting, pool, split):
+    """The scene of the episode stays, and is said as if it were one of the split."""
     for task in TASKS:
         episode = get_episode(task, "test", 2)
         if setting not in expressible(episode, wordings=pool):
             continue
+
         said = instruct(episode, setting, wordings=pool)
-        assert (said.metadata["pool"], said.metadata["wordings"]) == (pool, pool)
-        assert said.metadata["command"] == "own"
-        # The same scene as an episode of the split that has this pool by default.
-        own = instruct(replace(episode, split=split), setting)
-        assert (said.turns, said.metadata) == (own.turns, {**own.metadata, "wordings": pool})
+
+        of_split = instruct(replace(episode, split=split), setting)
+        assert said.turns == of_split.turns
+        assert said.metadata == {**of_split.metadata, "wordings": pool}
 
 
-@pytest.mark.parametrize("pool", POOLS)
-def test_the_commands_show_and_run_accept_a_pool_of_wordings(pool, tmp_path):
-    episode = get_episode("StopCube", "test", 0)
-    expected = instruct_with(episode, InstructionOptions(wordings=pool)).text
-    assert expected in words(call("show", "StopCube", "0", "--words", "--wordings", pool))
+@each_pool
+def test_the_metadata_of_an_instruction_name_the_chosen_pool(pool):
+    """ "own" tells that its command is ours, and no whole sentence of a user's file."""
+    said = instruct(get_episode("StopCube", "test", 0), wordings=pool)
 
-    run = ("run", "--policy", "random", "--out", str(tmp_path / "run"), "--dry-run")
-    assert "1 episode" in call(
-        *run, "--tasks", "StopCube", "--settings", "direct", "--episodes", "1",
-        *("--policy-seeds", "0", "--wordings", pool),
+    assert said.metadata["pool"] == pool
+    assert said.metadata["wordings"] == pool
+    assert said.metadata["command"] == "own"
+
+
+@each_pool
+def test_the_command_show_accepts_a_pool_of_wordings(pool):
+    """It prints the words of the pool for the same episode."""
+    said = instruct(get_episode("StopCube", "test", 0), wordings=pool)
+
+    printed = call("show", "StopCube", "0", "--words", "--wordings", pool)
+
+    assert said.text in words(printed)
+
+
+@each_pool
+def test_the_command_run_accepts_a_pool_of_wordings(pool, tmp_path):
+    """With `--dry-run` it prints what would be played: one episode."""
+    printed = call(
+        "run", "--policy", "random", "--tasks", "StopCube", "--settings", "direct",
+        "--episodes", "1", "--policy-seeds", "0", "--wordings", pool,
+        "--out", tmp_path / "run", "--dry-run",
     )  # fmt: skip
+    assert "1 episode" in printed

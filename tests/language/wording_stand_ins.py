@@ -1,4 +1,8 @@
-"""What tests of words share: a scenario, and a clone of RoboMME's repository for the import."""
+"""What tests of words share: scenarios, and a clone of RoboMME's repository for the import.
+
+A scenario is a template of texts, a little story around a command. In it, ``{color}`` stands for
+the color of the goal, and ``<it color: it>`` for the word *it*, which refers back to that color.
+"""
 
 import shutil
 from collections.abc import Iterator
@@ -8,11 +12,32 @@ from pathlib import Path
 import robomme_stand_in
 
 from roboirg.apps.language_lab import robomme_import
+from roboirg.apps.language_lab.scenarios.scenario_check import (
+    ScenarioReport,
+    check_scenarios,
+    scenes_of,
+)
 from roboirg.core.episode import SUITES, Episode, Goal
 from roboirg.language.scenarios import scenario_file
+from roboirg.language.scenarios.scenario_file import read_task_scenarios
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.published_episodes import published_episode
 
+BIRTHDAY = """
+tasks = ["PickXtimes"]
+[[scenario]]
+frame = "birthday"
+pool = "train"
+setting = "direct"
+introduction = "{person} turns {repeats} today and wants to see the {color} cube."
+reinforcement = "{he} keeps talking about <it color: it>."
+distractors = ["The cake is at the baker's.", "I forgot the candles.", "It's so loud in here."]
+competing = ["{person.2} has a {rival color} one."]
+cue = "Let's surprise {him} with the cube."
+say.color = ["<it color: it>"]
+say.repeats = ["<each repeats: [repeats: once for that year|once for each year]>"]
+"""
+"""*Leo turns two today and wants to see the red cube. … Lift it … once for each year.*"""
 WOBBLY = """
 tasks = ["PickXtimes"]
 [[scenario]]
@@ -22,7 +47,14 @@ setting = "spatial"
 introduction = "The table wobbles {place:spot}."
 say.color = ["the cube <there place: there>"]
 """
-"""A scenario of our own, of the spatial setting."""
+"""*The table wobbles on the left. Lift the cube there …*"""
+
+
+def report_on(text: str, task: str = "PickXtimes", every: int = 20) -> ScenarioReport:
+    """Return the checker's report on the only scenario of a file, in every n-th published scene."""
+    words = read_task_scenarios(text, "mine.toml")[task]
+    (report,) = check_scenarios(words, None, scenes_of(task, 0)[::every])
+    return report
 
 
 def take_words(monkeypatch, task: str) -> None:

@@ -238,9 +238,19 @@ def golden(body):
     return _described(found[1], found[2]) if found else body
 
 
+CAPTURES = Path(__file__).parent / "captures" / "planning"
+
+
+def check_sample(page, request, answer):
+    """Compare a request, and a reply with an answer, with the blocks of JSON on a page of docs."""
+    text = (Path(__file__).parents[2] / "docs" / page).read_text()
+    blocks = re.findall(r"```json\n(.*?)```", text, re.DOTALL)
+    assert list(map(json.loads, blocks)) == [request, openai_reply(answer)]
+
+
 def check_capture(name, body):
     """Compare with the capture of that name; written anew where ROBOIRG_CAPTURE=1 says so."""
-    file = Path(__file__).parent / "captures" / "planning" / f"{name}.json"
+    file = CAPTURES / f"{name}.json"
     if os.environ.get("ROBOIRG_CAPTURE") == "1":
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(body, indent=1, ensure_ascii=False) + "\n")

@@ -16,7 +16,7 @@ from attackers import (
 )
 from wire_servers import WireServer
 
-from roboirg.core.errors import PolicyServerError
+from roboirg.core.errors import PolicyServerError, UnknownCostError
 from roboirg.core.plain_text import printable
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import ModelOptions, ModelQuery, make_model
@@ -153,8 +153,16 @@ ANSWER_WITH_ESCAPE = sends_text(b"HTTP/1.1 400 No\r\nContent-Length: 4\r\n\r\n\x
 @pytest.mark.parametrize(
     ("provider", "answer", "words"),
     [
-        ("openai", COMPRESSED_ANSWER, "replied with something else"),
-        ("google", COMPRESSED_ANSWER, "replied with something else"),
+        (
+            "openai",
+            COMPRESSED_ANSWER,
+            "replied with something else, None that begins",
+        ),
+        (
+            "google",
+            COMPRESSED_ANSWER,
+            "replied with something else, None that begins",
+        ),
         ("openai", sends_endless_chunks, "the response has more than 64 MiB"),
         ("openai", ANSWER_WITH_ESCAPE, "refused or failed"),
         ("google", ANSWER_WITH_ESCAPE, "refused or failed"),
@@ -177,6 +185,25 @@ def test_a_hostile_model_endpoint_ends_in_a_named_error(provider, answer, words)
             model.answer(ModelQuery("", (ChatTurn("user", ("hello",)),)))
     assert words in str(caught.value)
     assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"<html>\n<b>Log in</b>" + b"x" * 200, "text/html that begins '<html> <b>Log in</b>x"),
+        (b'{"error": "no such model"}', 'text/html that begins \'{"error": "no such model"}\''),
+    ],
+)
+def test_of_a_reply_that_is_no_answer_its_type_and_beginning_are_named(content, words):
+    """A page to log in, and an error with status 200, which would be read as an empty answer."""
+    head = f"HTTP/1.1 200 OK\r\nContent-Type: text/html\r\nContent-Length: {len(content)}\r\n\r\n"
+    with answering(sends_text(head.encode() + content)) as place:
+        model = make_model(ModelOptions(provider="google", model="m", base_url=f"http://{place}"))
+        with pytest.raises(UnknownCostError) as caught:
+            model.answer(ModelQuery("", (ChatTurn("user", ("hello",)),)))
+
+    assert words in str(caught.value)
+    assert len(str(caught.value)) < 300
 
 
 def test_control_characters_of_a_server_are_printed_as_escapes():

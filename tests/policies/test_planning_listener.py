@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planning_fakes import (
+    CAPTURES,
     KEY,
     KEY_VARIABLE,
     TOKENS,
@@ -17,6 +18,7 @@ from planning_fakes import (
     Late,
     Status,
     check_capture,
+    check_sample,
     fake_vlm,
     golden,
     make_listener,
@@ -324,6 +326,12 @@ def test_requests_to_models_are_equal_to_the_stored_ones(provider, shown):
 
     name = f"listener-{provider}-{'video' if shown else 'none'}"
     check_capture(name, golden(server.requests[0]))
+
+
+def test_the_page_of_listeners_shows_a_stored_request_and_a_reply():
+    answer = '{"reasoning": "The first one is meant.", "color": "red", "placement": 1}'
+    request = json.loads((CAPTURES / "listener-openai-none.json").read_text())
+    check_sample("vlm-listeners.md", request, answer)
 
 
 @pytest.mark.sim

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import os
 import re
 from fractions import Fraction
 
@@ -170,6 +171,14 @@ def test_a_user_s_prompt_file_replaces_ours_and_has_another_fingerprint(tmp_path
     file.write_text("= 3")
     with pytest.raises(InvalidValueError, match="not TOML"):
         load_prompts("qwen", str(file))
+
+
+def test_prompts_that_are_a_pipe_are_refused(tmp_path):
+    """To open it would wait for ever."""
+    os.mkfifo(tmp_path / "pipe.toml")
+
+    with pytest.raises(InvalidValueError, match=r"pipe\.toml' cannot be read .*not a regular file"):
+        load_prompts("qwen", str(tmp_path / "pipe.toml"))
 
 
 wishes = st.sampled_from(["all", "none"]) | st.integers(1, 12)

@@ -8,8 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from planning_fakes import (
+    CAPTURES,
     TOKENS,
     check_capture,
+    check_sample,
     decoded,
     fake_vlm,
     golden,
@@ -386,6 +388,12 @@ def test_requests_of_planners_are_equal_to_the_stored_ones(kind, subgoals):
               instruction="Put the red one into the bin.", size=256)  # fmt: skip
         name = f"planner-{kind}-{subgoals}"
         check_capture(name, [golden(server.requests[0]), golden(server.requests[-1])])
+
+
+def test_the_page_of_planners_shows_a_stored_request_and_a_reply():
+    """It is the second request, which names the first subgoal."""
+    _, request = json.loads((CAPTURES / "planner-qwen-grounded.json").read_text())
+    check_sample("planners.md", request, REPLY)
 
 
 def test_planner_and_policy_form_a_policy_whose_costs_are_summed():

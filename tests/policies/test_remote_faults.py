@@ -29,10 +29,10 @@ MALFORMED_REPLIES = [
     (pack({1: 2}), "int is not allowed"),
     ({"action": np.zeros((20, 8))}, "without 'actions'; it holds 'action'"),
     ({}, "it holds nothing"),
-    ({"actions": np.zeros((20, 7))}, r"shape \(n, 8\).*got shape \(20, 7\)"),
+    ({"actions": np.zeros((20, 7))}, r"shape \(n, 8\) with n >= 1, got shape \(20, 7\)"),
     ({"actions": np.zeros((0, 8))}, r"got shape \(0, 8\)"),
-    ({"actions": np.full((20, 8), np.nan)}, "every value must be a finite number"),
-    ({"actions": "left"}, "array of 8 real numbers; got str"),
+    ({"actions": np.full((20, 8), np.nan)}, "value 0 of row 0: expected a finite number, got nan"),
+    ({"actions": "left"}, "array of 8 real numbers, got str"),
     ({"actions": {"__numpy__": "AAAA", "dtype": "<f8"}}, "dialect .keys '__numpy__', 'dtype'."),
     ({"actions": None}, "got NoneType"),
     ({"actions": np.zeros((200_000, 8))}, "more than 1 MiB; option max_reply_mib"),
@@ -73,6 +73,51 @@ def test_a_malformed_reply_is_reported_and_the_next_episode_works(protocol, repl
             assert server.place in str(caught.value)
         with client_of(server, protocol) as following:
             assert len(play_episode(following)) == 1
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize(
+    "reply",
+    [
+        {"status": "error", "message": "CUDA out of memory"},
+        {"error": {"code": 1, "detail": "CUDA out of memory."}},
+        {"error": True, "traceback": "Traceback:\n  a\nCUDA out of memory\n"},
+    ],
+)
+def test_an_error_in_a_reply_is_shown_in_the_words_of_the_server(protocol, reply):
+    """It comes in place of the confirmed reset, or of the actions where there is no reset."""
+    with (
+        PROTOCOLS[protocol](faults=[reply]) as server,
+        client_of(server, protocol) as policy,
+        pytest.raises(PolicyReplyError, match=r"with an error: CUDA out of memory\.$"),
+    ):
+        play_episode(policy)
+
+
+def test_an_error_in_place_of_the_metadata_is_shown():
+    with WireServer() as server, client_of(server, "openpi") as policy:
+        server.metadata = {"status": "error", "message": "The checkpoint is missing."}
+        with pytest.raises(PolicyReplyError, match="with an error: The checkpoint is missing"):
+            play_episode(policy)
+
+
+def test_a_server_that_takes_smaller_messages_only_is_not_taken_for_one_that_sends_larger_ones():
+    """Its close code 1009 is also the one for replies above max_reply_mib."""
+    with (
+        WireServer(most_bytes=500) as server,
+        client_of(server, "openpi") as policy,
+        pytest.raises(PolicyReplyError, match="does not take messages of 649 bytes"),
+    ):
+        play_episode(policy)
+
+
+def test_the_reason_with_which_a_server_closes_is_shown():
+    with (
+        WireServer(faults=["close"]) as server,
+        client_of(server, "openpi") as policy,
+        pytest.raises(PolicyConnectionError, match=r"\(close code 1011: No memory is left\)"),
+    ):
+        play_episode(policy)
 
 
 @pytest.mark.parametrize("protocol", ["mme-vla", "challenge"])

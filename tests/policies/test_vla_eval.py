@@ -112,9 +112,10 @@ def test_a_server_with_another_action_space_or_protocol_version_is_refused():
         ({"actions": np.zeros(7)}, r"got shape \(7,\)"),
         (
             {"actions": [[1.0], [2.0, 3.0]]},
-            "numbers; got rows of different lengths",
+            "numbers, got rows of different lengths",
         ),
         ({"other": 1}, "without 'actions'; it holds 'other'"),
+        ({"status": "error", "message": "no memory"}, "replied with an error: no memory"),
     ],
 )
 def test_a_malformed_reply_of_a_vla_eval_server_ends_only_its_episode(fault, words):

@@ -50,12 +50,13 @@ def unpack(data):
 class WireServer:
     """A server whose policy is the method `answer`.
 
-    `faults` are consumed one for each message: None for none; "die" drops the connection, a
-    number of seconds delays the reply, bytes or text are sent as they are, and a dictionary is sent
-    instead of the reply.
+    `faults` are consumed one for each message: None for none; "die" drops the connection, "close"
+    closes it with a reason, a number of seconds delays the reply, bytes or text are sent as they
+    are, and a dictionary is sent instead of the reply. Messages may have `most_bytes` bytes.
     """
 
-    def __init__(self, port=0, faults=()):
+    def __init__(self, port=0, faults=(), most_bytes=None):
+        self._most_bytes = most_bytes
         self.metadata = {}
         self.port, self.faults = port, list(faults)
         self.messages = []
@@ -87,7 +88,7 @@ class WireServer:
             "127.0.0.1",
             self.port,
             compression=None,
-            max_size=None,
+            max_size=self._most_bytes,
             process_request=self._request,
             close_timeout=0.5,
         ) as server:
@@ -119,6 +120,9 @@ class WireServer:
             fault = self.faults.pop(0) if self.faults else None
             if fault == "die":
                 websocket.transport.abort()
+                return
+            if fault == "close":
+                await websocket.close(1011, "No memory is left")
                 return
             if isinstance(fault, int | float):
                 await asyncio.sleep(fault)

@@ -3,7 +3,7 @@
 import pytest
 
 from roboirg.core.episode import Point, Scene, SceneObject
-from roboirg.language.landmarks import FRAMES, selectors
+from roboirg.language.landmarks import selectors
 from roboirg.reader.command import parse_sentence
 from roboirg.reader.referents import Referents
 from roboirg.reader.tokens import split_sentences
@@ -11,20 +11,24 @@ from roboirg.tasks import every_task, get_task
 from roboirg.tasks.splits import get_episode
 
 
-def things_meant_by(scene, noun, words):
-    """Return the names of the things that words can mean."""
+def names_meant(scene, noun, words):
+    """Return the names of the things that a phrase can mean in *Take the NOUN PHRASE.*, sorted."""
     (sentence,) = split_sentences(f"Take the {noun} {words}.")
-    (clause,) = parse_sentence(sentence).clauses
+    reading = parse_sentence(sentence)
+    assert not reading.unread, words
+    (clause,) = reading.clauses
     (thing,) = clause.values("thing")
-    assert not parse_sentence(sentence).unread, words
     return sorted(item.name for item in Referents(scene).things_at(thing, thing.place))
 
 
-def containers(places):
-    objects = [
-        SceneObject(f"container_{number}", "container", Point(x, y, 0.05))
-        for number, (x, y) in enumerate(places)
-    ]
+def containers(*places):
+    """Return a scene with container_0, container_1 … at points (x, y) in meters.
+
+    The robot is at smaller x and looks along x; its left is positive y.
+    """
+    objects = []
+    for number, (x, y) in enumerate(places):
+        objects.append(SceneObject(f"container_{number}", "container", Point(x, y, 0.05)))
     return Scene(tuple(objects))
 
 
@@ -41,40 +45,49 @@ def containers(places):
     ],
 )
 def test_of_two_things_at_nearly_the_same_place_both_may_be_meant(words, places):
-    """`places` are points (x, y) of three containers; the robot's left is positive y."""
-    assert things_meant_by(containers(places), "container", words) == ["container_0", "container_1"]
+    """container_0 and container_1 tie, or one measure chooses the one and another the other."""
+    found = names_meant(containers(*places), "container", words)
+    assert found == ["container_0", "container_1"]
 
 
-def test_a_place_within_a_group_is_unclear_if_the_group_is():
-    """First, any two of the three could be *the two closest to you*; then it is clear which."""
-    places = [(0.0, 0.1), (0.005, 0.15), (-0.1, 0.0)]
-    words = "farthest to your left among the two closest to you"
-    assert things_meant_by(containers(places), "container", words) == [
-        "container_0",
-        "container_1",
-    ]
+@pytest.mark.parametrize(
+    ("second", "names"),
+    [((0.005, 0.15), ["container_0", "container_1"]), ((-0.05, 0.15), ["container_1"])],
+    ids=["unclear", "clear"],
+)
+def test_a_place_within_a_group_is_unclear_if_the_group_is(second, names):
+    """container_1 is the leftmost one, but is it one of *the two closest to you*?
 
-    places[1] = (-0.05, 0.15)
-    assert things_meant_by(containers(places), "container", words) == ["container_1"]
-
-
-def test_left_and_right_of_the_picture_are_mirrored():
-    """The camera looks at the robot from the front."""
-    scene = containers([(0.0, 0.2), (0.0, -0.2)])
-    assert things_meant_by(scene, "container", "on the left") == ["container_0"]
-    assert things_meant_by(scene, "container", "on the left of the picture") == ["container_1"]
-    assert things_meant_by(scene, "container", "on the camera's right") == ["container_0"]
+    It is clear if it is 5 cm closer than container_0, and unclear if they are equally close.
+    """
+    scene = containers((0.0, 0.1), second, (-0.1, 0.0))
+    phrase = "farthest to your left among the two closest to you"
+    assert names_meant(scene, "container", phrase) == names
 
 
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ("on the left", "container_0"),
+        ("on the left of the picture", "container_1"),
+        ("on the camera's right", "container_0"),
+    ],
+)
+def test_left_and_right_of_the_picture_are_mirrored(words, name):
+    """container_0 stands on the robot's left; the camera looks at the robot from the front."""
+    scene = containers((0.0, 0.2), (0.0, -0.2))
+    assert names_meant(scene, "container", words) == [name]
+
+
+@pytest.mark.parametrize("index", [3, 14])
 @pytest.mark.parametrize("task", [name for name, task in every_task().items() if task.spatial])
-def test_the_interpreter_finds_the_object_of_each_of_our_phrases_for_a_place(task):
+def test_the_interpreter_finds_the_object_of_each_of_our_phrases_for_a_place(task, index):
+    """It is written without our phrases, so this checks both."""
     kind = get_task(task).things.pointed
-    for index in (3, 14):
-        scene = get_episode(task, "test", index).scene
-        for frame in FRAMES:
-            for selector in selectors(scene, kind, frame):
-                selected = selector.select()
-                words = selector.landmark.phrase
-                if selected is not None:
-                    names = things_meant_by(scene, kind.removeprefix("hidden_"), words)
-                    assert selected.name in names, words
+    noun = kind.removeprefix("hidden_")
+    scene = get_episode(task, "test", index).scene
+    for selector in [*selectors(scene, kind, "robot"), *selectors(scene, kind, "camera")]:
+        thing = selector.select()
+        phrase = selector.landmark.phrase
+        if thing is not None:
+            assert thing.name in names_meant(scene, noun, phrase), phrase

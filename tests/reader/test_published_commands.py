@@ -6,7 +6,6 @@ import pytest
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.word_pools import POOLS
 from roboirg.language import instruct_with
 from roboirg.language.generator import find_refusal
 from roboirg.language.settings import setting_names
@@ -24,46 +23,51 @@ OPTIONS_THAT_STATE_THE_GOAL = (
 )
 
 
-def instruction_or_none(task, split, index, options):
-    """Return an episode and an instruction, or None where the task or the scene refuses it."""
+def said_in(task, split, index, options):
+    """Return an episode and its instruction; None where the task or the scene refuses the options.
+
+    A task that has no such setting raises an error instead of giving a reason.
+    """
     episode = get_episode(task, split, index)
     try:
-        if find_refusal(episode, options) is not None:
-            return episode, None
-    except InvalidValueError:  # the task has no such setting
-        return episode, None
-    return episode, instruct_with(episode, options)
+        refusal = find_refusal(episode, options)
+    except InvalidValueError:
+        return None
+    return None if refusal else (episode, instruct_with(episode, options))
 
 
-def check_that_all_are_read(task, split, index):
+def check_that_the_goal_is_read(task, split, index):
+    """Check that the interpreter reads the goal from what is said of an episode, and nothing else
+    in each of the ways to say it that state every value of the goal."""
     for options in OPTIONS_THAT_STATE_THE_GOAL:
-        episode, instruction = instruction_or_none(task, split, index, options)
-        if instruction is None:
-            continue
-        found = interpret(instruction.text, episode.scene, task)
-        assert found == ((episode.goal,), (), ()), instruction.text
+        told = said_in(task, split, index, options)
+        if told is not None:
+            episode, said = told
+            found = interpret(said.text, episode.scene, task)
+            assert found == ((episode.goal,), (), ()), said.text
 
 
 @pytest.mark.parametrize("task", every_task())
 def test_our_commands_that_state_the_whole_goal_are_read_as_that_goal(task):
-    """The interpreter is built without our words, so this checks both."""
-    for split, index in itertools.product(POOLS, range(0, 50, 6)):
-        check_that_all_are_read(task, split, index)
+    """The interpreter is built without our words, so this checks both, in every sixth episode."""
+    for split, index in itertools.product(("train", "test"), range(0, 50, 6)):
+        check_that_the_goal_is_read(task, split, index)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("task", every_task())
 def test_our_commands_that_state_the_whole_goal_are_read_in_every_scene(task):
-    for split, index in itertools.product(POOLS, range(50)):
-        check_that_all_are_read(task, split, index)
+    for split, index in itertools.product(("train", "test"), range(50)):
+        check_that_the_goal_is_read(task, split, index)
 
 
+@pytest.mark.parametrize("form", ["implicit", "resolved"])
 @pytest.mark.parametrize("task", every_task())
-def test_our_commands_that_leave_a_value_open_are_never_read_as_a_wrong_goal(task):
+def test_our_commands_that_leave_a_value_open_are_never_read_as_a_wrong_goal(task, form):
+    """Commands that point back, such as *Lift it twice*, leave no goal, or the right one."""
     for index, setting in itertools.product(range(0, 50, 9), setting_names()):
-        for form in ("implicit", "resolved"):
-            options = InstructionOptions(setting, form)
-            episode, instruction = instruction_or_none(task, "test", index, options)
-            if instruction is not None:
-                found = interpret(instruction.text, episode.scene, task)
-                assert not found.goals or episode.goal in found.goals, instruction.text
+        told = said_in(task, "test", index, InstructionOptions(setting, form))
+        if told is not None:
+            episode, said = told
+            found = interpret(said.text, episode.scene, task)
+            assert not found.goals or episode.goal in found.goals, said.text

@@ -185,8 +185,44 @@ def test_an_episode_that_lacks_what_a_setting_needs_is_left_out_and_none_at_all_
     assert [job.episode for job in jobs if job.setting == "explicit"] == list(range(8))
     with pytest.raises(InvalidValueError, match="nothing to play: grounded cannot"):
         make_plan(["random"], tasks="PickXtimes", settings="grounded", episodes="1").checked()
-    with pytest.raises(InvalidValueError, match="StopCube has no spatial setting"):
-        make_plan(["random"], tasks="StopCube", settings="spatial").checked()
+
+
+def test_settings_of_a_list_are_played_in_its_order():
+    jobs = make_plan(["random"], tasks="BinFill", settings="spatial,direct", episodes="1").jobs()
+    assert [job.setting for job in jobs] == ["spatial", "direct"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "rest"), [("explicit,spatial,direct", "explicit,direct"), ("spatial", "all")]
+)
+def test_a_setting_in_a_list_that_a_task_lacks_is_refused_with_what_plays_the_rest(settings, rest):
+    with pytest.raises(InvalidValueError) as caught:
+        make_plan(["random"], tasks="StopCube,BinFill,VideoRepick", settings=settings)
+
+    assert str(caught.value) == (
+        "There is no spatial setting in StopCube, VideoRepick, but in PickXtimes, SwingXtimes, "
+        "BinFill, VideoUnmaskSwap, VideoUnmask, ButtonUnmaskSwap, ButtonUnmask, PutInBox, "
+        f"PickByCount; for the rest give --settings {rest}."
+    )
+
+
+@pytest.mark.parametrize(
+    ("option", "typed"),
+    [
+        ("forms", "both"), ("split", "random"), ("episodes", "easy"), ("episodes", "all"),
+        ("arms", "told,other-goal,silent,silent-empty,scrambled,paraphrase:2,again"),
+        ("stages", "1,5;1-5"), ("wordings", "train"), ("video", "failures"),
+        ("long_prompts", "refuse"),
+    ],
+)  # fmt: skip
+def test_what_the_help_of_an_option_names_is_a_value_of_it(option, typed):
+    """Help said "implicit, resolved or both", and both was refused."""
+    assert make_plan(["random"], tasks="PickXtimes", settings="explicit", **{option: typed})
+
+
+def test_both_forms_are_the_two_that_there_are():
+    made = make_plan(["random"], tasks="PickXtimes", settings="direct", forms="both")
+    assert made.forms == ("implicit", "resolved")
 
 
 def test_episodes_are_played_in_the_given_order_with_explicit_words_last_in_each_scene():

@@ -38,7 +38,9 @@ from roboirg.runs.hosting.policy_child import PolicyChild
 from roboirg.runs.hosting.policy_opening import open_policy
 from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_sections import Hosting
+from roboirg.runs.run import ray_machines
 from roboirg.runs.run.executor import Executor, InProcess, LocalProcesses
+from roboirg.runs.run.ray_machines import MachineAgent, MachineVersions
 from roboirg.runs.run.runner import run_plan
 from roboirg.util.process_guard import descendants
 
@@ -713,3 +715,20 @@ class It:
     assert (record.outcome, record.error, record.attempt) == ("error", "policy", 2)
     assert "the process ended with exit code 5" in str(record.cause)
     assert "last words" in capfd.readouterr().err  # in a worker, of the episode's log
+
+
+def test_a_worker_is_served_while_idle_clients_may_still_send_their_key(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a machine of a Ray cluster, where they may be silent for longer than this test lasts."""
+    monkeypatch.setattr(ray_machines, "KEY_S", 3600.0)
+    agent = MachineAgent(tmp_path / "agent", HostSettings())
+    address = agent.check(MachineVersions(())).hosts
+    assert address is not None
+
+    with socket.socket(socket.AF_UNIX) as idle:
+        idle.connect(address.path)
+        with address.connect() as line:
+            HostedPolicy(line, read_policy("hosting_fakes:Dice"), 0).close()
+
+    agent.close()

@@ -29,7 +29,7 @@ def test_a_terminal_sees_pace_time_left_and_score_in_80_columns():
     text = printed_report(FOUR_RECORDS, terminal=True)
     last = text[text.rindex("episodes") :]
     assert "6/6" in last
-    assert "0:00 left" in last
+    assert "0:00:00 left" in last
     assert "/min" in last
 
     won = {
@@ -41,11 +41,7 @@ def test_a_terminal_sees_pace_time_left_and_score_in_80_columns():
     assert f"direct {won['direct']}/2 · explicit {won['explicit']}/2" in last
 
 
-def test_outside_a_terminal_each_episode_is_reported_in_one_plain_line(monkeypatch):
-    """The time left is from the pace of this run, one minute an episode, not from stored ones."""
-    minutes = itertools.count(0, 60)
-    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=minutes.__next__))
-
+def test_outside_a_terminal_each_episode_is_reported_in_one_plain_line():
     lines = printed_report(
         [
             FOUR_RECORDS[0],
@@ -60,8 +56,38 @@ def test_outside_a_terminal_each_episode_is_reported_in_one_plain_line(monkeypat
         "[3/6]", "random", "PickXtimes", "test/0", "direct:", "failure:",
         "explicit", "(resolved)", "(silent):", "success",
     ]  # fmt: skip
-    assert [line[-11:] for line in lines[1:]] == [f"({left}:00 left)" for left in (3, 2, 1, 0)]
     assert "\x1b" not in "".join(lines)
+
+
+def lines_of_six_episodes(workers: int | None) -> list[str]:
+    """Return what is printed if 4 of 44 episodes are stored, and six more take 100 s each."""
+    console = Console(file=io.StringIO(), width=200)
+    with ConsoleReporter(console) as reporter:
+        reporter.start(44, 4, workers)
+        for _ in range(6):
+            reporter.advance(replace(FOUR_RECORDS[0], duration_s=100.0))
+    return console.file.getvalue().splitlines()[1:]  # type: ignore[attr-defined]
+
+
+def test_the_time_left_is_estimated_from_the_fifth_episode_of_a_run_on():
+    """One worker has 35 and then 34 episodes left to play."""
+    lines = lines_of_six_episodes(1)
+
+    assert all(line.endswith("(-:--:-- left)") for line in lines[:4])
+    assert [line[-14:] for line in lines[4:]] == ["(0:58:20 left)", "(0:56:40 left)"]
+
+
+def test_of_several_workers_the_rest_takes_as_many_rounds_as_each_has_to_play():
+    """Eight workers play 35 episodes in five rounds, of which the last plays three."""
+    assert lines_of_six_episodes(8)[4].endswith("(0:08:20 left)")
+
+
+def test_if_nobody_knows_how_many_workers_there_are_the_pace_goes_on(monkeypatch):
+    """An episode of 100 s ended every 50 s, so two were played side by side: 18 rounds."""
+    clock = itertools.count(0, 50)
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=clock.__next__))
+
+    assert lines_of_six_episodes(None)[4].endswith("(0:30:00 left)")
 
 
 def test_a_warning_is_printed_at_once_on_stderr(capsys):

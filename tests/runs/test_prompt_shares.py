@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections import Counter
 from pathlib import Path
@@ -211,6 +212,16 @@ def test_a_prompt_that_may_or_may_not_be_cut_is_not_refused():
         check_prompt(audit_job(job_with(), LIMIT_OF_64_TOKENS)[0], verdict)
     with pytest.raises(InvalidValueError, match="must be 'send' or 'refuse'"):
         make_plan(["random"], long_prompts="cut")
+
+
+def test_of_a_tokenizer_that_is_a_pipe_the_policy_and_the_file_are_named(tmp_path):
+    """To open it would wait for ever."""
+    os.mkfifo(tmp_path / "pipe.model")
+    policy = f"mine=openpi://localhost:1?prompt_tokens=64&tokenizer={tmp_path}/pipe.model"
+    jobs = make_plan([policy], tasks="PickXtimes", episodes="0,").jobs()
+
+    with pytest.raises(InvalidValueError, match=r"policy mine .*pipe\.model is not a regular file"):
+        prompt_shares(jobs)
 
 
 def test_a_dry_run_prints_the_share_of_cut_prompts_and_the_policies_without_a_limit(tmp_path):

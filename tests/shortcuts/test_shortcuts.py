@@ -1,4 +1,9 @@
-"""Shortcuts: rules and learned floors that see the words only."""
+"""Shortcuts: how far simple rules on the words get without understanding them.
+
+A rule guesses the value that was named first (first-mention), last (last-mention) or not at all
+(elimination), or it understands single phrases such as *one fewer than that* (surface). A guess is
+a tuple of values, equally likely, for each place of each slot of the goal.
+"""
 
 import sys
 from dataclasses import replace
@@ -16,7 +21,6 @@ from roboirg.core.episode import values_in
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct, instruct_with
-from roboirg.language.settings import get_setting
 from roboirg.language.variants import expressible_options
 from roboirg.main import app
 from roboirg.shortcuts import SURFACE_RULES, draw_goal, goal_share, guess_goal
@@ -44,49 +48,41 @@ from roboirg.tasks import get_task, goals_of
 from roboirg.tasks.splits.splits import get_episode
 
 COLORS = ("blue", "green", "red")
-NEITHER_RED_NOR_BLUE = (
-    "My kitchen is painted red and blue. Take the cube of a color other than that pair"
-)
-CHOSEN = "Of the two, I would choose blue."
-LIFT_NEITHER_THEN_THE_OTHER = (
-    "Lift the container over the cube that is neither of those, then lift the container over the "
-    "cube in the other of those colors."
-)
+each_task = pytest.mark.parametrize("task", TASKS)
 
 
-def guessed_values(rule, text, task, slot):
-    return guess_goal(rule, text, task)[slot]
-
-
-GUESSES_BY_HAND = {
-    ("PickXtimes", "color"): [
+@pytest.mark.parametrize(
+    ("rule", "text", "colors"),
+    [
         ("first-mention", "I like the red cube. My door is green. Take it once.", ("red",)),
         ("last-mention", "I like the red cube. My door is green. Take it once.", ("green",)),
         ("elimination", "I like the red cube. My door is green. Take it once.", ("blue",)),
-        ("elimination", "I like the red cube. Take it once.", ("blue", "green")),
-        ("elimination", "Red, green and blue are nice. Take it once.", COLORS),
         ("surface", "I like the red cube. My door is green. Take it once.", ("red",)),
-        ("surface", f"{NEITHER_RED_NOR_BLUE} once.", ("green",)),
-        (
-            "surface",
-            "I like the red cube and the blue cube. I mean the latter. Take it.",
-            ("blue",),
-        ),
+        ("elimination", "I like the red cube. Take it once.", ("blue", "green")),
+        ("elimination", "Red, green and blue are nice. Take it once.", ("blue", "green", "red")),
+        ("first-mention", "Red and blue. A cube of a color other than that pair once.", ("red",)),
+        ("last-mention", "Red and blue. A cube of a color other than that pair once.", ("blue",)),
+        ("surface", "Red and blue. Take the cube of a color other than that pair.", ("green",)),
+        ("surface", "I like the red cube and the blue cube. I mean the latter.", ("blue",)),
         ("surface", "Here are red and blue. Not the former. Take the cube I mean.", ("blue",)),
         ("surface", "Here are red and blue. Not the former but the latter. Take it.", ("red",)),
-        ("first-mention", f"{NEITHER_RED_NOR_BLUE} once.", ("red",)),
-        ("last-mention", f"{NEITHER_RED_NOR_BLUE} once.", ("blue",)),
-        ("first-mention", "Have a look at the cube at the far left. Take it once.", COLORS),
+        ("first-mention", "Look at the cube at the far left. Take it.", ("blue", "green", "red")),
         ("last-mention", "A green door. Take the red cube once.", ("red",)),
         ("elimination", "A green door. Take the red cube once.", ("red",)),
         ("surface", "Take the cube whose color is different from RED and blue once.", ("green",)),
-        (
-            "surface",
-            "I like red and blue. Take the cube that is neither of those once.",
-            ("green",),
-        ),
+        ("surface", "Red and blue. Take the cube that is neither of those once.", ("green",)),
     ],
-    ("PickXtimes", "repeats"): [
+)
+def test_each_surface_rule_guesses_the_color_that_its_reading_of_the_words_gives(
+    rule, text, colors
+):
+    """Several colors are a draw between them. What the command states is no guess."""
+    assert guess_goal(rule, text, "PickXtimes")["color"] == (colors,)
+
+
+@pytest.mark.parametrize(
+    ("rule", "text", "numbers"),
+    [
         ("first-mention", "My number is four. The bus is two minutes late. Do it.", (4,)),
         ("last-mention", "My number is four. The bus is two minutes late. Do it.", (2,)),
         ("elimination", "My number is four. The bus is two minutes late. Do it.", (1, 3, 5)),
@@ -100,94 +96,104 @@ GUESSES_BY_HAND = {
         ("surface", "I knock twice. Take the red cube just as often.", (2,)),
         ("surface", "I knock five times. Take the red cube two times fewer than that.", (3,)),
         ("first-mention", "My number is four. Take the red cube one time fewer than that.", (4,)),
-        ("first-mention", f"{NEITHER_RED_NOR_BLUE} three times.", (3,)),
+        ("first-mention", "Red and blue. Take a color other than that pair three times.", (3,)),
         ("first-mention", "I like those two. Take the one there twice.", (2,)),
         ("first-mention", "Take one of them as before.", (1, 2, 3, 4, 5)),
         ("last-mention", "My number is 4. Take it that many times.", (4,)),
     ],
-    ("StopCube", "visit"): [
+)
+def test_each_surface_rule_guesses_the_number_that_its_reading_of_the_words_gives(
+    rule, text, numbers
+):
+    """Numbers from one to five are possible; several are a draw between them."""
+    assert guess_goal(rule, text, "PickXtimes")["repeats"] == (numbers,)
+
+
+@pytest.mark.parametrize(
+    ("rule", "text", "visits"),
+    [
         ("first-mention", "I wait for the third visit. Press during that visit.", (3,)),
+        ("elimination", "I wait for the third visit. Press during that visit.", (2, 4, 5)),
         ("surface", "I wait for the third visit. Press during the visit right before that.", (2,)),
         ("surface", "I wait for the third visit. Press two visits after that.", (5,)),
         ("surface", "I wait for the third visit. Press two visits earlier than that.", (1,)),
         ("surface", "I say four. Press on the visit whose number is one less than that.", (3,)),
         ("first-mention", "Press during its fifth visit.", (5,)),
         ("elimination", "Press during its fifth visit.", (5,)),
-        ("elimination", "I wait for the third visit. Press during that visit.", (2, 4, 5)),
     ],
-}
-
-
-@pytest.mark.parametrize("slot", GUESSES_BY_HAND)
-def test_each_surface_rule_guesses_the_value_that_its_reading_of_the_words_gives(slot):
-    """A rule takes what is named first, last or not at all, or computes ("one fewer than that").
-
-    Several values are a draw between them.
-    """
-    for rule, text, found in GUESSES_BY_HAND[slot]:
-        assert (rule, text, guessed_values(rule, text, *slot)) == (rule, text, (found,))
-
-
-RED_THEN_BLUE = (
-    "I like the red cube and the blue cube. Lift the container over the former, then the container "
-    "over the latter."
 )
-TWO_RED_AND_ONE_BLUE = (
-    "She asked for two red cubes and one blue cube. Put the former and the latter into the bin."
-)
-TWO_AND_ONE = {"colors": (("red",), ("blue",)), "counts": ((2,), (1,))}
-PAIR = f"My kitchen is painted red and blue. {CHOSEN} {LIFT_NEITHER_THEN_THE_OTHER}"
-THE_OTHER_MOMENT_THAN = (
-    "Of the two moments right before and right after the press, he prefers the one right {} it. "
-    "Take the red cube and put it at the other of the two moments, not that one."
-)
+def test_each_surface_rule_guesses_the_visit_that_its_reading_of_the_words_gives(
+    rule, text, visits
+):
+    """In StopCube, at which visit of the cube the button is to be pressed: the second to fifth."""
+    assert guess_goal(rule, text, "StopCube")["visit"] == (visits,)
 
 
 @pytest.mark.parametrize(
-    ("rule", "text", "task", "found"),
+    ("rule", "first", "second"),
     [
-        ("first-mention", RED_THEN_BLUE, "VideoUnmask", {"colors": (("red",), ("blue",))}),
-        ("elimination", RED_THEN_BLUE, "VideoUnmask", {"colors": (("green",), COLORS)}),
-        ("surface", PAIR, "VideoUnmask", {"colors": (("green",), ("red",))}),
-        ("last-mention", PAIR, "VideoUnmask", {"colors": (("blue",), ("blue",))}),
-        (
-            "first-mention",
-            TWO_RED_AND_ONE_BLUE,
-            "BinFill",
-            TWO_AND_ONE,
-        ),
-        (
-            "surface",
-            "Look left and right. Lift the container at the former place, then at the latter.",
-            "VideoUnmask",
-            {"colors": (COLORS, COLORS)},
-        ),
+        ("first-mention", ("red",), ("blue",)),
+        ("elimination", ("green",), ("blue", "green", "red")),
     ],
 )
-def test_each_surface_rule_guesses_the_values_of_a_goal_with_several_things(
-    rule, text, task, found
-):
-    """For each thing the values that it draws from; all colors if the words give none."""
-    assert guess_goal(rule, text, task) == found
+def test_rules_guess_the_colors_of_two_containers_by_the_former_and_the_latter(rule, first, second):
+    """Elimination has one color left for the first container, and draws from all for the second."""
+    text = "Red and blue. Lift the container over the former, then the container over the latter."
+    assert guess_goal(rule, text, "VideoUnmask") == {"colors": (first, second)}
 
 
-@pytest.mark.parametrize(("named", "other"), [("before", "after"), ("after", "before")])
-def test_each_surface_rule_guesses_which_of_two_moments_is_meant(named, other):
-    """He prefers the one, so *the other of the two* is meant: one rule understands it."""
-    for rule, moment in {
-        "surface": other,
-        "last-mention": named,
-        "first-mention": "before",
-    }.items():
-        said = THE_OTHER_MOMENT_THAN.format(named)
-        assert guessed_values(rule, said, "VideoPlaceButton", "relation") == ((moment,),), (
-            rule,
-            said,
-        )
+@pytest.mark.parametrize(
+    ("rule", "first", "second"),
+    [("surface", ("green",), ("red",)), ("last-mention", ("blue",), ("blue",))],
+)
+def test_the_rule_surface_understands_neither_of_those_and_the_other(rule, first, second):
+    """Red and blue are named, so green is neither; blue was chosen, so the other is red."""
+    text = (
+        "My kitchen is painted red and blue. Of the two, I would choose blue. Lift the container "
+        "over the cube that is neither of those, then lift the container over the cube in the "
+        "other of those colors."
+    )
+    assert guess_goal(rule, text, "VideoUnmask") == {"colors": (first, second)}
+
+
+def test_rules_draw_from_all_colors_if_the_words_name_none():
+    """Two containers are to be lifted; for each, all three colors are as likely."""
+    text = "Look left and right. Lift the container at the former place, then at the latter."
+    assert guess_goal("surface", text, "VideoUnmask") == {"colors": (COLORS, COLORS)}
+
+
+def test_rules_guess_amounts_in_the_order_of_mention():
+    """A guess has one place for each color, and its count at the same place."""
+    text = "She wants two red cubes and one blue cube. Put the former and the latter into the bin."
+    assert guess_goal("first-mention", text, "BinFill") == {
+        "colors": (("red",), ("blue",)),
+        "counts": ((2,), (1,)),
+    }
+
+
+@pytest.mark.parametrize(
+    ("rule", "named", "moment"),
+    [
+        ("surface", "before", "after"),
+        ("surface", "after", "before"),
+        ("last-mention", "before", "before"),
+        ("last-mention", "after", "after"),
+        ("first-mention", "before", "before"),
+        ("first-mention", "after", "before"),
+    ],
+)
+def test_each_surface_rule_guesses_which_of_two_moments_is_meant(rule, named, moment):
+    """He prefers the one, so *the other of the two* is meant: only "surface" understands it."""
+    text = (
+        "Of the two moments right before and right after the press, he prefers the one right "
+        f"{named} it. Take the red cube and put it at the other of the two moments, not that one."
+    )
+    assert guess_goal(rule, text, "VideoPlaceButton")["relation"] == ((moment,),)
 
 
 def test_a_guess_of_amounts_in_another_order_than_the_goals_is_right():
-    episode = get_episode("BinFill", "test", 3)  # three red cubes and one green cube
+    """The goal is three red cubes and one green cube."""
+    episode = get_episode("BinFill", "test", 3)
     text = "She wants one green cube and three red cubes. Put the former and the latter into it."
 
     guess = guess_goal("first-mention", text, "BinFill")
@@ -196,44 +202,61 @@ def test_a_guess_of_amounts_in_another_order_than_the_goals_is_right():
     assert draw_goal(guess, goals_of(episode), np.random.default_rng(0)) == episode.goal
 
 
-WORDS_OF_RANDOM_TEXTS = (
-    "red green blue one two three first second once twice other different not before after half "
-    "fewer more the of that those cube container neighbor place take and I like 2 seven"
-)
-TEXTS = st.lists(
-    st.lists(st.sampled_from(WORDS_OF_RANDOM_TEXTS.split()), max_size=9).map(" ".join), max_size=4
-).map(". ".join)
+WORDS_OF_TEXTS = """
+red green blue one two three first second once twice other different not before after half fewer
+more the of that those cube container neighbor place take and I like 2 seven
+"""
+sentences = st.lists(st.sampled_from(WORDS_OF_TEXTS.split()), max_size=9).map(" ".join)
+texts = st.lists(sentences, max_size=4).map(". ".join)
+any_rule = st.sampled_from(sorted(SURFACE_RULES))
+any_task = st.sampled_from(TASKS)
 
 
 @settings(max_examples=40)
-@given(text=TEXTS, rule=st.sampled_from(sorted(SURFACE_RULES)), task=st.sampled_from(TASKS))
-def test_any_text_gives_a_guess_whose_values_exist_in_either_case(text, rule, task):
-    """One that is drawn from it is a goal of the scene, or none."""
-    guess = guess_goal(rule, text, task)
+@given(text=texts, rule=any_rule, task=any_task)
+def test_any_text_gives_a_guess_with_a_value_for_each_place_of_each_slot(text, rule, task):
+    """`vocabulary` has for each slot of the task's goals how many values it may have."""
     vocabulary = goal_vocabulary(task)
-    assert list(guess) == list(vocabulary)
-    for slot, found in guess.items():
-        assert all(found)
-        assert 1 <= len(found) <= vocabulary[slot].longest
 
+    guess = guess_goal(rule, text, task)
+
+    assert list(guess) == list(vocabulary)
+    for slot, places in guess.items():
+        assert all(places)
+        assert 1 <= len(places) <= vocabulary[slot].longest
+
+
+@settings(max_examples=40)
+@given(text=texts, rule=any_rule, task=any_task)
+def test_what_is_drawn_from_any_guess_is_a_goal_of_the_scene_or_none(text, rule, task):
+    """None if no goal of the scene has the guessed values."""
     episode = get_episode(task, "test", 0)
-    assert 0 <= goal_share(guess, episode) <= 1
+    guess = guess_goal(rule, text, task)
 
     drawn = draw_goal(guess, goals_of(episode), np.random.default_rng(1))
+
     assert drawn is None or drawn in get_task(task).goals(episode.scene)
-    assert guess_goal(rule, text.upper().replace(" ", "  "), task) == guess
+    assert 0 <= goal_share(guess, episode) <= 1
+
+
+@settings(max_examples=40)
+@given(text=texts, rule=any_rule, task=any_task)
+def test_upper_case_and_doubled_spaces_do_not_change_a_guess(text, rule, task):
+    """Only words count."""
+    shouted = text.upper().replace(" ", "  ")
+    assert guess_goal(rule, shouted, task) == guess_goal(rule, text, task)
 
 
 @settings(max_examples=25)
 @given(named=st.lists(st.sampled_from(COLORS), min_size=1, max_size=6))
 def test_rules_guess_the_first_the_last_or_an_unnamed_color(named):
-    """If all colors are named, elimination draws from all."""
+    """*I like red. I like blue. Take it.* If all colors are named, elimination draws from all."""
     text = " ".join(f"I like {color}." for color in named) + " Take it."
-    assert guessed_values("first-mention", text, "PickXtimes", "color") == ((named[0],),)
-    assert guessed_values("last-mention", text, "PickXtimes", "color") == ((named[-1],),)
+    unnamed = tuple(color for color in COLORS if color not in named)
 
-    rest = tuple(color for color in COLORS if color not in named)
-    assert guessed_values("elimination", text, "PickXtimes", "color") == (rest or COLORS,)
+    assert guess_goal("first-mention", text, "PickXtimes")["color"] == ((named[0],),)
+    assert guess_goal("last-mention", text, "PickXtimes")["color"] == ((named[-1],),)
+    assert guess_goal("elimination", text, "PickXtimes")["color"] == (unnamed or COLORS,)
 
 
 def test_a_misspelled_rule_is_refused_with_the_right_name():
@@ -241,42 +264,66 @@ def test_a_misspelled_rule_is_refused_with_the_right_name():
         guess_goal("first-mentoin", "Take it.", "PickXtimes")
 
 
-def test_every_goal_of_the_test_split_can_be_guessed():
+@each_task
+def test_every_goal_of_the_test_split_can_be_guessed(task):
     """Its values are in the vocabulary from which rules guess, and are not more than it allows."""
-    for task in TASKS:
-        vocabulary = goal_vocabulary(task)
-        for episode in first_episodes(task, "test", 50):
-            for slot, content in episode.goal.slots:
-                assert set(values_in(content)) <= set(vocabulary[slot].values)
-                assert len(values_in(content)) <= vocabulary[slot].longest
+    vocabulary = goal_vocabulary(task)
+    for episode in first_episodes(task, "test", 50):
+        for slot, content in episode.goal.slots:
+            values = values_in(content)
+            assert set(values) <= set(vocabulary[slot].values), episode.key
+            assert len(values) <= vocabulary[slot].longest, episode.key
+
+
+def instructions_of(task, setting):
+    """Yield (episode, instruction) of two test episodes in a setting, with all its options."""
+    for episode in first_episodes(task, "test", 2):
+        for options in expressible_options(episode):
+            if options.setting == setting:
+                yield episode, instruct_with(episode, options)
 
 
 @pytest.mark.parametrize(("task", "setting"), PAIRS)
-def test_a_rule_is_scored_on_what_the_words_hide_and_is_right_if_they_hide_nothing(task, setting):
-    """A slot is a part of the goal, as its color. The *resolved* form names everything."""
-    for episode in first_episodes(task, "test", 2):
-        for options in expressible_options(episode):
-            if options.setting != setting:
-                continue
-            told = episode, instruct_with(episode, options)
-            for score in rule_scores(told).values():
-                assert tuple(score.slots) == counted_slots(told)
-                assert all(0 <= share <= 1 for share in (*score.slots.values(), score.goal))
-            if not get_setting(setting, get_task(task)).implicit:
-                assert all(score_rule(rule, told).goal == 1 for rule in SURFACE_RULES)
-            elif setting in ("direct", "contextual") and options.form == "resolved":
-                assert score_rule("elimination", told).goal == 1
+def test_a_rule_is_scored_on_the_slots_of_the_goal_that_the_words_hide(task, setting):
+    """A slot is a part of the goal, such as its color."""
+    for told in instructions_of(task, setting):
+        for score in rule_scores(told).values():
+            assert tuple(score.slots) == counted_slots(told)
+            assert all(0 <= share <= 1 for share in (*score.slots.values(), score.goal))
+
+
+@each_task
+def test_every_rule_is_right_if_the_words_hide_nothing(task):
+    """The explicit command states every value, and rules take what is stated."""
+    for told in instructions_of(task, "explicit"):
+        for rule in SURFACE_RULES:
+            assert score_rule(rule, told).goal == 1, told[1].text
+
+
+@pytest.mark.parametrize("setting", ["direct", "contextual"])
+@each_task
+def test_elimination_is_right_if_the_command_names_every_value(task, setting):
+    """As it does in the form *resolved*."""
+    for episode, said in instructions_of(task, setting):
+        if said.form == "resolved":
+            assert score_rule("elimination", (episode, said)).goal == 1, said.text
 
 
 def test_in_a_known_episode_the_first_mention_is_right_and_elimination_wrong():
+    """*I'm supposed to test the target the robot used right after pressing the button. Put the
+    green cube there.* Hidden is which target: *after*."""
     episode = get_episode("VideoPlaceButton", "test", 0)
     told = episode, instruct(episode, "direct")
 
-    hidden = hidden_slots(told)
+    assert hidden_slots(told) == ("relation",)
+    assert score_rule("first-mention", told).slots == {"relation": 1}
+    assert score_rule("elimination", told).slots == {"relation": 0}
 
-    assert score_rule("first-mention", told).slots == dict.fromkeys(hidden, 1)
-    assert score_rule("elimination", told).slots == dict.fromkeys(hidden, 0)
-    assert score_chance((episode, instruct(episode))) == ({}, 1)
+
+def test_an_explicit_instruction_leaves_nothing_to_chance():
+    """No slot is scored, and a guess of the goal is right with probability 1."""
+    episode = get_episode("VideoPlaceButton", "test", 0)
+    assert score_chance((episode, instruct(episode, "explicit"))) == ({}, 1)
 
 
 @pytest.mark.parametrize(
@@ -287,6 +334,7 @@ def test_in_a_known_episode_the_first_mention_is_right_and_elimination_wrong():
         ((COLORS, ("green", "blue")), Fraction(5, 18)),
         ((("red",), COLORS, ("blue",), ("green",)), Fraction(4, 9)),
     ],
+    ids=["red", "red, red, red", "any, green or blue", "red, any, blue, green"],
 )
 def test_a_guess_is_scored_by_the_share_of_the_goals_three_values_that_it_gets_right(
     guessed, share
@@ -295,73 +343,105 @@ def test_a_guess_is_scored_by_the_share_of_the_goals_three_values_that_it_gets_r
     assert slot_share({"colors": guessed}, "colors", ("red", "green", "red"), range(3)) == share
 
 
-def test_of_two_containers_one_of_which_is_named_only_the_other_is_scored():
-    """It is described by its place: a draw from three colors is right in 1/3, chance in 1/2."""
-    found = set()
-    for index in range(50):
-        episode = get_episode("ButtonUnmaskSwap", "test", index)
+@pytest.mark.parametrize("hidden", [0, 1], ids=["first", "second"])
+def test_of_two_containers_one_of_which_is_named_only_the_other_is_scored(hidden):
+    """It is described by its place: a draw from three colors is right in 1/3, chance in 1/2.
+
+    The color of the other one is stated, so that every guess has it.
+    """
+    scored = 0
+    for episode in first_episodes("ButtonUnmaskSwap", "test", 50):
         told = episode, instruct(episode, "spatial")
-        if len(episode.goal["colors"]) == 2:
-            (at,) = counted_positions(told)["colors"]
-            found.add(at)
-            named = {1 - at: (episode.goal["colors"][1 - at],)}
-            guess = {"colors": [named.get(place, ()) or COLORS for place in (0, 1)]}
-            assert score_guess(guess, told).slots == {"colors": Fraction(1, 3)}
+        if len(episode.goal["colors"]) == 2 and counted_positions(told)["colors"] == [hidden]:
+            guess = [(color,) for color in episode.goal["colors"]]
+            guess[hidden] = COLORS
+            assert score_guess({"colors": guess}, told).slots == {"colors": Fraction(1, 3)}
             assert score_chance(told).slots == {"colors": Fraction(1, 2)}
-    assert found == {0, 1}
+            scored += 1
+    assert scored
 
 
 def test_only_the_parts_of_a_goal_that_a_text_touches_are_scored():
-    """*touched* is in the metadata of an instruction; an explicit one hides nothing."""
+    """*Touched* is in the metadata of an instruction; without it, all that is hidden counts."""
     episode = get_episode("VideoPlaceButton", "test", 0)
     said = instruct(episode, "direct")
+    touched = replace(said, metadata={**said.metadata, "touched": ["color"]})
 
-    touched = replace(said, metadata={**said.metadata, "touched": ["relation"]})
+    assert counted_slots((episode, said)) == ("relation",)
+    assert counted_slots((episode, touched)) == ("color",)
+    assert set(score_chance((episode, touched)).slots) == {"color"}
 
-    assert counted_slots((episode, said)) == hidden_slots((episode, said))
-    assert counted_slots((episode, touched)) == ("relation",)
-    assert set(score_chance((episode, touched)).slots) == {"relation"}
-    assert counted_slots((episode, instruct(episode))) == ()
+
+def test_no_part_of_a_goal_is_scored_for_an_explicit_text():
+    """It hides none."""
+    episode = get_episode("VideoPlaceButton", "test", 0)
+    assert counted_slots((episode, instruct(episode, "explicit"))) == ()
+
+
+def spatial_instructions(names_a_color):
+    """Return (episode, spatial instruction) of PickXtimes that name a color, or that name none."""
+    found = []
+    for episode in first_episodes("PickXtimes", "test", 50):
+        said = instruct(episode, "spatial")
+        if names_a_color == any(color in said.text for color in COLORS):
+            found.append((episode, said))
+    return found
 
 
 def test_words_for_a_place_give_a_color_away_only_if_they_name_another_cube():
-    """*Left of the red one*: elimination draws from two colors, other rules are wrong.
+    """*Left of the red one*: elimination draws from two colors, and other rules guess red."""
+    told = spatial_instructions(names_a_color=True)
 
-    Without a color every rule draws from three.
-    """
-    named = 0
-    for episode in first_episodes("PickXtimes", "test", 50):
-        told = episode, instruct(episode, "spatial")
-        other = any(color in told[1].text for color in COLORS)
-        named += other
+    assert 0 < len(told) < 25
+    for episode_and_words in told:
         for rule in SURFACE_RULES:
             share = Fraction(1, 2) if rule == "elimination" else 0
-            expected = {"color": share if other else Fraction(1, 3)}
-            assert score_rule(rule, told).slots == expected
-    assert 0 < named < 25
+            assert score_rule(rule, episode_and_words).slots == {"color": share}
 
 
-def test_rows_by_pattern_task_or_slot_add_up_to_the_row_of_all_instructions():
-    """50 episodes of BinFill in one setting."""
-    rows = {
-        by: shortcut_rows(("BinFill",), ("test",), ("reasoning",), InstructionOptions(), by=by)
-        for by in (None, "pattern", "task", "slot")
+@pytest.mark.parametrize("rule", SURFACE_RULES)
+def test_words_for_a_place_without_a_color_leave_three_colors(rule):
+    """*The cube on the left*: a rule that sees no scene draws from all three."""
+    for told in spatial_instructions(names_a_color=False):
+        assert score_rule(rule, told).slots == {"color": Fraction(1, 3)}
+
+
+def rows_by(group):
+    """Return the rows of a table of shortcuts: 50 BinFill episodes in the setting *reasoning*."""
+    options = InstructionOptions()
+    return shortcut_rows(("BinFill",), ("test",), ("reasoning",), options, by=group)
+
+
+def test_rows_by_pattern_count_each_instruction_once():
+    """A pattern is how a value is derived."""
+    rows = rows_by("pattern")
+
+    assert sum(row.count for row in rows) == 50
+    assert {row.group for row in rows} == {
+        ("reasoning", "color exclusion"),
+        ("reasoning", "number deduction"),
+        ("reasoning", "contextual logic"),
     }
-    assert {row.group for row in rows["pattern"]} == {
-        ("reasoning", pattern)
-        for pattern in ("color exclusion", "number deduction", "contextual logic")
-    }
-    assert sum(row.count for row in rows["pattern"]) == 50
-    assert [(row.group, row.count) for row in rows["task"]] == [(("reasoning", "BinFill"), 50)]
-    assert {row.group[1] for row in rows["slot"]} == {"BinFill colors", "BinFill counts"}
 
-    (whole,) = rows[None]
-    by_slot = {row.group: row.count * row.shares[CHANCE].slots for row in rows["slot"]}
-    hidden = sum(row.count for row in rows["slot"])
-    assert sum(by_slot.values()) / hidden == pytest.approx(whole.shares[CHANCE].slots)
+
+def test_rows_by_task_have_the_task_in_their_name():
+    (row,) = rows_by("task")
+    assert (row.group, row.count) == (("reasoning", "BinFill"), 50)
+
+
+def test_rows_by_slot_add_up_to_the_row_of_all_instructions():
+    """The chance level of all hidden slots is the mean of those of the rows by slot."""
+    (whole,) = rows_by(None)
+    rows = rows_by("slot")
+
+    assert {row.group[1] for row in rows} == {"BinFill colors", "BinFill counts"}
+    by_chance = sum(row.count * row.shares[CHANCE].slots for row in rows)
+    hidden = sum(row.count for row in rows)
+    assert by_chance / hidden == pytest.approx(whole.shares[CHANCE].slots)
 
 
 def shortcuts_command(*words):
+    """Return the outcome of `roboirg language shortcuts` with these options."""
     return CliRunner().invoke(app, ["language", "shortcuts", *words])
 
 
@@ -376,6 +456,7 @@ def shortcuts_command(*words):
     ids=" ".join,
 )
 def test_the_command_prints_a_row_for_each_setting_pattern_or_slot(words, snapshot):
+    """The whole print is compared with a stored one."""
     assert shortcuts_command("--tasks", "StopCube", *words).output == snapshot
 
 
@@ -388,6 +469,7 @@ def test_how_far_a_shortcut_exceeds_chance_is_printed_with_sign_and_interval(val
 
 
 def test_the_caption_of_a_table_names_the_adjustment_of_its_intervals():
+    """Two rows are two comparisons with chance."""
     rows = [ShortcutRow((name,), 9, {}, Excess(0.1, 0.02)) for name in ("direct", "spatial")]
     caption = str(shortcut_table(rows, "Shortcuts").caption)
     assert caption.endswith("with 95 % intervals, Bonferroni-adjusted for 2 rows.")
@@ -399,7 +481,7 @@ def test_the_caption_of_a_table_names_the_adjustment_of_its_intervals():
         (("--by", "colour"), "colour"),
         (("--plan", plan_file(forms="implied")), "implied"),
         (("--split", "tset"), "tset"),
-        (("--tasks", "StopCube", "--settings", "spatial"), "nothing to score"),
+        (("--tasks", "StopCube", "--settings", "spatial"), "no spatial setting in StopCube"),
         (("--split", "none"), "nothing to score"),
         (("--seeds", "-1"), "seeds is -1; it must be a whole number from 0"),
         (("--learned", "--split", "val"), "choose --split test"),
@@ -407,6 +489,7 @@ def test_the_caption_of_a_table_names_the_adjustment_of_its_intervals():
     ],
 )
 def test_a_wrong_option_of_the_shortcuts_command_is_one_sentence(words, sentence):
+    """It fails before anything is scored."""
     outcome = shortcuts_command("--tasks", "StopCube", *words)
     assert outcome.exit_code
     assert isinstance(outcome.exception, (InvalidValueError, UnknownNameError))
@@ -421,18 +504,26 @@ def test_without_scikit_learn_the_learned_floors_are_refused_with_what_to_instal
     assert "[report]'" in str(outcome.exception)
 
 
-def test_rates_of_learners_are_columns_with_an_interval_that_widens_with_the_rows():
-    """In StopCube the words alone give the visit away in 9 of 10; 100 rows adjust it more than 1.
-
-    Such a rate is called a floor: it takes no understanding of the scene.
-    """
+@pytest.fixture(scope="module")
+def stopcube_row():
+    """The row of StopCube in the setting *direct* with the rates of learners."""
     pytest.importorskip("sklearn")
     (row,) = shortcut_rows(("StopCube",), ("test",), ("direct",), InstructionOptions(), learning=0)
-    assert list(row.shares) == ["chance", *SURFACE_RULES, *LEARNED_FLOORS]
-    assert row.shares["text-only"].goals > 0.9
+    return row
 
-    low, high = row.excess.interval(1)
-    assert 0.5 < low < row.excess.value < high < 1
 
-    wide = row.excess.interval(100)
-    assert wide[0] < low < high < wide[1]
+def test_rates_of_learners_are_columns_after_chance_and_rules(stopcube_row):
+    assert list(stopcube_row.shares) == ["chance", *SURFACE_RULES, *LEARNED_FLOORS]
+
+
+def test_in_stopcube_the_words_alone_give_the_visit_away_in_nine_of_ten(stopcube_row):
+    assert stopcube_row.shares["text-only"].goals > 0.9
+
+
+def test_the_interval_of_what_exceeds_chance_widens_with_the_number_of_rows(stopcube_row):
+    """It is adjusted for several comparisons."""
+    low, high = stopcube_row.excess.interval(1)
+    lower, higher = stopcube_row.excess.interval(100)
+
+    assert lower < low < stopcube_row.excess.value < high < higher
+    assert 0.5 < low < high < 1

@@ -33,7 +33,7 @@ def cell_of_words(*won: str) -> Cell:
 
 
 def gap_of(first: Cell, second: Cell):
-    return measure_gap([Pairs.of(first, second)], np.random.default_rng(0))
+    return measure_gap([Pairs.of(first, second)])
 
 
 # By hand: 1 of 8 is 2 (1 + 8) / 256; 2 of 12 is 2 (1 + 12 + 66) / 4096.
@@ -77,10 +77,10 @@ def test_a_gap_over_tasks_weighs_them_equally_whatever_their_number_of_episodes(
     lost = Pairs.of(cell_of_words(*"0" * 18), cell_of_words(*"1" * 18))
     without_pairs = Pairs.of(cell_of_words("1"), cell_of_words("-"))
 
-    gap = measure_gap([won, lost, without_pairs], np.random.default_rng(0))
+    gap = measure_gap([won, lost, without_pairs])
 
     assert (gap.value, gap.episodes) == (0.0, 19)
-    assert measure_gap([without_pairs], np.random.default_rng(0)) is None
+    assert measure_gap([without_pairs]) is None
 
 
 def test_trials_are_paired_by_seed_or_by_episode_if_no_seed_is_common():
@@ -102,38 +102,23 @@ def test_retention_is_unknown_if_nothing_was_won_in_explicit():
     gap = gap_of(cell_of_words("0", "1"), cell_of_words("0", "0"))
     assert (gap.retention, gap.retention_interval) == (None, None)
 
-    # One success of six: one resample in three has none, and is no bound.
-    barely = gap_of(cell_of_words(*"100000"), cell_of_words(*"100000"))
-    assert (barely.retention, *barely.retention_interval) == (1.0, 0.0, math.inf)
+    # One success of six in each: the ratio may be anything but 0 and infinite.
+    low, high = gap_of(cell_of_words(*"100000"), cell_of_words(*"100000")).retention_interval
+    assert low < 0.2
+    assert 5 < high < math.inf
 
 
-def test_a_ratio_or_gap_that_is_equal_in_all_resamples_still_has_an_interval():
-    """Rates differ from resample to resample, but their ratio is always 1, the gap always -1/3.
-
-    Would find an interval of width 0, which looks like certainty.
-    """
+def test_a_ratio_that_is_equal_in_all_episodes_still_has_an_interval():
+    """Would find an interval of width 0, which looks like certainty."""
     same = gap_of(cell_of_words(*"10" * 20), cell_of_words(*"10" * 20))
     low, high = same.retention_interval
     assert low < 0.9
     assert high > 1.1
 
-    tasks = [("0", "1"), ("110", "110"), ("1010010", "1010010")]
-    pairs = [Pairs.of(cell_of_words(*first), cell_of_words(*second)) for first, second in tasks]
-    lost = measure_gap(pairs, np.random.default_rng(0))
-    low, high = lost.interval
 
-    assert low < -0.5 < lost.value < 0 < high, "but for rounding all are −33.3 points"
-
-
-def test_a_gap_whose_episodes_all_ended_alike_still_has_an_interval():
-    """50 won by both, and 50 won by one alone. 0.07135 is z² / (50 + z²), as Wilson's."""
+def test_a_gap_that_is_equal_in_all_episodes_still_has_an_interval():
     same = gap_of(cell_of_words(*"1" * 50), cell_of_words(*"1" * 50))
-    assert same.interval == pytest.approx((-0.07135, 0.07135), abs=1e-5)
-    assert same.retention_interval == pytest.approx((0.92865, 1 / 0.92865), abs=1e-4)
-
-    lost = gap_of(cell_of_words(*"0" * 50), cell_of_words(*"1" * 50))
-    assert lost.interval == pytest.approx((-1, -0.8573), abs=1e-4)
-    assert lost.p_value == pytest.approx(2 / 2**50)
+    assert same.interval == pytest.approx((-0.0727, 0.0727), abs=1e-4)
     assert gap_of(cell_of_words("1"), cell_of_words("0")).interval is None
 
 

@@ -116,6 +116,15 @@ def test_a_rate_of_one_has_an_interval_below_it():
     assert 0.9 < certain.interval[0] < certain.interval[1] == 1.0
 
 
+def test_the_interval_of_a_share_of_one_percent_reaches_above_one_of_five():
+    """One right answer of 100 scenes; Student's alone would end at 3 %."""
+    verdicts = np.zeros((1, 100))
+    verdicts[0, 0] = 1
+    low, high = trained_rate([verdicts]).interval
+    assert 0 < low < 0.01
+    assert 0.05 < high < 0.06
+
+
 def scene_of(*views):
     """What is seen of a scene with containers and red cubes."""
     from roboirg_learn.listener.object_relations import SeenObjects, TablePlane, locate_and_rank

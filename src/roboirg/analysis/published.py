@@ -7,11 +7,15 @@ import functools
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from decimal import Decimal
+from fractions import Fraction
 from importlib import resources
 from typing import Literal, NamedTuple, cast
 
+import numpy as np
+
 from roboirg.analysis.results.option_labels import options_label, staged_options
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.stats.intervals import Interval, TaskRates, mean_interval
 from roboirg.stats.rates import DIGITS, mean_percent
 
 RateTable = Literal["main", "planner", "context", "real", "harder", "other"]
@@ -64,7 +68,7 @@ NOTES: Mapping[RateTable, tuple[str, ...]] = {
     "real": (
         (
             "(published): from the paper, 10 trials per cell, on its own robot. It prints no "
-            "intervals; at 50 % a cell's is ±26 points."
+            "intervals; at 50 % a cell's is ±29 points."
         ),
     ),
 }
@@ -133,6 +137,53 @@ def published_rows(table: str) -> tuple[PublishedRow, ...]:
         average = cast("Decimal", rates.pop(AVERAGE))  # every row has one
         rows.append(PublishedRow(model, options, rates, average))
     return tuple(rows)
+
+
+def unpaired_rates(
+    first: Mapping[str, Decimal | None],
+    second: Mapping[str, Decimal | None],
+    tasks: Collection[str],
+    trials: int,
+) -> list[TaskRates]:
+    """Return the rates of two published rows, which are 0 in each other's trials.
+
+    Single trials are not published, so each counts as an episode of its own, and the two rows of a
+    task are two tasks, one after the other.
+
+    Args:
+        first: percent by task.
+        second: percent by task.
+        tasks: which tasks; both rows have a rate in each.
+        trials: behind each rate.
+    """
+    found = []
+    for task in tasks:
+        for number, rates in enumerate((first, second)):
+            successes = round(Fraction(rates[task] or 0) * trials / 100)
+            rows = np.zeros((trials, 4), dtype=np.int64)
+            rows[:successes, 2 * number] = 1
+            rows[:, 2 * number + 1] = 1
+            found.append(TaskRates.of(rows))
+    return found
+
+
+def published_gap_interval(
+    first: Mapping[str, Decimal | None],
+    second: Mapping[str, Decimal | None],
+    tasks: Collection[str],
+    trials: int,
+) -> Interval | None:
+    """Return the 95 % interval of the first row's mean over tasks less the second's, -1 to 1.
+
+    Args:
+        first: percent by task.
+        second: percent by task.
+        tasks: which tasks; both rows have a rate in each.
+        trials: behind each rate.
+    """
+    part = 1 / len(tasks)
+    rates = unpaired_rates(first, second, tasks, trials)
+    return mean_interval([task.combined(part, -part) for task in rates])
 
 
 def published_tasks(table: str) -> tuple[str, ...]:

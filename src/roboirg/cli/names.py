@@ -32,12 +32,20 @@ def known_tasks(given: object, wordings: str | None = None) -> tuple[str, ...]:
     return tuple(name for name in names if name in tasks)
 
 
-def known_settings(given: object) -> tuple[str, ...]:
-    """Return settings as typed or in a plan."""
-    from roboirg.language.settings import find_settings
+def known_settings(given: object, tasks: Sequence[str]) -> tuple[str, ...]:
+    """Return settings as typed or in a plan.
+
+    Args:
+        given: names or groups of settings.
+        tasks: that must have all settings of a list without groups.
+    """
+    from roboirg.language.settings import check_named_settings, find_settings
     from roboirg.runs.plan.option_parsing import parse_names
 
-    return find_settings(parse_names("setting", given))
+    words = parse_names("setting", given)
+    found = find_settings(words)
+    check_named_settings(words, tasks)
+    return found
 
 
 def known_names(kind: str, given: object, known: Sequence[Name]) -> tuple[Name, ...]:

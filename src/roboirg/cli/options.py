@@ -95,9 +95,12 @@ class PlanWords:
         """
         return known_tasks(self.given("tasks", typed), wordings)
 
-    def settings(self, typed: str = "all") -> tuple[str, ...]:
-        """Return the names of settings that were typed, or else those of the plan."""
-        return known_settings(self.given("settings", typed))
+    def settings(self, typed: str = "all", tasks: Sequence[str] = ()) -> tuple[str, ...]:
+        """Return the names of settings that were typed, or else those of the plan.
+
+        The tasks must have each that is named.
+        """
+        return known_settings(self.given("settings", typed), tasks)
 
     def choices(self, kind: type) -> dict[str, Any]:
         """Return the values in this command's section of the plan that are fields of a class.
@@ -144,8 +147,9 @@ class PlanWords:
     def forms(self, usual: Sequence[str] = ("implicit",)) -> tuple[str, ...]:
         """Return the plan's forms, or the usual ones if it has none."""
         from roboirg.language import FORMS
+        from roboirg.runs.plan.option_parsing import parse_forms
 
-        return known_names("form", self.fields.get("forms", usual), FORMS)
+        return known_names("form", parse_forms(self.fields.get("forms", usual)), FORMS)
 
     def form(self) -> str:
         """Return the plan's only form."""

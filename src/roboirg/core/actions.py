@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
+from numbers import Real
 from types import NoneType
 from typing import Any, NamedTuple
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roboirg.core.errors import InvalidActionError, check_names
+from roboirg.core.plain_text import clip_text
 
 Actions = NDArray[np.floating[Any]]
 """One action, or a chunk of several, one a row."""
@@ -81,6 +83,8 @@ _NO_NUMBERS = bool, np.bool_, NoneType, Decimal, np.ma.core.MaskedConstant
 """What stands in lists of others for a number, and is none."""
 _REAL_KINDS = "iuf"
 """NumPy's letters for whole numbers with and without a sign, and for floating-point numbers."""
+_MOST_SHOWN = 80
+"""Characters of a value in an error message."""
 NO_POINT = -1.0
 CHOICE = ActionSpace(
     "choice",
@@ -126,7 +130,7 @@ def check_action(action: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> Checked
     numbers = _numbers(action, space)
     if numbers.shape != (space.size,):
         raise InvalidActionError(
-            f"An action ({space.name}) has shape ({space.size},), {space.describe}; "
+            f"An action ({space.name}), {space.describe}: expected shape ({space.size},), "
             f"got shape {numbers.shape}."
         )
     return _finite(numbers)
@@ -144,8 +148,8 @@ def check_chunk(actions: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> Checked
     chunk = numbers[None] if numbers.ndim == 1 else numbers  # one action becomes one row
     if chunk.ndim != 2 or chunk.shape[1] != space.size or len(chunk) == 0:  # noqa: PLR2004
         raise InvalidActionError(
-            f"A chunk of actions ({space.name}) has shape (n, {space.size}), n >= 1; an action has "
-            f"{space.describe}; got shape {numbers.shape}."
+            f"A chunk of actions ({space.name}), each {space.describe}: expected shape "
+            f"(n, {space.size}) with n >= 1, got shape {numbers.shape}."
         )
     return _finite(chunk)
 
@@ -167,15 +171,18 @@ def _numbers(action: ArrayLike, space: ActionSpace) -> CheckedActions:
     except ValueError:
         numbers = np.asarray(None)  # no number either, so it is refused below
         got = "rows of different lengths"
-    # NumPy turns the flags in a list into numbers; an array, which it returns as it is, has a type.
-    if numbers.ndim and numbers is not action:
-        _check_values(np.ma.asarray(action, dtype=object))  # type: ignore[no-untyped-call]
     is_real = numbers.dtype.kind in _REAL_KINDS or numbers.dtype.name == "bfloat16"  # JAX's
+    # NumPy turns the flags in a list into numbers; an array, which it returns as it is, has a type,
+    # which says what is wrong unless it is the type of any Python object.
+    is_typed = numbers is action and numbers.dtype.kind != "O"
+    if numbers.ndim and not is_typed:
+        values = np.ma.asarray(action, dtype=object)  # type: ignore[no-untyped-call]
+        _check_values(values, is_real=is_real)
     if not is_real:
         if numbers.ndim:
             got += f" of dtype {numbers.dtype}"
         raise InvalidActionError(
-            f"An action ({space.name}) is an array of {space.size} real numbers; got {got}."
+            f"An action ({space.name}): expected an array of {space.size} real numbers, got {got}."
         )
     return numbers.astype(np.float64)
 
@@ -189,11 +196,18 @@ def _as_numpy(tensor: Any) -> NDArray[Any]:  # noqa: ANN401 - PyTorch need not b
     return array
 
 
-def _check_values(values: NDArray[np.object_]) -> None:
-    """Raise InvalidActionError for what NumPy takes for a number in a list: flags, masks."""
+def _check_values(values: NDArray[np.object_], *, is_real: bool) -> None:
+    """Refuse the first value in a list that is no number, by its place.
+
+    Args:
+        values: Python objects.
+        is_real: whether NumPy takes all of them for real numbers. It does so with flags and with
+            what is behind a mask; of others, such as texts, there is then none.
+    """
     for place, value in np.ma.ndenumerate(values, compressed=False):  # type: ignore[no-untyped-call]
-        if isinstance(value, _NO_NUMBERS):
-            raise _bad_value(place, repr(value))
+        is_number = is_real or isinstance(value, Real)
+        if isinstance(value, _NO_NUMBERS) or not is_number:
+            raise _bad_value(place, clip_text(repr(value), _MOST_SHOWN))
 
 
 def _finite(numbers: CheckedActions) -> CheckedActions:
@@ -209,5 +223,5 @@ def _bad_value(place: Sequence[int] | NDArray[np.intp], shown: str) -> InvalidAc
     """Return the error of a value; its place is the index in an action or a chunk."""
     row = f" of row {place[0]}" if len(place) > 1 else ""
     return InvalidActionError(
-        f"Action value {place[-1]}{row} is {shown}; every value must be a finite number."
+        f"Action value {place[-1]}{row}: expected a finite number, got {shown}."
     )

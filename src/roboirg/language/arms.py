@@ -46,7 +46,7 @@ _KEPT_NOTES = ("pattern", "patterns", "relation", "rival")
 
 
 class ArmWords(NamedTuple):
-    """What is said in an arm of a scene.
+    """What is said of a scene in one arm, a variant of the words for a comparison.
 
     Attributes:
         episode: the episode, with the goal by which its verdict falls.
@@ -60,13 +60,13 @@ class ArmWords(NamedTuple):
 
 
 class TrialWords(NamedTuple):
-    """Everything that is said of a trial.
+    """Everything that is said of a trial, one playing of an episode.
 
     Attributes:
         episode: the episode, with the goal by which its verdict falls.
         instruction: what is said.
         command: the explicit command of its goal.
-        stated: its goal in words.
+        stated: its goal in words, ``color red, repeats 3``.
         goals: the episode with each goal that its scene allows, by the goal's words.
     """
 
@@ -124,7 +124,8 @@ def say_arm(episode: Episode, options: InstructionOptions, arm: str = TOLD) -> A
 def word_trial(episode: Episode, options: InstructionOptions, arm: str = TOLD) -> TrialWords:
     """Return what the policy hears in an arm, with the explicit command and the goals in words.
 
-    An arm is a variant of the words. Raises like `say_arm`.
+    An arm is a variant of what is said of a scene, for a comparison. The goals are those among
+    which a guesser could choose. Arguments and errors are those of `say_arm`.
     """
     words = say_arm(episode, options, arm)
     judged_episode = words.episode
@@ -151,8 +152,9 @@ def _paraphrase(
 ) -> Instruction:
     """Return the instruction in other words: paraphrase 1, 2, ..., all with different texts.
 
-    Words are drawn again (`variant`) until `number` texts other than the usual one have come up;
-    the last of them is returned. Only texts that take the same reasoning count.
+    Words are drawn again, variant after variant, until `number` texts other than the usual one have
+    come up; the last of them is returned. Only texts that take the same reasoning count, and
+    variants that the setting refuses do not.
 
     Args:
         episode: what to say.
@@ -177,12 +179,16 @@ def _paraphrase(
 
 
 def _notes_to_keep(instruction: Instruction) -> list[object]:
-    """Return the notes in which a paraphrase equals the told text."""
+    """Return the entries of the metadata in which a paraphrase must equal the usual text."""
     return [instruction.metadata.get(name) for name in _KEPT_NOTES]
 
 
 def _silence(instruction: Instruction, text: str) -> Instruction:
-    """Return a text that says nothing about the goal; it leaves all goals of the scene."""
+    """Return the instruction with a text that says nothing about the goal.
+
+    ``Please do your task.`` means all goals of the scene; if the instruction declares no meaning,
+    neither does the result.
+    """
     meaning = None if instruction.meaning is None else Meaning({})
     return _with_texts(instruction, [text], meaning)
 
@@ -193,6 +199,9 @@ def _scramble(episode: Episode, instruction: Instruction) -> Instruction:
     *Please lift the red cube.* may become *cube red lift*. Each utterance keeps its number of
     content words; what the new text means is not known. The order depends on the episode and the
     text only.
+
+    Raises:
+        InvalidValueError: fewer than two different words are left, so there is no other order.
     """
     words_by_utterance = [_content_words(utterance_text) for utterance_text in instruction.turns]
     words = list(itertools.chain.from_iterable(words_by_utterance))
@@ -203,16 +212,17 @@ def _scramble(episode: Episode, instruction: Instruction) -> Instruction:
     new_order = words
     while new_order == words:
         new_order = shuffled(rng, words)
-    next_words = iter(new_order)  # each utterance takes the next of them
-    texts = [
-        " ".join(itertools.islice(next_words, len(utterance_words)))
-        for utterance_words in words_by_utterance
-    ]
+    texts: list[str] = []
+    start = 0
+    for utterance_words in words_by_utterance:
+        end = start + len(utterance_words)
+        texts.append(" ".join(new_order[start:end]))
+        start = end
     return _with_texts(instruction, texts)
 
 
 def _content_words(text: str) -> list[str]:
-    """Return the words of a text in lower case, without `FUNCTION_WORDS`."""
+    """Return the words of a text in lower case, in order, without `FUNCTION_WORDS`."""
     function_words = FUNCTION_WORDS.split()
     words = [word.lower() for word in _WORD.findall(text)]
     return [word for word in words if word not in function_words]
@@ -221,9 +231,14 @@ def _content_words(text: str) -> list[str]:
 def _with_texts(
     instruction: Instruction, texts: Sequence[str], meaning: Meaning | None = None
 ) -> Instruction:
-    """Return an instruction of other texts, which mention nothing; the last is the command.
+    """Return an instruction with other texts for its utterances, and no mentions.
 
-    Fewer texts than there are utterances stand for the last ones.
+    Fewer texts than there are utterances stand for the last ones; the last text is the command.
+
+    Args:
+        instruction: whose stages and metadata are kept.
+        texts: at least one.
+        meaning: of the texts; None if it is not known.
     """
     spoken = instruction.utterances[-len(texts) :]
     utterances = [

@@ -40,10 +40,12 @@ _SIDE_BY_SIGN = {1: "left", -1: "right"}
 class Clue(NamedTuple):
     """Words for a value that only who sees the scene or the video can tell.
 
+    *The cube in the middle* for its color.
+
     Attributes:
         kind: what has to be seen.
         words: for the thing, the number or the placement.
-        short: the words for a number of times.
+        short: for a number of times, words that end a command, *once for each red cube …*.
         aside: the places of the other two of three things, if these are what the words say.
     """
 
@@ -54,14 +56,16 @@ class Clue(NamedTuple):
 
 
 class ThingClue(NamedTuple):
-    """A clue, and the thing that it leads to."""
+    """Words for a thing that only who sees the scene can tell, and the thing."""
 
     thing: SceneObject
     clue: Clue
 
 
 class EventClue(NamedTuple):
-    """A clue, and the value of a goal's slot that it leads to.
+    """Words for what the video shows, and the value of a goal's slot that they lead to.
+
+    *The cube that the robot moved* leads to ``red`` in the slot ``color``.
 
     Attributes:
         slot: ``color``, ``placement``, ``relation`` or ``repeats``.
@@ -139,7 +143,10 @@ def event_clues(scene: Scene) -> Iterator[EventClue]:
 
 
 def _moved_cube(scene: Scene) -> Iterator[EventClue]:
-    """Yield the color of the cube that the robot moves in the video, if there are others."""
+    """Yield *the cube that the robot moved*, which leads to its color, if there are other cubes.
+
+    The video must show that a cube is placed.
+    """
     moved = scene[scene.past[0].subject]
     if len(scene.of_kind("cube")) > 1:
         clue = Clue("events", "the cube that the robot moved")
@@ -168,7 +175,10 @@ def _visited_targets(scene: Scene) -> Iterator[EventClue]:
 
 
 def _target_at_press(scene: Scene) -> EventClue:
-    """Return the target on which the cube was at the press, after all placements before it."""
+    """Return words for the target on which the cube lay when the button was pressed.
+
+    They lead to ``placement`` 2 if the cube had been put on two targets before.
+    """
     acts = [fact.kind for fact in scene.past]
     words = "the target that the cube was on when the button was pressed"
     placements_before = acts.index("pressed")  # the cube is then on the last of these
@@ -176,7 +186,10 @@ def _target_at_press(scene: Scene) -> EventClue:
 
 
 def _swaps(scene: Scene) -> Iterator[EventClue]:
-    """Yield how often the cubes change places in the video: *as many times as …*."""
+    """Yield a clue to a number of repeats: *as many times as the cubes switched places*.
+
+    Nothing is yielded if the video shows no swap, or more than three.
+    """
     swaps = len(scene.motions_of(Swap))
     if swaps in SHARE_BY_SWAPS:
         words = "the cubes switched places"
@@ -188,8 +201,8 @@ def _cubes_on_sides(scene: Scene) -> Iterator[EventClue]:
     """Yield clues to a number of repeats: how many cubes of a color are left or right of another.
 
     *Once for each red cube to the left of the cube from the video* leads to ``repeats`` 2 if two
-    red cubes are there. Yields nothing if all cubes have one color, as in scenes where they change
-    places.
+    red cubes are there. The video must show that a cube is picked up. Yields nothing if all cubes
+    have one color, as in scenes where they change places.
     """
     shown = scene[scene.past[0].subject]
     cubes = scene.of_kind("cube")
@@ -205,7 +218,10 @@ def _cubes_on_sides(scene: Scene) -> Iterator[EventClue]:
 
 
 def _clue_to_side(color: str, side: str) -> Clue:
-    """Return the clue to the number of cubes of a color on a side of the one in the video."""
+    """Return words for the number of cubes of a color on a side of the cube in the video.
+
+    *red cubes to the left of the cube from the video*.
+    """
     where = f"to the {side} of the cube from the video"
     return Clue("counts", f"{color} cubes {where}", f"once for each {color} cube {where}")
 

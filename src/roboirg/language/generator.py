@@ -81,9 +81,13 @@ def instruct(
 def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 0) -> Instruction:
     """Return the instruction of an episode, as `instruct` does, with all options in one value.
 
-    Each `variant` draws the words anew from its number; 0 gives the usual ones.
+    Args:
+        episode: what to say.
+        options: how to say it.
+        variant: which of several choices of words to draw; 0 is the usual one.
 
     Raises:
+        UnknownNameError: an option names what does not exist.
         InvalidValueError: the open wording file has no words of the task, or the setting cannot
             express the episode.
     """
@@ -103,15 +107,21 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
 
 
 def find_refusal(episode: Episode, options: InstructionOptions) -> str | None:
-    """Return why a setting of the task cannot express an episode; None if it can."""
+    """Return why an episode cannot be said with some options; None if it can.
+
+    ``no landmark singles out a target``: the end of a sentence, without a stop.
+
+    Raises:
+        InvalidValueError: the task lacks the setting, or an option is wrong.
+    """
     missing = _find_missing_words(episode, options)
     return missing or refusal(request_of(episode, options))
 
 
 def find_refusals(episode: Episode, **options: Unpack[WordKeywords]) -> Mapping[str, str]:
-    """Return the settings that cannot express an episode, each with the reason.
+    """Return the settings of an episode's task that cannot express it, each with the reason.
 
-    A setting is a way to say the goal; only those of the episode's task are tried.
+    ``{"spatial": "no landmark singles out a target"}``.
     """
     usual = replace(InstructionOptions(), **as_fields(options))
     reasons: dict[str, str] = {}
@@ -123,7 +133,7 @@ def find_refusals(episode: Episode, **options: Unpack[WordKeywords]) -> Mapping[
 
 
 def expressible(episode: Episode, **options: Unpack[WordKeywords]) -> tuple[str, ...]:
-    """Return the settings of the task that can express an episode."""
+    """Return the settings of an episode's task that can express it, explicit first."""
     refused = find_refusals(episode, **options)
     return tuple(name for name in settings_of(get_task(episode.task)) if name not in refused)
 
@@ -131,9 +141,13 @@ def expressible(episode: Episode, **options: Unpack[WordKeywords]) -> tuple[str,
 def request_of(
     episode: Episode, options: InstructionOptions, variant: int = 0
 ) -> InstructionRequest:
-    """Return an episode with its task, checked options and drawn words: all that a wording needs.
+    """Return an episode with its task, checked options and the sampler that draws its words.
 
     `variant` selects other random words than the usual ones, 0.
+
+    Raises:
+        UnknownNameError: an option names what does not exist.
+        InvalidValueError: an option is wrong, or the task lacks the setting.
     """
     check_options(options)
     task = get_task(episode.task)
@@ -142,9 +156,9 @@ def request_of(
 
 
 def _find_missing_words(episode: Episode, options: InstructionOptions) -> str | None:
-    """Return why a file of wordings has no words for an episode's task; None if it has them.
+    """Return why an open wording file has no words for an episode's task; None if it has some.
 
-    None also for our own words, which all tasks have. The text follows *The* in an error message.
+    None also if our own words are used. The text follows *The* in an error message.
     """
     wording_file = outside_words(options.wordings)
     if wording_file is None:
@@ -159,9 +173,13 @@ def _find_missing_words(episode: Episode, options: InstructionOptions) -> str | 
 
 
 def check_options(options: InstructionOptions) -> None:
-    """Raise if any option of an instruction has a value that does not exist.
+    """Check that all options of an instruction have values that exist.
 
     Options that the chosen setting does not read are checked, too.
+
+    Raises:
+        UnknownNameError: a name does not exist.
+        InvalidValueError: the stages or the number of distractors are wrong.
     """
     if options.stages not in STAGE_SETS:
         possible_sets = ", ".join(map(str, STAGE_SETS))
@@ -174,10 +192,14 @@ def check_options(options: InstructionOptions) -> None:
 
 
 def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruction:
-    """Return the instruction for a request from its phrases: texts, mentions and metadata.
+    """Return an instruction written out: phrases become texts, and their tagged words mentions.
 
-    A phrase is words with tags on those that name or point back at a value; each tag becomes a
-    mention with its characters in the text.
+    A phrase is pieces of text, some with tags: *Lift*, *it* (the color red). It becomes the text
+    *Lift it* and a mention of its characters 5 to 7.
+
+    Args:
+        request: the episode, and how it is said.
+        spec: the utterances as phrases, with their meaning.
     """
     utterances: list[Utterance] = []
     mentions: list[Mention] = []
@@ -200,8 +222,9 @@ def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> In
 
 
 def _metadata(request: InstructionRequest, spec: InstructionSpec) -> dict[str, object]:
-    """Return the metadata of an instruction: what its setting notes, and how its words were drawn.
+    """Return the metadata of an instruction, with the same keys for every setting.
 
+    They are what its setting notes, such as the reasoning pattern, and how its words were drawn.
     Entries that the setting does not note keep their default.
     """
     options = request.options

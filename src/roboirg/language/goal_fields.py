@@ -55,6 +55,6 @@ def unordered(goal: Goal) -> Goal:
 def goal_name(goal: Goal) -> str:
     """Return the name that records have for a goal: ``color red, repeats 3``.
 
-    It stays as it is, because records that were published are compared with it.
+    Published records are compared with it, so its form must not change.
     """
     return ", ".join(f"{name} {value}" for name, value in goal_fields(goal).items())

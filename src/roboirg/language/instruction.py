@@ -27,8 +27,8 @@ class Utterance:
     """One turn of the speaker.
 
     Attributes:
-        stage: its part in the discourse.
-        text: its words.
+        stage: its part in the text; the last one is the ``command``.
+        text: its words, *Red is nice.*
     """
 
     stage: UtteranceStage
@@ -37,14 +37,17 @@ class Utterance:
 
 @dataclass(frozen=True, slots=True)
 class Mention:
-    """A span that introduces a slot value (antecedent) or points back at one (anaphor).
+    """Characters of an utterance that name a value (antecedent) or point back at one (anaphor).
+
+    In *Red is nice.*, *Red* is an antecedent of the slot ``color``; in *Lift it.*, *it* is an
+    anaphor with the value ``red``.
 
     Attributes:
         utterance: index of the utterance.
         start: first character of the span in that utterance's text.
         end: one past the last character.
         role: antecedent or anaphor.
-        expression: class of an anaphor; None for an antecedent.
+        expression: class of an anaphor, ``it``; None for an antecedent.
         slot: name of the goal slot, or ``reference`` for values that only lead to the goal: two
             colors or moments, the chosen one of them, the quantity or position to count from.
         value: the referent: for a goal slot one of the goal's values, or all of them
@@ -139,12 +142,12 @@ class Instruction:
 
     @property
     def text(self) -> str:
-        """The prompt for policies: all utterances, joined by spaces."""
+        """The prompt for policies: the texts of all utterances, joined by spaces."""
         return " ".join(utterance.text for utterance in self.utterances)
 
     @property
     def turns(self) -> tuple[str, ...]:
-        """The texts of the utterances."""
+        """The text of each utterance, in the order of speaking."""
         return tuple(utterance.text for utterance in self.utterances)
 
     @property
@@ -153,18 +156,19 @@ class Instruction:
         return self.utterances[-1].text
 
     def span(self, mention: Mention) -> str:
-        """Return the text of a mention."""
+        """Return the words of a mention of this instruction: ``it``."""
         return self.utterances[mention.utterance].text[mention.start : mention.end]
 
 
 def command_expressions(mentions: Iterable[Any], last: int) -> tuple[str, ...]:
-    """Return the classes of the anaphors of the last utterance, each once.
+    """Return the classes of the words that point back in the last utterance, each once.
 
-    Those of the context add no referent.
+    *Lift it there.* gives ``("it", "there")``. Such words in earlier utterances do not count, as
+    they add no referent.
 
     Args:
         mentions: of an instruction, or of its record.
-        last: index of the last utterance.
+        last: index of the last utterance, the command.
     """
     of_command = [mention.expression for mention in mentions if mention.utterance == last]
     return tuple(dict.fromkeys(name for name in of_command if name is not None))

@@ -17,7 +17,10 @@ _RIVAL = ("rival", "rival_slot", "rival_position", "rival_reference")
 
 
 def row(episode: Episode, instruction: Instruction) -> ExportRow:
-    """Return an instruction as a row; `docs/instruction-data.md` explains the columns."""
+    """Return an instruction as a row of plain JSON values by column.
+
+    `docs/instruction-data.md` explains the columns. All rows have the same columns and types.
+    """
     metadata: Mapping[str, Any] = instruction.metadata
     return {
         "id": f"{episode.key}/{instruction.setting}/{instruction.form}",
@@ -54,7 +57,7 @@ def row(episode: Episode, instruction: Instruction) -> ExportRow:
 
 
 def _copied(metadata: Mapping[str, Any], *names: str) -> ExportRow:
-    """Return some entries of the metadata."""
+    """Return some entries of the metadata, under their own names."""
     return {name: metadata[name] for name in names}
 
 
@@ -97,7 +100,7 @@ def _mention_rows(instruction: Instruction) -> list[ExportRow]:
 
 
 def _texts(value: object) -> list[str]:
-    """Return one value or several as a list of texts, which is empty for None."""
+    """Return a value as a list of texts: ``3`` and ``[3]`` give ``["3"]``, None ``[]``."""
     if value is None:
         return []
     if isinstance(value, list):

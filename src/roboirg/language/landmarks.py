@@ -54,8 +54,8 @@ class Landmark(NamedTuple):
     Attributes:
         phrase: words after the noun: "the cube *farthest to your left*".
         is_sided: whether the words name left or right, so that the frame matters.
-        is_in_depth: whether they order objects from near to far: by depth, and perhaps not by
-            distance.
+        is_in_depth: whether they order objects from near to far, *closest to you*: by depth, and
+            perhaps not by distance.
     """
 
     phrase: str
@@ -64,26 +64,38 @@ class Landmark(NamedTuple):
 
 
 class Ranking(NamedTuple):
-    """A quantity to rank objects by, largest first; differences count from `margin` on."""
+    """An order of objects by a quantity, the largest first.
+
+    By ``y``, the leftmost object comes first, since y points to the robot's left.
+
+    Attributes:
+        quantity: of an object; meters, or columns of the camera's picture.
+        margin: a difference of the quantity counts from here on, in its unit.
+    """
 
     quantity: Callable[[SceneObject], float]
     margin: float = MARGIN
 
     @property
     def opposite(self) -> Ranking:
-        """The order from the other end."""
+        """The order from the other end: the smallest quantity first."""
         return self._replace(quantity=lambda item: -self.quantity(item))
 
     def select(self, candidates: Sequence[SceneObject], rank: int) -> SceneObject | None:
-        """Return the candidate of a rank, 0 for the largest quantity; None if that is unclear.
+        """Return the object of a rank, 0 for the largest quantity; None if that is unclear.
 
-        It is clear if its quantity differs by the margin from those just before and after it. None
-        also if there are too few candidates.
+        It is clear if its quantity differs by at least the margin from those just before and after
+        it. None also if there are too few objects.
+
+        Args:
+            candidates: the objects, in any order.
+            rank: 0 for the first, 1 for the second.
         """
         if rank >= len(candidates):
             return None
         ordered = sorted(candidates, key=self.quantity, reverse=True)
         chosen = ordered[rank]
+        # The one before it, if it is not the first, and the one after it, if it is not the last.
         neighbors = [*ordered[max(rank - 1, 0) : rank], *ordered[rank + 1 : rank + 2]]
         for neighbor in neighbors:
             if abs(self.quantity(chosen) - self.quantity(neighbor)) < self.margin:
@@ -95,8 +107,8 @@ class Selector(NamedTuple):
     """A landmark and its meaning: which of some objects its words single out.
 
     Attributes:
-        landmark: the words.
-        rankings: the orders that the words can mean; they select an object only if all agree.
+        landmark: the words, *second from your left*.
+        rankings: the orders that the words can mean; they single out an object only if all agree.
         candidates: the objects that are compared.
         rank: which of the order is meant, from 0.
     """
@@ -112,7 +124,11 @@ class Selector(NamedTuple):
 
 
 def agreed(found: Iterable[SceneObject | None]) -> SceneObject | None:
-    """Return the object that all ways to understand words lead to; None if they differ."""
+    """Return the object that all readings of some words lead to; None if they differ.
+
+    Args:
+        found: the object that each reading leads to, None if it is unclear; at least one.
+    """
     first, *others = found
     for other in others:
         if other is not first:
@@ -123,8 +139,15 @@ def agreed(found: Iterable[SceneObject | None]) -> SceneObject | None:
 def selectors(scene: Scene, kind: ObjectKind, frame: Frame) -> Iterator[Selector]:
     """Yield phrases for where an object stands, each with the rule by which it singles one out.
 
-    The rule ranks the objects of the kind, for example from left to right. Simpler words come
-    first. Boxes and tapes stand in pairs, one on each side of the robot; only their sides are used.
+    *closest to you*, *second from your left*, *closest to the button*, *nearest to the cube closest
+    to you*. A rule ranks the objects of the kind, for example from left to right. Simpler words
+    come first, and this order must stay: words of texts are drawn from it.
+
+    Args:
+        scene: with the objects.
+        kind: of the objects. Boxes and tapes stand in pairs, one on each side of the robot; only
+            their sides are used, *on your left*.
+        frame: whose left and right is meant.
     """
     candidates = candidates_in(scene, kind)
     if kind in PAIRED:
@@ -178,7 +201,7 @@ class Direction(NamedTuple):
     Attributes:
         extreme: words for the first in that direction: "the cube *closest to you*".
         rank: words after *second* and *third*: "second *from your left*".
-        ranking: the first one first.
+        ranking: the order of objects, the farthest in that direction first.
         side: ``left`` or ``right``, for which the frame matters; else empty.
     """
 
@@ -214,21 +237,23 @@ def directions(frame: Frame) -> tuple[Direction, ...]:
 
 
 def sideways(frame: Frame) -> tuple[Direction, ...]:
-    """Return left and right of a frame."""
+    """Return the words and the order of things for left and right, in this sequence."""
     return directions(frame)[:2]
 
 
 def _column(item: SceneObject) -> float:
-    """Return an object's column in the picture of the front camera, from 0 to 256.
+    """Return an object's column in the picture of the front camera, from 0, its left, to 256.
 
-    The camera stands at (0.3, 0, 0.4) and looks at (0, 0, -0.2); all heights count as a cube's.
+    The camera stands at (0.3, 0, 0.4) and looks at (0, 0, -0.2), meters in the world; all heights
+    count as a cube's. A perspective projection: the column is off the middle by y through the
+    depth, the distance along the camera's axis, in units of half a picture.
     """
     depth = _ORIGIN_DEPTH - _AXIS_X * item.position.x - _AXIS_Z * _CUBE_HEIGHT
     return _PICTURE_MIDDLE + _PICTURE_MIDDLE * item.position.y / depth
 
 
 def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    """Yield the first in each direction: *closest to you*."""
+    """Yield the words for the first thing in each of the four directions: *closest to you*."""
     for direction in directions(frame):
         is_sided = bool(direction.side)
         landmark = Landmark(direction.extreme, is_sided, is_in_depth=not is_sided)
@@ -236,7 +261,7 @@ def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sel
 
 
 def _sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    """Yield the two of a pair by their sides: *on your left*."""
+    """Yield the words for the two things of a pair by their sides: *on your left*."""
     owner = "your" if frame == "robot" else "the camera's"
     for direction in sideways(frame):
         landmark = Landmark(f"on {owner} {direction.side}", is_sided=True)
@@ -244,9 +269,14 @@ def _sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Select
 
 
 def corner_rankings(depth: str, side: str) -> tuple[Ranking, ...]:
-    """Return the orders by the distance from a corner, such as ``far`` and ``left``.
+    """Return the orders by the distance from a corner, the nearest first.
 
-    People may mean the corner of the area where things stand, or that of the table.
+    There are two, since people may mean the corner of the area where things stand, or that of the
+    table.
+
+    Args:
+        depth: ``near`` or ``far`` from the robot.
+        side: ``left`` or ``right`` of the robot.
     """
     return tuple(nearness((area[depth], area[side])) for area in (WORK_AREA, TABLE))
 
@@ -290,8 +320,12 @@ def _in_rows(
 ) -> Iterator[Selector]:
     """Yield the words for things in a row, counted from an end: *second from your left*.
 
-    `ordinals` has the words by rank, 1 for *second*. The last thing in a row gets none, since it is
-    the first from the other end.
+    The last thing in a row gets none, since it is the first from the other end.
+
+    Args:
+        candidates: the things.
+        frame: whose left and right is meant.
+        ordinals: the words by rank, from 0: 1 is *second*.
     """
     for rank, ordinal in ordinals.items():
         # The last one in a row is the extreme of the other end.
@@ -300,19 +334,22 @@ def _in_rows(
         for direction in directions(frame):
             is_sided = bool(direction.side)
             # *Fourth closest* is not counted as depth: `places` would leave it out.
-            is_in_depth = not is_sided and ordinals is ORDINALS
+            is_in_depth = not is_sided and rank not in FOURTH
             landmark = Landmark(f"{ordinal} {direction.rank}", is_sided, is_in_depth)
             yield Selector(landmark, (direction.ranking,), candidates, rank)
 
 
 def fixtures_in(scene: Scene) -> list[SceneObject]:
-    """Return the button, the target and the bin, if there is only one of it."""
+    """Return those of button, target and bin of which there is exactly one."""
     of_kinds = [scene.of_kind(kind) for kind in FIXTURES]
     return [of_kind[0] for of_kind in of_kinds if len(of_kind) == 1]
 
 
 def _by_fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Selector]:
-    """Yield the nearest to a fixture and the farthest from it: *closest to the button*."""
+    """Yield words for the things nearest to a fixture and farthest from it, *the button*.
+
+    Fixtures are button, target and bin.
+    """
     for fixture in fixtures_in(scene):
         near = nearness(fixture.position)
         closest = Landmark(f"closest to the {fixture.kind}")
@@ -322,13 +359,13 @@ def _by_fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[
 
 
 def alone_in_color(things: Sequence[SceneObject]) -> list[SceneObject]:
-    """Return the things that are the only ones of their color."""
+    """Return the things that are the only ones of their color; things without a color are none."""
     colors = [thing.color for thing in things]
     return [thing for thing in things if thing.color and colors.count(thing.color) == 1]
 
 
 def _by_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
-    """Yield the nearest to the only cube of a color: *closest to the red cube*."""
+    """Yield words for the thing nearest to the only cube of a color, *the red cube*."""
     for anchor in alone_in_color(candidates):
         landmark = Landmark(f"closest to the {anchor.color} cube")
         yield Selector(landmark, (nearness(anchor.position),), _without(candidates, anchor))
@@ -368,13 +405,15 @@ def _by_neighbors(
 
 
 def _without(candidates: Sequence[SceneObject], anchor: SceneObject) -> tuple[SceneObject, ...]:
+    """Return the objects but one."""
     return tuple(item for item in candidates if item is not anchor)
 
 
 def nearness(place: Sequence[float]) -> Ranking:
-    """Return the order by the distance from a place, the nearest first.
+    """Return the order of objects by the distance from a place in the plane, the nearest first.
 
-    The quantity is the distance with a minus sign, so that the nearest has the largest.
+    The quantity is the distance in meters with a minus sign, so that the nearest has the largest.
+    `place` is x and y in the world; further numbers are ignored.
     """
     x, y = place[:2]
     return Ranking(lambda item: -math.hypot(item.position.x - x, item.position.y - y))

@@ -28,12 +28,19 @@ Operand = Value | Described
 
 
 def meant_goals(meaning: Meaning, episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals of the scene that fit everything that was said."""
+    """Return the goals of the scene that fit everything that was said.
+
+    One goal for a clear instruction, none if its words contradict each other or the scene.
+    """
     return _goals_with(_values_of(meaning.terms, meaning, episode), meaning, episode)
 
 
 def command_goals(meaning: Meaning, episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals that fit the command alone: it settles some fields, the others are open."""
+    """Return the goals of the scene that fit the command alone, without the utterances before it.
+
+    After *Red is nice. Lift it twice.*, the command settles the repeats and leaves the color open:
+    every color, twice.
+    """
     return _goals_with(_values_of(meaning.settled, meaning, episode), meaning, episode)
 
 
@@ -53,20 +60,32 @@ def candidate_goals(meaning: Meaning, episode: Episode) -> tuple[Goal, ...]:
 
 
 def field_values(meaning: Meaning, field: str, episode: Episode) -> Values:
-    """Return the values that a field can have by what was said; empty if no term is about it."""
+    """Return the values that a field of the goal can have by what was said: ``{"red"}``.
+
+    Empty if nothing was said about it.
+    """
     term = meaning.terms.get(field)
     return frozenset() if term is None else _term_values(term, field, episode)
 
 
 def _values_of(fields: Iterable[str], meaning: Meaning, episode: Episode) -> dict[str, Values]:
-    """Return the possible values of some fields by their terms."""
+    """Return the possible values of some fields by their terms: ``{"color": {"red"}}``.
+
+    A term says how the value of a field follows from what was said. Each field must have one.
+    """
     return {field: _term_values(meaning.terms[field], field, episode) for field in fields}
 
 
 def _goals_with(
     possible: Mapping[str, Values], meaning: Meaning, episode: Episode
 ) -> tuple[Goal, ...]:
-    """Return the scene's goals with the fields that were said, each with a possible value."""
+    """Return the goals of the scene that have, in each field that was said, a possible value.
+
+    Args:
+        possible: for some fields, the values that the words allow: ``{"color": {"red"}}``.
+        meaning: of the instruction.
+        episode: with the scene; its own goal is not read.
+    """
     return tuple(goal for goal in goals_of(episode) if _can_be_meant(goal, possible, meaning))
 
 
@@ -74,7 +93,8 @@ def _can_be_meant(goal: Goal, possible: Mapping[str, Values], meaning: Meaning) 
     """Return whether a goal of the scene fits what was said.
 
     It fits if each of its fields, such as ``color`` or ``repeats``, has a value that the words
-    allow, and if singular and plural agree with it.
+    allow, and if singular and plural agree with it. A goal of a field that was not said does not
+    fit.
 
     Args:
         goal: of the scene.
@@ -95,7 +115,10 @@ def _can_be_meant(goal: Goal, possible: Mapping[str, Values], meaning: Meaning) 
 
 
 def _has_values(by_field: Mapping[str, Value], possible: Mapping[str, Values]) -> bool:
-    """Return whether a goal has a possible value in each field."""
+    """Return whether a goal, by field, has a possible value in each field that is asked for.
+
+    ``{"color": "red", "repeats": 2}`` with ``{"color": {"red", "blue"}}`` has.
+    """
     return all(by_field[field] in values for field, values in possible.items())
 
 
@@ -135,10 +158,15 @@ def _in_every_order(goal: Goal) -> Iterator[GoalValues]:
 
 
 def _term_values(term: Term, field: str, episode: Episode) -> Values:
-    """Return the values that the words allow for a field of the goal, as a term derives them.
+    """Return the values that the words allow for a field of the goal.
 
-    A term is an operation on what was said: ``double`` of 2 gives ``{4}``, ``rank`` 1 of red and
-    blue ``{"red"}``. Empty if it picks nothing of what was said.
+    A term is an operation on operands, what was said: ``double`` of 2 gives ``{4}``, ``rank`` 1 of
+    red and blue ``{"red"}``. Empty if it picks nothing, or what it picks is not in the scene.
+
+    Args:
+        term: of the field.
+        field: of the goal, ``colors.1``.
+        episode: with the scene in which descriptions, *on the left*, are looked up.
     """
     if term.operation == "without":
         return _values_without(term.operands, field, episode)
@@ -164,7 +192,10 @@ def picked_operand(term: Term) -> Operand | None:
 
 
 def _is_picked(position: int, term: Term) -> bool:
-    """Return whether a term picks the operand at a position, from 1."""
+    """Return whether a term picks the operand at a position, from 1.
+
+    ``rank`` picks the one at its rank, ``other`` all but that one, and all others pick each.
+    """
     if term.operation == "rank":
         return position == term.rank
     if term.operation == "other":
@@ -173,7 +204,10 @@ def _is_picked(position: int, term: Term) -> bool:
 
 
 def _computed_number(term: Term, number: int) -> int:
-    """Return the number that follows from another one."""
+    """Return the number that a term computes from another one, its operand.
+
+    ``double`` gives 6 from 3, ``half`` 2 from 4, and ``step`` with the step -1 gives 2 from 3.
+    """
     if term.operation == "double":
         return 2 * number
     if term.operation == "half":
@@ -186,6 +220,12 @@ def _values_without(operands: Sequence[Operand], field: str, episode: Episode) -
 
     In a scene of red, blue and green cubes, *neither red nor blue* leaves ``{"green"}``. Things may
     be set aside by descriptions, *the one on the left*; then the only thing left gives the value.
+    For a number of cubes, *all but three* of five leaves ``{2}``.
+
+    Args:
+        operands: what is set aside: values, or descriptions.
+        field: of the goal, ``color``.
+        episode: with the scene.
     """
     described = [operand for operand in operands if isinstance(operand, Described)]
     if described:
@@ -217,12 +257,15 @@ def _values_of_last_thing(
 
 
 def _things_to_point_at(episode: Episode) -> Sequence[SceneObject]:
-    """Return the things of the scene among which words point."""
+    """Return the cubes or containers of the scene that words such as *on the left* can mean."""
     return candidates_in(episode.scene, get_task(episode.task).things.pointed)
 
 
 def _listed_values(term: Term, field: str, episode: Episode) -> Values:
-    """Return the values of a field for which any operand of a term stands."""
+    """Return the values of a field for which any operand of a term, anything that was said, stands.
+
+    For ``rank`` 1 of red and blue: both.
+    """
     found: set[Value] = set()
     for operand in term.operands:
         found |= _operand_values(operand, field, episode)
@@ -244,7 +287,10 @@ def _operand_values(operand: Operand, field: str, episode: Episode) -> Values:
 
 
 def _values_of_event(described: Described, field: str, episode: Episode) -> Values:
-    """Return the value of a field to which something in the video leads."""
+    """Return the value of a field to which words for something in the video lead; empty if none.
+
+    *The cube that the robot moved* leads to its color.
+    """
     found: set[Value] = set()
     for event in event_clues(episode.scene):
         if event.clue.words == described.phrase and event.slot == field:
@@ -270,7 +316,12 @@ def _described_thing(described: Described, episode: Episode) -> SceneObject | No
 def _values_of_thing(thing: SceneObject, field: str, episode: Episode) -> Values:
     """Return the colors by which a goal can ask for a thing: ``{"red"}`` for a red cube.
 
-    A container has the colors of what is under it. `field` is the goal's field, ``colors.1``.
+    A container has the colors of what is under it.
+
+    Args:
+        thing: of the scene.
+        field: of the goal, ``colors.1``, whose slot decides which colors are possible.
+        episode: with the scene.
     """
     kind_of_thing = get_task(episode.task).things.pointed
     found: set[Value] = set()
@@ -281,7 +332,10 @@ def _values_of_thing(thing: SceneObject, field: str, episode: Episode) -> Values
 
 
 def _possible_values(field: str, episode: Episode) -> Values:
-    """Return the values that a field's slot has in any goal of the scene."""
+    """Return the values that a field can have in any goal of the scene: ``{"red", "blue"}``.
+
+    They are those of its slot: for ``colors.1``, the second color, the colors of all goals.
+    """
     slot = field.partition(".")[0]  # of "colors.1", the second color
     found: set[Value] = set()
     for goal in goals_of(episode):

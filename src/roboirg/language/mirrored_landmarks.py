@@ -29,8 +29,10 @@ def exchange_sides(words: str) -> str:
 def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str, frozenset[str]]:
     """Return which objects the instruction would mean to a listener who takes left for right.
 
-    Where the goal counts cubes, a place only gives their color, so all cubes of a color stand for
-    one another. No object is given that the instruction means as well.
+    *The cube on the left* means the red cube and, with left and right exchanged, the blue one:
+    ``{"cube_red": {"cube_blue"}}``. Where the goal counts cubes, a place only gives their color, so
+    all cubes of a color stand for one another. No object is given that the instruction means as
+    well.
 
     Returns:
         For the name of each object that is meant, those that the exchanged words single out; empty
@@ -54,7 +56,11 @@ def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str,
 
 
 def _exchangeable(episode: Episode, thing: SceneObject) -> frozenset[str]:
-    """Return the names of what stands for a thing: what it hides, or all cubes of its color."""
+    """Return the names of what stands for a thing in the goal.
+
+    For a container the cube under it; for a cube itself, or, where the goal counts cubes, all cubes
+    of its color.
+    """
     if "counts" not in episode.goal.as_mapping():
         return frozenset([thing.inside or thing.name])
     same_kind = episode.scene.of_kind(thing.kind)

@@ -34,7 +34,7 @@ def agreeing_number(values: Sequence[str | int]) -> int:
 
 
 def plural(noun: str) -> str:
-    """Return the plural of a noun: ``cubes``, ``passes``."""
+    """Return the plural of a noun: ``cube`` -> ``cubes``, ``pass`` -> ``passes``."""
     return f"{noun}es" if noun.endswith(("s", "x")) else f"{noun}s"
 
 

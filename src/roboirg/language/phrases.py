@@ -24,7 +24,14 @@ _PRONOUNS = ("it", "them")
 
 
 class Tag(NamedTuple):
-    """The referent of a piece of text; see `Mention`."""
+    """What a piece of text stands for; the fields are those of the `Mention` that it becomes.
+
+    Attributes:
+        role: antecedent or anaphor.
+        expression: class of an anaphor, ``it``; None for an antecedent.
+        slot: of the goal, or ``reference``.
+        value: the referent.
+    """
 
     role: Role
     expression: Expression | None
@@ -33,7 +40,10 @@ class Tag(NamedTuple):
 
 
 class TaggedText(NamedTuple):
-    """A run of characters: one mention if it has a tag, else none."""
+    """A piece of text: a mention of a value if it has a tag, else plain words.
+
+    *it* with the tag ``Tag("anaphor", "it", "color", "red")``.
+    """
 
     text: str
     tag: Tag | None = None
@@ -43,17 +53,24 @@ Phrase = tuple[TaggedText, ...]
 
 
 def plain(text: str) -> Phrase:
-    """Return words that are no mention."""
+    """Return words that mention no value, as a phrase."""
     return (TaggedText(text),)
 
 
 def antecedent(text: str, slot: str, value: str | int) -> Phrase:
-    """Return words that introduce a value of a slot."""
+    """Return words that name a value of a slot, *red*, as a phrase."""
     return (TaggedText(text, Tag("antecedent", None, slot, value)),)
 
 
 def anaphor(text: str, expression: Expression, slot: str, value: str | int) -> Phrase:
-    """Return words that point back at a value of a slot."""
+    """Return words that point back at a value of a slot, *it*, as a phrase.
+
+    Args:
+        text: the words.
+        expression: their class, ``it``.
+        slot: of the value.
+        value: that they stand for.
+    """
     return (TaggedText(text, Tag("anaphor", expression, slot, value)),)
 
 
@@ -111,22 +128,29 @@ def listed(phrases: Sequence[Phrase], joint: str = "and") -> Phrase:
 
 
 class Spoken(NamedTuple):
-    """An utterance, and the mentions in it."""
+    """An utterance written out, and the mentions of values in it, in order."""
 
     utterance: Utterance
     mentions: tuple[Mention, ...]
 
 
 def words_of(phrase: Phrase) -> str:
-    """Return the words of a phrase, without its mentions."""
+    """Return the words of a phrase as a text, without its tags."""
     return "".join(piece.text for piece in phrase)
 
 
 def speak(index: int, stage: UtteranceStage, phrase: Phrase, *, capitalize: bool = True) -> Spoken:
-    """Return a phrase as an utterance, with the words that have tags as mentions.
+    """Return a phrase as an utterance, with a mention for each piece of text that has a tag.
 
     A mention has its first and last characters in the utterance. Of *Lift it*, in which *it* has a
-    tag, it starts at 5 and ends at 7. `index` is the number of the utterance in the instruction.
+    tag, it starts at 5 and ends at 7.
+
+    Args:
+        index: number of the utterance in the instruction.
+        stage: its part in the text.
+        phrase: its words with their tags.
+        capitalize: whether each sentence gets a capital letter; no characters are added or removed,
+            so the mentions stay right.
     """
     mentions: list[Mention] = []
     start = 0
@@ -142,5 +166,8 @@ def speak(index: int, stage: UtteranceStage, phrase: Phrase, *, capitalize: bool
 
 
 def _capitalized(text: str) -> str:
-    """Capitalize every sentence, without adding or removing characters."""
+    """Return a text with a capital letter at the beginning of every sentence.
+
+    It has as many characters as before, since mentions are positions in it.
+    """
     return re.sub(r"(?:^|[.!?] )[a-z]", lambda begin: begin[0].upper(), text)

@@ -66,7 +66,7 @@ class PlaceClass(IntEnum):
 
 
 class SpokenPlace(NamedTuple):
-    """A place, and what stands there.
+    """Words for where a thing stands, and the thing.
 
     Attributes:
         kind: class.
@@ -83,7 +83,12 @@ class SpokenPlace(NamedTuple):
     spot: str | None = None
 
     def said(self, form: str | None = None) -> str:
-        """Return the words of the form ``spot``, or those after a noun; empty if there are none."""
+        """Return the words in a form; empty if there are none.
+
+        Args:
+            form: ``spot`` for where something happens, *right by the button*; any other, or None,
+                for words after a noun, *nearest to the button*.
+        """
         words = self.spot if form == "spot" else self.attributive
         return words or ""
 
@@ -95,7 +100,13 @@ def spoken_places(scene: Scene, kind: ObjectKind, frame: Frame) -> tuple[SpokenP
 
     Things are where the scene has them, at the start; what moves later is named by where it
     started. Cubes that arrive later are left out. If there is only one thing, only words for where
-    something happens are returned (*on the left*), since it needs no telling apart.
+    something happens are returned (*on the left*), since it needs no telling apart. The order must
+    stay: words of texts are drawn from it.
+
+    Args:
+        scene: with the things.
+        kind: of the things.
+        frame: whose left and right is meant, the robot's or the camera picture's.
     """
     things = candidates_in(scene, kind)
     places: list[SpokenPlace] = []
@@ -108,10 +119,11 @@ def spoken_places(scene: Scene, kind: ObjectKind, frame: Frame) -> tuple[SpokenP
 
 
 def _landmarks(scene: Scene, kind: ObjectKind, frame: Frame) -> Iterator[SpokenPlace]:
-    """Yield the words of `landmarks` as places of the last class, which people hardly say.
+    """Yield the words of the module `landmarks` as places of the last class, hardly said.
 
-    Words by depth, *closest to you*, are left out, as they may be wrong by distance. Boxes and
-    tapes come in pairs, and the words for their sides also say where something happens.
+    *second nearest to the button*. Words by depth, *closest to you*, are left out, as they may be
+    wrong by distance. Boxes and tapes come in pairs, and the words for their sides also say where
+    something happens.
     """
     is_paired = kind in PAIRED
     for selector in selectors(scene, kind, frame):
@@ -123,7 +135,11 @@ def _landmarks(scene: Scene, kind: ObjectKind, frame: Frame) -> Iterator[SpokenP
 
 
 def _places_of(scene: Scene, things: Things, frame: Frame) -> Iterator[SpokenPlace]:
-    """Yield the places of things, in any order."""
+    """Yield the words for where things stand, of all classes that people say.
+
+    Corners and sides of a fixture are said in the robot's frame only. `spoken_places` sorts them by
+    class and keeps the order within one, from which words are drawn, so the order here must stay.
+    """
     yield from _in_directions(things, frame)
     if frame == "robot":
         yield from _corners(things)
@@ -134,26 +150,32 @@ def _places_of(scene: Scene, things: Things, frame: Frame) -> Iterator[SpokenPla
 
 
 @lru_cache(maxsize=64)
-def things_at(
-    scene: Scene, kind: ObjectKind, frame: Frame
-) -> Mapping[str | None, SceneObject | None]:
+def things_at(scene: Scene, kind: ObjectKind, frame: Frame) -> Mapping[str, SceneObject | None]:
     """Return the thing that each phrase for a place singles out; None where that is unclear.
 
     ``{"on the left": <a cube>, "in the middle": <another>}``
     """
-    found: dict[str | None, SceneObject | None] = {}
+    found: dict[str, SceneObject | None] = {}
     for selector in selectors(scene, kind, frame):
         found[selector.landmark.phrase] = selector.select()
     for place in spoken_places(scene, kind, frame):
-        found[place.attributive] = place.thing
-        found[place.spot] = place.thing
+        for words in (place.attributive, place.spot):
+            if words is not None:
+                found[words] = place.thing
     return found
 
 
 def _place_if_any(
     kind: PlaceClass, thing: SceneObject | None, attributive: str | None, spot: str | None = None
 ) -> Iterator[SpokenPlace]:
-    """Yield a place if something stands there, and if there are words for it."""
+    """Yield a place, if a thing stands there and there are words for it; else nothing.
+
+    Args:
+        kind: class of the place.
+        thing: what stands there; None if that is unclear.
+        attributive: words after a noun; None without any.
+        spot: words for where something happens; None without any.
+    """
     if thing is not None and (attributive or spot):
         yield SpokenPlace(kind, thing, attributive, spot)
 
@@ -164,6 +186,11 @@ def _only_beyond(things: Things, ranking: Ranking, start: float) -> SceneObject 
     None also if another thing comes closer to `start` than the margin. With the distance to the
     left of the center as the quantity and 0.06 m as `start`: the only thing that is clearly on the
     left.
+
+    Args:
+        things: that are compared.
+        ranking: the quantity, and its margin.
+        start: from which a quantity counts, in the unit of the quantity.
     """
     # Things beyond the start count as equal, so that two of them are no clear first one.
     capped_ranking = ranking._replace(quantity=lambda thing: min(ranking.quantity(thing), start))
@@ -192,7 +219,10 @@ _MAX_DETOUR = 0.03
 
 
 def _center_of(things: Things) -> SceneObject:
-    """Return the center in front of the robot: of the work area, or as deep as the things are."""
+    """Return the center in front of the robot from which things count as left, right, near or far.
+
+    For several things it is as deep as their middle; for a single one it is the work area's center.
+    """
     if len(things) == 1:
         return _CENTER
     depths = [thing.position.x for thing in things]
@@ -200,7 +230,10 @@ def _center_of(things: Things) -> SceneObject:
 
 
 def _distance_past(center: SceneObject, ranking: Ranking) -> Ranking:
-    """Return the order of things by how far they are past a center."""
+    """Return the order of things by how far they are past a center in the direction of a ranking.
+
+    The quantity is negative for things on the other side of it.
+    """
     start = ranking.quantity(center)
     return ranking._replace(quantity=lambda thing: ranking.quantity(thing) - start)
 
@@ -219,8 +252,8 @@ def _is_past_work_center(thing: SceneObject | None, *rankings: Ranking) -> bool:
     return True
 
 
-class _Words(NamedTuple):
-    """Words of a direction, here to the left; None where no one says any.
+class _DirectionWords(NamedTuple):
+    """The words of a direction, here to the left; None where no one says any.
 
     Attributes:
         most: for the first in that direction, *all the way on the left*.
@@ -241,35 +274,42 @@ _FRONT = "all the way in the front"
 _BACK = "all the way in the back"
 
 
-def _sided(side: str) -> _Words:
-    """Return the words for left or right."""
+def _sided(side: str) -> _DirectionWords:
+    """Return the words for the direction ``left`` or ``right``."""
     there = f"on the {side}"
-    return _Words(f"all the way {there}", f"on the far {side}", there, there, f"from the {side}")
+    return _DirectionWords(
+        f"all the way {there}", f"on the far {side}", there, there, f"from the {side}"
+    )
 
 
-_WORDS: Mapping[Frame, tuple[_Words, ...]] = {
+_WORDS_BY_FRAME: Mapping[Frame, tuple[_DirectionWords, ...]] = {
     "robot": (
         _sided("left"),
         _sided("right"),
-        _Words("closest to you", _FRONT, "in the front", "in the front", "closest to you"),
-        _Words(_BACK, _BACK, "in the back", "in the back"),
+        _DirectionWords("closest to you", _FRONT, "in the front", "in the front", "closest to you"),
+        _DirectionWords(_BACK, _BACK, "in the back", "in the back"),
     ),
     "camera": (
         _sided("left of the picture"),
         _sided("right of the picture"),
-        _Words("closest to the robot", None, None, "close to the robot", "closest to the robot"),
-        _Words("farthest from the robot", spot="far from the robot"),
+        _DirectionWords(
+            "closest to the robot", None, None, "close to the robot", "closest to the robot"
+        ),
+        _DirectionWords("farthest from the robot", spot="far from the robot"),
     ),
 }
 """By frame, in the order of `directions`."""
 
 
 def _in_directions(things: Things, frame: Frame) -> Iterator[SpokenPlace]:
-    """Yield the words for things far to the left, right, front and back, with their things.
+    """Yield the words for the things at the left, right, front and back, each with its thing.
 
-    The frame says whose left and right: the robot's, or that of the front camera's picture.
+    *all the way on the left*, *on the left*, *second from the left* …; the frame says whose left
+    and
+    right: the robot's, or that of the front camera's picture. Words by depth must also be right by
+    the distance from the robot.
     """
-    left_words, right_words, near_words, far_words = _WORDS[frame]
+    left_words, right_words, near_words, far_words = _WORDS_BY_FRAME[frame]
     to_left, to_right, in_front, behind = directions(frame)
     yield from _in_direction(things, left_words, to_left.ranking)
     yield from _in_direction(things, right_words, to_right.ranking)
@@ -279,11 +319,18 @@ def _in_directions(things: Things, frame: Frame) -> Iterator[SpokenPlace]:
 
 
 def _in_depth(
-    things: Things, words: _Words, by_depth: Ranking, by_distance: Ranking
+    things: Things, words: _DirectionWords, by_depth: Ranking, by_distance: Ranking
 ) -> Iterator[SpokenPlace]:
     """Yield words for near or far things that are right by depth and by distance from the robot.
 
-    What stands aside is farther away than it is deep, and people may mean either.
+    A thing far to the side is farther from the robot than it is deep, and people may mean either,
+    so only words that both orders give to the same thing are yielded.
+
+    Args:
+        things: that are compared.
+        words: of the direction.
+        by_depth: the order by x.
+        by_distance: the order by the distance from the robot.
     """
     right_by_distance = set(_in_direction(things, words, by_distance))
     for place in _in_direction(things, words, by_depth):
@@ -291,11 +338,18 @@ def _in_depth(
             yield place
 
 
-def _in_direction(things: Things, words: _Words, ranking: Ranking) -> Iterator[SpokenPlace]:
+def _in_direction(
+    things: Things, words: _DirectionWords, ranking: Ranking
+) -> Iterator[SpokenPlace]:
     """Yield words in one direction, here the left, each with the thing that it singles out.
 
     They are the first one, *all the way on the left*; one that is far ahead, *on the far left*; the
     only one there, *on the left*; and those after the first, *second from the left*.
+
+    Args:
+        things: that are compared.
+        words: of the direction.
+        ranking: the order of things, the first in the direction first.
     """
     yield from _place_if_any(PlaceClass.EXTREME, ranking.select(things, 0), words.most)
 
@@ -316,10 +370,15 @@ def _in_direction(things: Things, words: _Words, ranking: Ranking) -> Iterator[S
         yield from _in_row(things, words, ranking)
 
 
-def _in_row(things: Things, words: _Words, ranking: Ranking) -> Iterator[SpokenPlace]:
+def _in_row(things: Things, words: _DirectionWords, ranking: Ranking) -> Iterator[SpokenPlace]:
     """Yield words for the things after the first one in a direction: *second from the left*.
 
     The last one gets no such words, since it is the first from the other end.
+
+    Args:
+        things: that are compared.
+        words: of the direction; they must have those for a row.
+        ranking: the order of things, the first in the direction first.
     """
     for rank, ordinal in ORDINALS.items():
         if rank >= len(things) - 1:
@@ -352,24 +411,23 @@ def _near_others(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
 def _near(
     anchor: SceneObject, name: str, things: Things, kind: PlaceClass
 ) -> Iterator[SpokenPlace]:
-    """Yield *nearest to the button* and *next to the button*, for the things that are so.
+    """Yield *nearest to the button* and *next to the button*, each for the thing that is so.
 
-    The anchor is what the words name, here the button. *Next to* is within a few centimeters
-    (`BESIDE`) of touching it.
+    *Next to* is for the only thing within a few centimeters (`BESIDE`) of touching the button. By a
+    fixture it also says where something happens, *right by the button*.
 
     Args:
-        anchor: near which things are looked for.
+        anchor: near which things are looked for, here the button.
         name: words for it, *the button*.
-        things: that may be near it.
+        things: that may be near it; at least one.
         kind: class of the places.
     """
     nearness_to_anchor = nearness(anchor.position)
     yield from _place_if_any(kind, nearness_to_anchor.select(things, 0), f"nearest to {name}")
 
     reach = anchor.half_width + things[0].half_width + BESIDE
-    neighbor = _only_beyond(
-        things, nearness_to_anchor, -reach
-    )  # the quantity is the distance with a minus sign
+    # The quantity of nearness is the distance with a minus sign.
+    neighbor = _only_beyond(things, nearness_to_anchor, -reach)
     spot = None
     if kind == PlaceClass.FIXTURE:
         spot = f"right by {name}"
@@ -377,7 +435,10 @@ def _near(
 
 
 def _between(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
-    """Yield the only thing over which the way between two fixtures is hardly longer."""
+    """Yield *between the button and the target* for the only thing between two such fixtures.
+
+    The way from one to the other over this thing is at most 3 cm longer than the direct way.
+    """
     for first, second in itertools.combinations(fixtures_in(scene), 2):
         words = f"between the {first.kind} and the {second.kind}"
         shortest = nearness(first.position).quantity(second)
@@ -386,18 +447,22 @@ def _between(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
 
 
 def _way_between(first: SceneObject, second: SceneObject) -> Ranking:
-    """Return the order of things by the way from one to the other over them, the shortest first."""
+    """Return the order of things by the way from one object to another over them, shortest first.
+
+    As nearness is the distance with a minus sign, the quantity is that way with a minus sign.
+    """
     near, far = nearness(first.position), nearness(second.position)
     # A thing that moves comes nearer to both, or goes away from both, by as much.
     return Ranking(lambda thing: near.quantity(thing) + far.quantity(thing), 2 * MARGIN)
 
 
 def _in_middle(things: Things) -> Iterator[SpokenPlace]:
-    """Yield the thing that is nearest to the center, if it can be called *in the middle*.
+    """Yield *in the middle* for the thing that is nearest to the center, if it can be called so.
 
     It has to be the nearest to the center of the work area and to that of the things, since people
     may mean either. Of an even number of things, it must be the only one around the center; of an
-    odd number, it must be the middle one from left to right.
+    odd number, it must be the middle one from left to right. Only a thing that is alone around the
+    center also says where something happens, as a spot.
     """
     nearness_to_area_center = nearness(_CENTER.position)
     nearness_to_their_center = nearness(_center_of(things).position)
@@ -418,7 +483,7 @@ def _in_middle(things: Things) -> Iterator[SpokenPlace]:
 
 
 class _Corner(NamedTuple):
-    """A corner in front of the robot.
+    """A corner of the table in front of the robot.
 
     Attributes:
         depth: ``near`` or ``far``.
@@ -443,14 +508,19 @@ class _Corner(NamedTuple):
         return agreed(found)
 
     def quarter(self, center: SceneObject) -> Ranking:
-        """Return the order of things by how far they are in the corner's quarter of the table."""
+        """Return the order of things by how far they are in the corner's quarter around a center.
+
+        The quantity is the lesser of two: how far a thing is past the center toward the corner's
+        depth, and toward its side. It is negative outside of the quarter.
+        """
         return _lesser_of(_distance_past(center, self.along), _distance_past(center, self.across))
 
 
 def _corners(things: Things) -> Iterator[SpokenPlace]:
     """Yield words for the thing nearest to each of the four corners of the table, with the thing.
 
-    Front and left are the robot's: *nearest to the front left corner*.
+    *at the back left*, *in the back left corner*, *nearest to the back left corner*; left and right
+    are the robot's, and the front is near the robot.
     """
     left, right, near, far = (direction.ranking for direction in directions("robot"))
     corners = (
@@ -467,7 +537,8 @@ def _at_corner(things: Things, corner: _Corner) -> Iterator[SpokenPlace]:
     """Yield words for the thing nearest to a corner, if one is clearly the nearest.
 
     Alone in that quarter of the table, it is *at the back left*, and close enough to the corner
-    also *in the back left corner*. Else it is *nearest to the back left corner*.
+    also *in the back left corner*. Else it is *nearest to the back left corner*, which is no spot:
+    it does not say where something happens.
     """
     nearest = corner.nearest(things)
     if nearest is None:
@@ -487,12 +558,15 @@ def _at_corner(things: Things, corner: _Corner) -> Iterator[SpokenPlace]:
 
 
 def _lesser_of(along: Ranking, across: Ranking) -> Ranking:
-    """Return the order of things by the lesser of two quantities: how far they are past both."""
+    """Return the order of things by the lesser of two quantities, the largest first.
+
+    Its margin is twice as large, 6 cm, since what is hardly outside of a quarter may still pass for
+    being in it.
+    """
 
     def lesser(thing: SceneObject) -> float:
         return min(along.quantity(thing), across.quantity(thing))
 
-    # What is hardly outside of a quarter may still pass for being in it.
     return Ranking(lesser, _CLEAR_MARGINS * MARGIN)
 
 
@@ -512,6 +586,9 @@ def _on_sides(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
 
 
 def _is_sideways(thing: SceneObject, fixture: SceneObject) -> bool:
-    """Return whether a thing is at least as much aside of a fixture as behind or before it."""
+    """Return whether a thing is rather aside of a fixture than behind or before it.
+
+    Aside is along y, behind and before along x; at 45 degrees it counts as aside.
+    """
     sideward = abs(thing.position.y - fixture.position.y)
     return sideward >= abs(thing.position.x - fixture.position.x)

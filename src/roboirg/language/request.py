@@ -40,12 +40,14 @@ AMOUNT_FIELD = "cubes"
 
 
 class GoalValue(NamedTuple):
-    """One value of the goal that an instruction conveys.
+    """One value of a goal, with its place in the goal and in commands.
+
+    Of a goal of red and blue: ``GoalValue("colors.1", "colors", "color", "blue")``.
 
     Attributes:
         field: its field in the task's commands, ``repeats`` or ``colors.1``.
-        slot: name of the goal slot.
-        slot_type: type of the slot.
+        slot: name of the goal slot, ``colors``.
+        slot_type: type of the slot, ``color``; ``amount`` for colors that have counts.
         value: the value.
     """
 
@@ -56,28 +58,28 @@ class GoalValue(NamedTuple):
 
     @property
     def color(self) -> str:
-        """The value, if it is a color."""
+        """The value as a color; only for values that are one."""
         return str(self.value)
 
     @property
     def number(self) -> int:
-        """The value, if it is a number."""
+        """The value as a number; only for values that are one."""
         return int(self.value)
 
 
 GoalValues = tuple[GoalValue, ...]
-"""Values of one type, or all of a goal, in the order of its slots."""
+"""Values of a goal, in the order of its slots."""
 
 
 @dataclass(frozen=True, slots=True)
 class InstructionRequest:
-    """An episode, how to instruct it, and the random choice of words.
+    """An episode that is to be said, with the options of its words and the random choice of them.
 
     Attributes:
         episode: the episode.
         task: its task.
         options: valid ones; see `roboirg.language.instruct`.
-        sampler: picks the words.
+        sampler: draws the words, and keeps a log of the draws.
     """
 
     episode: Episode
@@ -87,17 +89,17 @@ class InstructionRequest:
 
     @property
     def resolved(self) -> bool:
-        """Whether the command names the referents of its referring expressions."""
+        """Whether the command names what its pronouns stand for: *the red cube*, not *it*."""
         return self.options.form == "resolved"
 
     @property
     def pool(self) -> PoolName:
-        """The pool from which the words are taken."""
+        """The pool from which the words are taken: ``train`` or ``test``."""
         return pool_of(self.episode.split, self.options.wordings)
 
     @property
     def frame(self) -> Frame:
-        """The frame of left and right."""
+        """Whose left and right the words mean: ``robot`` or ``camera``."""
         return cast("Frame", self.options.frame)
 
     @property
@@ -106,30 +108,38 @@ class InstructionRequest:
         return values_of_goal(self.episode.goal)
 
     def values_of(self, slot_type: SlotTypeName) -> GoalValues:
-        """Return the goal values of one slot type."""
+        """Return the goal's values of one type: of ``color``, red and blue. May be empty."""
         return tuple(value for value in self.goal_values if value.slot_type == slot_type)
 
     def values_in(self, slot: str) -> GoalValues:
-        """Return the goal values of one slot."""
+        """Return the goal's values in one slot: in ``colors``, red and blue. May be empty."""
         return tuple(value for value in self.goal_values if value.slot == slot)
 
     def fields_in(self, name: str) -> list[str]:
-        """Return the fields of the goal that a field of our commands holds: itself, or amounts."""
+        """Return the fields of the goal that a field of a command holds.
+
+        ``color`` holds itself; ``cubes``, for goals that count cubes, holds all fields:
+        ``colors.0``, ``colors.1``, ``counts.0``, ``counts.1``.
+        """
         if name != AMOUNT_FIELD:
             return [name]
         return [value.field for value in self.goal_values]
 
     @property
     def color_values(self) -> GoalValues:
-        """The goal values that are colors, counted or not."""
+        """The goal's values that are colors, with counts or without."""
         return tuple(value for value in self.goal_values if value.slot in COLOR_SLOTS)
 
     def alternatives(self, slot: str) -> tuple[tuple[str | int, ...], ...]:
-        """Return all that a slot can hold in this scene if the other slots keep their values."""
+        """Return all that a slot can hold in this scene if the other slots keep their values.
+
+        In a scene of red and blue cubes, ``color`` gives ``(("red",), ("blue",))``. What the goal
+        has is among them.
+        """
         return _alternatives(self.task.name, self.episode.scene, self.episode.goal, slot)
 
     def alternative_numbers(self, slot: str) -> tuple[tuple[int, ...], ...]:
-        """Return the alternatives of a slot that holds numbers."""
+        """Return the alternatives of a slot of numbers: ``((1,), (2,), (3,))`` for ``repeats``."""
         return tuple(tuple(map(int, content)) for content in self.alternatives(slot))
 
     @property
@@ -153,16 +163,21 @@ class InstructionRequest:
         return _scene_colors(self.task.name, self.episode.scene)
 
     def other_colors(self, color: str) -> tuple[Color, ...]:
-        """Return the colors in the task's vocabulary, without this one."""
+        """Return the colors that the task knows, in the scene or not, without this one."""
         return tuple(other for other in self.task.things.colors if other != color)
 
     def objects_to_point_at(self, color: GoalValue) -> tuple[SceneObject, ...]:
-        """Return the cubes of a color, or the containers over them."""
+        """Return the cubes of a color, or the containers over them, if the task has such."""
         return things_of_color(self.episode.scene, self.task.things.pointed, color.color)
 
 
 class UtteranceSpec(NamedTuple):
-    """One utterance: its stage, and its words with their mentions."""
+    """One utterance before it is written out.
+
+    Attributes:
+        stage: its part in the text, ``introduction``.
+        phrase: its words, with the mentions of values among them.
+    """
 
     stage: UtteranceStage
     phrase: Phrase
@@ -170,12 +185,12 @@ class UtteranceSpec(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class InstructionSpec:
-    """The words of an instruction.
+    """The words of an instruction before they are written out.
 
     Attributes:
         utterances: in the order of speaking; the last one is the command.
-        meaning: by declaration.
-        notes: entries of the metadata.
+        meaning: how the values of the goal follow from the words.
+        notes: entries of the metadata, such as the reasoning pattern.
     """
 
     utterances: tuple[UtteranceSpec, ...]
@@ -186,10 +201,10 @@ class InstructionSpec:
 # Cached: all settings and forms of an episode ask for the same.
 @functools.lru_cache(maxsize=256)
 def values_of_goal(goal: Goal) -> GoalValues:
-    """Return the values of a goal one by one, each with its slot, its field and its type.
+    """Return the values of a goal one by one, in the order of its slots.
 
-    A goal with the slot ``colors`` of red and blue gives red in the field ``colors.0`` and blue in
-    ``colors.1``. Colors that have counts are of the type ``amount``.
+    A goal with the slot ``colors`` of red and blue gives red with the field ``colors.0`` and blue
+    with ``colors.1``. Colors that have counts are of the type ``amount``.
     """
     found: list[GoalValue] = []
     has_counts = "counts" in dict(goal.slots)
@@ -206,20 +221,24 @@ def values_of_goal(goal: Goal) -> GoalValues:
 def _alternatives(
     task: str, scene: Scene, goal: Goal, slot: str
 ) -> tuple[tuple[str | int, ...], ...]:
-    """Return what a slot holds in each goal of a scene that equals this goal in all other slots."""
+    """Return what a slot holds in each goal of a scene that has the other slots of a given goal.
+
+    If the scene allows the goals *red, twice*, *blue, twice* and *blue, once*, the slot ``color``
+    of the first gives ``(("red",), ("blue",))``.
+    """
     rest = _without_slot(goal, slot)
     goals = [other for other in get_task(task).goals(scene) if _without_slot(other, slot) == rest]
     return tuple(values_in(other[slot]) for other in goals)
 
 
 def _without_slot(goal: Goal, slot: str) -> dict[str, SlotValue]:
-    """Return the values of a goal by slot, but one."""
+    """Return the values of a goal by slot, without one slot."""
     return {name: value for name, value in goal.slots if name != slot}
 
 
 @functools.lru_cache(maxsize=64)
 def _scene_colors(task: str, scene: Scene) -> tuple[str, ...]:
-    """Return all colors in goals of a scene, in the order of the task's vocabulary."""
+    """Return the colors for which goals of a scene ask, in the order of the task's vocabulary."""
     found: set[str | int] = set()
     for goal in get_task(task).goals(scene):
         for slot, content in goal.slots:

@@ -5,8 +5,8 @@ values, each possible in the other, are partners: the value of one is the rival 
 two values each is the meant one in half of a split's episodes.
 
 - *meant*: the value that the goal has. *rival*: another one that the goal could have there.
-- *pair*: a meant value with a rival. `possible_pairs` finds all, `rival_pairs` those of one slot,
-  and `balanced_rival` the one that is said.
+- *pair*: a meant value with a rival. `possible_pairs` finds all, `pairs_of_drawn_slot` those of one
+  slot, and `balanced_rival` the one that is said.
 - *entry*: an episode of a split with all that may be its rival.
 """
 
@@ -36,7 +36,7 @@ NUMBER_SLOTS = ("repeats", "counts", "visit", "placement")
 
 
 class ValuePair(NamedTuple):
-    """Two values, one of which is meant.
+    """A value of the goal and its rival, for which the goal could ask instead: *red* and *blue*.
 
     Attributes:
         meant: a value of the goal; of two colors in order, the one that comes first.
@@ -59,20 +59,23 @@ class ValuePair(NamedTuple):
 
 
 def pair_refusal(request: InstructionRequest) -> str | None:
-    """Return why an episode can have no rival; None if it can."""
-    if rival_pairs(request):
+    """Return why an episode can have no rival, a second value for which its goal could ask.
+
+    None if it can. The text is the end of a sentence, without a stop.
+    """
+    if pairs_of_drawn_slot(request):
         return None
     if len(request.values_of("amount")) > _FIELDS_OF_ONE_AMOUNT:
         return "a goal that counts cubes of several colors leaves no rival"
     return "the scene has no second value that the goal could ask for"
 
 
-def rival_pairs(request: InstructionRequest) -> list[ValuePair]:
-    """Return the goal's value in one slot, with each other value that words may name next to it.
+def pairs_of_drawn_slot(request: InstructionRequest) -> list[ValuePair]:
+    """Draw a slot of the goal, and return its value there with each of its rivals.
 
-    The other value is a rival: *red or blue?* where red is meant. Of several slots that can have
-    rivals one is drawn. A color that the video gives away has none, as the choice would be no
-    choice.
+    A rival is a value that words may name next to it: *red or blue?* where red is meant. Only slots
+    that can have rivals are drawn from. A color that the video gives away has none, as the choice
+    would be no choice. Empty if no slot can have a rival. The draw is the same each time.
     """
     pairs_by_slot: dict[str, list[ValuePair]] = {}
     for pair in possible_pairs(request):
@@ -117,7 +120,10 @@ def _other_values(request: InstructionRequest, meant: GoalValue) -> Iterator[str
 
 
 def _has_opposite_order(request: InstructionRequest, slot: str) -> bool:
-    """Return whether a slot can have its values in the opposite order, as another goal."""
+    """Return whether another goal of the scene has a slot's values in the opposite order.
+
+    *First red, then blue* has if the scene also allows *first blue, then red*.
+    """
     values = tuple(value.value for value in request.values_in(slot))
     swapped = values[::-1]
     return swapped != values and swapped in request.alternatives(slot)
@@ -138,20 +144,21 @@ def _usual_numbers(task: str, difficulty: Difficulty, slot: str) -> frozenset[st
 
 
 class _SlotValue(NamedTuple):
-    """A value in a slot: another slot may have the same one."""
+    """A value with its slot, since another slot may have the same value."""
 
     slot: str
     value: str | int
 
 
 class _SplitEntry(NamedTuple):
-    """An episode that can have a rival.
+    """An episode of a split that can have a rival, a second value for which its goal could ask.
 
     Attributes:
         episode: the episode.
-        meant: its value.
+        meant: the value that its goal has.
         rivals: each value that it may have instead.
-        rival: the value of its partner; None if it has none.
+        rival: the one that words name: the meant value of the episode with which this one is
+            paired; None if it is not paired (yet).
     """
 
     episode: Episode
@@ -160,16 +167,24 @@ class _SplitEntry(NamedTuple):
     rival: str | int | None = None
 
     def is_of(self, episode: Episode) -> bool:
-        """Return whether it is about an episode; another one may have the same index."""
+        """Return whether it is about an episode: another one may have the same index."""
         return self.episode.split == episode.split and self.episode.seed == episode.seed
 
     def is_partner(self, other: _SplitEntry) -> bool:
-        """Return whether the value of each episode can be the rival in the other."""
+        """Return whether two episodes fit together: the value of each can be the other's rival."""
         return other.meant in self.rivals and self.meant in other.rivals
 
 
 def balanced_rival(request: InstructionRequest, pairs: list[ValuePair]) -> ValuePair:
-    """Return one of the pairs of a value: that of the partner, or of a likely one."""
+    """Return the value of the goal with the rival that words should name next to it.
+
+    Rivals are chosen so that over a split each of two values is the meant one equally often; where
+    several are as good, one is drawn.
+
+    Args:
+        request: the episode.
+        pairs: all pairs of its value, as `pairs_of_drawn_slot` returns them; at least one.
+    """
     by_rival = {pair.rival.value: pair for pair in pairs}
     likely = _likely_rivals(request, pairs[0].meant)
     possible = [value for value in likely if value in by_rival]
@@ -200,9 +215,11 @@ def _likely_rivals(request: InstructionRequest, meant: GoalValue) -> list[str | 
 
 @functools.cache
 def _paired_entries(task: str, split: Split) -> Mapping[int, _SplitEntry]:
-    """Return the episodes of a split that can have a rival value, by index, paired with each other.
+    """Return the episodes of a split that can have a rival, paired with each other, by index.
 
-    The rival of an entry is the meant value of the episode with which it is paired.
+    A rival is a value for which the goal could ask instead of its own. That of an entry is the
+    meant value of the episode with which it is paired: of red and blue, each is the rival of the
+    other.
     """
     entries: dict[int, _SplitEntry] = {}
     for episode in split_episodes([task], [split]):
@@ -213,12 +230,12 @@ def _paired_entries(task: str, split: Split) -> Mapping[int, _SplitEntry]:
 
 
 def _unpaired_entry(episode: Episode, task: Task) -> _SplitEntry | None:
-    """Return an episode with the values that may be named instead of its own; None without any.
+    """Return an episode with its rivals, values for which its goal could ask instead.
 
-    Such a value is a rival. The entry is not paired with another episode yet.
+    None if there are none. The entry is not paired with another episode yet.
     """
     request = InstructionRequest(episode, task, InstructionOptions(), sampler_of(episode))
-    pairs = rival_pairs(request)
+    pairs = pairs_of_drawn_slot(request)
     if not pairs:
         return None
     meant = _SlotValue(pairs[0].slot, pairs[0].meant.value)
@@ -251,11 +268,12 @@ def _with_partners(entries: Mapping[int, _SplitEntry]) -> Iterator[_SplitEntry]:
 
 
 class PairOrder(NamedTuple):
-    """In which order two values are said, and at which one the last words point.
+    """In which order a value and its rival are said, and which one the last words point at.
 
     Attributes:
-        is_meant_first: whether the value that is meant is introduced first.
-        points_at_meant: whether the remark points at it; else it sets the rival aside.
+        is_meant_first: whether the value that is meant is said first.
+        points_at_meant: whether the last words choose it, *let's take the former*; else they set
+            the rival aside, *let's skip the latter*.
     """
 
     is_meant_first: bool
@@ -276,7 +294,7 @@ def draw_order(request: InstructionRequest) -> PairOrder:
     """Draw in which order two values are said, and whether the remark points at the meant one.
 
     Each block of four episodes has each of the four cases once: with independent draws, a split of
-    fifty could favor the value named first by chance.
+    fifty could favor the value named first by chance. The case is added to the log of the request.
     """
     episode = request.episode
     block, place_in_block = divmod(episode.index, BLOCK)

@@ -27,7 +27,10 @@ _WORD = re.compile(r"[^\s.,:;?!]+|[.,:;?!]")
 
 @functools.lru_cache(maxsize=100)  # the longest text of many is asked for again and again
 def tokens_of(text: str) -> int:
-    """Return the number of tokens of any text; without the tokenizer, new words count high."""
+    """Return the number of tokens of any text.
+
+    Exact if a tokenizer is installed; else words that the language does not use count high.
+    """
     encode = _tokenizer()
     if encode is None:
         return count_tokens(text)
@@ -49,7 +52,10 @@ def tokens_shown(text: str) -> str:
 
 @functools.cache
 def _tokenizer() -> Callable[[str], list[int]] | None:
-    """Return the function that splits text into ids of tokens; None if it is not installed."""
+    """Return the function that splits text into ids of tokens; None if none is installed.
+
+    It needs `sentencepiece`, and `mistral-common` with the vocabulary of the first Mistral models.
+    """
     try:
         from sentencepiece import SentencePieceProcessor
 
@@ -73,7 +79,7 @@ def count_tokens(text: str) -> int:
 
 
 def split_words(text: str) -> frozenset[str]:
-    """Return the words and marks of a text, as they are counted."""
+    """Return the words and marks of a text: ``Lift it.`` gives ``{"Lift", "it", "."}``."""
     return frozenset(_WORD.findall(text))
 
 

@@ -20,6 +20,11 @@ def expressible_options(
     """Yield all options with which an episode can be instructed: every setting, form and variant.
 
     A setting that cannot express the episode with some options is left out with these.
+
+    Args:
+        episode: to instruct.
+        wordings: a pool of words, or the identity of an open wording file; None for the usual
+            words.
     """
     for name in settings_of(get_task(episode.task)):
         plain_options = InstructionOptions(name, wordings=wordings)
@@ -42,6 +47,12 @@ def instructions(
     """Yield each episode with its instructions in every wanted setting and form.
 
     Leaves out a setting that the task lacks, or that cannot express the episode.
+
+    Args:
+        episodes: to instruct.
+        settings: their names.
+        forms: ``implicit`` or ``resolved``, or both.
+        options: for all else, such as the pool of words.
     """
     for episode in episodes:
         present = [name for name in settings if name in settings_of(get_task(episode.task))]

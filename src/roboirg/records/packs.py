@@ -37,7 +37,7 @@ MEDIA_FOLDERS = (LOG_FOLDER, VIDEO_FOLDER)
 PACKED_FOLDERS = (ACTION_FOLDER, *MEDIA_FOLDERS)
 """What a pack may hold in addition to records and plans."""
 MOST_PACKED_BYTES = 20 << 30
-"""Most bytes that a pack may hold unpacked."""
+"""Most bytes that are unpacked of a pack."""
 _MAX_MANIFEST_BYTES = 64 << 20
 _MOST_SHOWN = 200
 """Characters of a name or a complaint in an error."""
@@ -120,8 +120,9 @@ def _manifest(archive: zipfile.ZipFile, path: Path) -> PackManifest:
 def _unpack(archive: zipfile.ZipFile, path: Path, folder: Path, folders: Collection[str]) -> None:
     """Unpack the wanted files of a pack, which may be a stranger's, so it is checked first.
 
-    It must hold exactly the files of its manifest, not too many bytes, and only files of a run.
-    Names are checked before anything is written under them, contents while they are written.
+    It must hold exactly the files of its manifest, only files of a run, and of wanted ones not too
+    many bytes. Names are checked before anything is written under them, contents while they
+    are written.
 
     Args:
         archive: the pack.
@@ -136,13 +137,16 @@ def _unpack(archive: zipfile.ZipFile, path: Path, folder: Path, folders: Collect
     entries = [entry for entry in archive.infolist() if entry.filename != MANIFEST]
     if sorted(entry.filename for entry in entries) != sorted(digests):
         raise StoreError(f"{path} does not hold exactly the files that its manifest names.")
-    if sum(entry.file_size for entry in entries) > MOST_PACKED_BYTES:
-        raise StoreError(f"{path} unpacks to more than {MOST_PACKED_BYTES >> 30} GiB.")
     unwanted = {*PACKED_FOLDERS} - {*folders}
+    wanted: list[zipfile.ZipInfo] = []
     for entry in entries:
         _check_name(entry.filename, path)
         if _top_folder(entry.filename) not in unwanted:
-            _unpack_file(archive, entry, path, folder, digests[entry.filename])
+            wanted.append(entry)
+    if sum(entry.file_size for entry in wanted) > MOST_PACKED_BYTES:
+        raise StoreError(f"{path} unpacks to more than {MOST_PACKED_BYTES >> 30} GiB.")
+    for entry in wanted:
+        _unpack_file(archive, entry, path, folder, digests[entry.filename])
 
 
 def _unpack_file(

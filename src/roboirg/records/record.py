@@ -329,6 +329,8 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
         prompt_verdict: whether all that was said reached the policy's language model.
         guessed: whether the policy reports that it chose a goal at random, because the words have
             no meaning for it.
+        usage: what models queried by the policy cost: ``calls``, ``input_tokens``,
+            ``output_tokens``, ``cost_usd``; those that are unknown are missing.
         robot: the real robot that played it; None in simulation.
         action_log: digest of the executed actions, as in `roboirg.records.action_log`;
             None if they were not kept.
@@ -363,6 +365,7 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
     attempt: Whole = 1
     prompt_verdict: PromptVerdict = "unknown"
     guessed: bool = False
+    usage: dict[str, float] = {}
     robot: Name | None = None
     action_log: str | None = None
     video: RunPath | None = None
@@ -442,8 +445,6 @@ class Record(Summary, kw_only=True, forbid_unknown_fields=True):  # type: ignore
         attempts: the same for facts of attempts, which no stage expects; None if nobody watched for
             them, as with a real robot.
         subgoals: what a planner named, in order.
-        usage: what models queried by the policy cost: ``calls``, ``input_tokens``,
-            ``output_tokens``, ``cost_usd``; those that are unknown are missing.
         timings: wall-clock seconds by phase: ``policy_load``, ``policy_act``, ``env_step``, ….
         video_error: why the requested video could not be written, or None.
         details: traceback of an error, or None.
@@ -464,7 +465,6 @@ class Record(Summary, kw_only=True, forbid_unknown_fields=True):  # type: ignore
     events: tuple[EventRecord, ...] = ()
     attempts: tuple[EventRecord, ...] | None = None
     subgoals: tuple[SubgoalRecord, ...] = ()
-    usage: dict[str, float] = {}
     timings: dict[str, float] = {}
     video_error: str | None = None
     details: str | None = None

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from statistics import NormalDist
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -33,6 +32,7 @@ from roboirg.shortcuts.shortcut_scores import (
     rule_scores,
     score_guess,
 )
+from roboirg.stats.intervals import ALPHA, critical_value
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode, split_episodes
 
@@ -89,7 +89,7 @@ class Excess(NamedTuple):
 
         95 % of the time all of these are right.
         """
-        reach = NormalDist().inv_cdf(1 - 0.025 / count) * self.error
+        reach = critical_value(ALPHA / count) * self.error
         return self.value - reach, self.value + reach
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -11,14 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.stats.intervals import (
-    DRAWS,
-    Interval,
-    Rows,
-    resampled_interval,
-    resampled_rates,
-    wilson_interval,
-)
+from roboirg.stats.intervals import Interval, Rows, TaskRates, mean_interval
 
 
 class Trial(NamedTuple):
@@ -157,31 +150,15 @@ def rows_of(frame: Columns, *names: str) -> Iterator[Key]:
     return zip(*columns, strict=True)
 
 
-def clustered_interval(
-    tasks: Sequence[Cell], rng: np.random.Generator, draws: int = DRAWS
-) -> Interval | None:
-    """Return the 95 % bootstrap interval of a success rate, the mean over tasks.
+def rate_interval(tasks: Collection[Cell]) -> Interval | None:
+    """Return the 95 % interval of a success rate, the mean over tasks with a verdict.
 
-    It resamples whole episodes, because the trials of an episode with several policy seeds are not
-    independent. None with fewer than two episodes per task on average, or if a task has none.
+    None with too few episodes: it takes more of them than tasks.
     """
-    rows = [cell.rows() for cell in tasks]
-    episodes_of_tasks = [len(task_rows) for task_rows in rows]
-    if not episodes_of_tasks or 0 in episodes_of_tasks:
+    judged = [cell for cell in tasks if cell.verdicts]
+    if not judged:
         return None
-    rates = resampled_rates(rows, rng, draws)[:, 0]  # the only column, shape (draws, 1)
-    return resampled_interval(rates, episodes_of_tasks)
-
-
-def cell_interval(cell: Cell, rng: np.random.Generator) -> Interval | None:
-    """Return the 95 % interval of the success rate of one task; None without a verdict.
-
-    It is Wilson's, or with several policy seeds, whose trials depend on each other, the bootstrap
-    over episodes.
-    """
-    counts = cell.counts
-    if not counts.trials:
-        return None
-    if counts.episodes < counts.trials:
-        return clustered_interval([cell], rng)
-    return wilson_interval(counts.successes, counts.trials)
+    strata = []
+    for cell in judged:
+        strata.append(TaskRates.of(cell.rows()).combined(1 / len(judged)))
+    return mean_interval(strata)

@@ -1,39 +1,45 @@
-"""Wilson's interval of a rate, and the bootstrap over episodes behind all other intervals.
+"""Score intervals of rates, of their differences and ratios, and of means of these over tasks.
+
+All are of one kind. An interval holds the true values that a score test does not reject: it asks
+how many standard errors the estimate is from such a value, and takes the standard error not from
+the data alone, but from the shares of results that are most likely if that value is the true one.
+So it has a length even if all episodes ended alike. For a rate of independent trials this is
+Wilson's interval, for a difference of two paired ones Tango's (Statistics in Medicine 17, 1998),
+for several tasks the stratified one of Miettinen and Nurminen (Statistics in Medicine 4, 1985).
+Near 0 and 1 these are too short on the side of the edge, so that end is moved out by the
+correction for skewness of Gart and Nam (Biometrics 44, 1988).
 
 Results of several policy seeds in the same episode are correlated: an episode that is hard for one
-seed is hard for the next. So the bootstrap resamples episodes, not trials.
+seed is hard for the next. So the unit is an episode with all of its trials, never a trial.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from roboirg.core.extras import extra_needed
-
-Z_95 = 1.959963984540054
-"""Two-sided 95 % quantile of the normal distribution."""
 ALPHA = 0.05
-"""Share of intervals that may miss the true value, and of tests that may raise a false alarm."""
-SEED = 20_240_607
-"""Of all bootstraps that are shown; the same records give the same numbers."""
-DRAWS = 4000
-"""Bootstrap resamples; the ends of an interval then vary by about 3 % of its length."""
+"""The one level: the share of intervals that may miss the true value, and of tests that may raise a
+false alarm. All intervals, tests and texts derive from it."""
 TOO_FEW = "too few episodes"
 """Printed in place of an interval: it takes more episodes than tasks."""
-_ROUNDING = 1e-9
-"""Ends of an interval that are closer are equal."""
+
+_ROUNDING = 1e-12
+"""Differences of rates that are smaller are none."""
+_PRECISION = 1e-6
+"""Of the ends of an interval, in standard errors."""
+_MOST_STEPS = 60
+"""Of a search for a root."""
+_MOST_DOUBLINGS = 25
+"""After these a mean is as large as it can be, but for rounding."""
 
 Rows = NDArray[np.int64]
 """A row for each episode with k pairs of successes and trials, shape (episodes, 2 k)."""
-
-
-Draws = NDArray[np.float64]
-"""A rate, a gap or several for each resample, shape (draws,) or (draws, k)."""
 
 
 class Interval(NamedTuple):
@@ -42,132 +48,372 @@ class Interval(NamedTuple):
     low: float
     high: float
 
+
+def critical_value(alpha: float = ALPHA) -> float:
+    """Return how many standard errors a two-sided interval reaches to each side: 1.96 for 95 %.
+
+    Args:
+        alpha: share of such intervals that may miss the true value.
+    """
+    return NormalDist().inv_cdf(1 - alpha / 2)
+
+
+class Stratum(NamedTuple):
+    """What was observed of one task (a stratum), whose mean is a part of a sum.
+
+    Attributes:
+        values: the different values that episodes have, such as ``(-1.0, 0.0, 1.0)`` for
+            differences of two verdicts.
+        shares: of the episodes that have each value; they add up to 1.
+        episodes: their number; less if they differ in their weight, as Kish's effective size.
+        low: the least mean that is possible. Of an episode that counts little, a value may be less.
+        high: the largest one.
+    """
+
+    values: Sequence[float]
+    shares: Sequence[float]
+    episodes: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, values: ArrayLike, low: float, high: float, weights: ArrayLike = 1.0) -> Stratum:
+        """Collect the values of a task's episodes.
+
+        Args:
+            values: one for each episode, at least one.
+            low: the least mean that is possible.
+            high: the largest one.
+            weights: above 0, how much each episode counts in the mean; all alike by default.
+        """
+        numbers = np.asarray(values, dtype=np.float64)
+        parts = np.broadcast_to(np.asarray(weights, dtype=np.float64), numbers.shape)
+        parts = parts / parts.sum()
+        shares: dict[float, float] = {}
+        for value, part in zip(numbers.tolist(), parts.tolist(), strict=True):
+            shares[value] = shares.get(value, 0.0) + part
+        episodes = 1 / float(parts @ parts)
+        return cls(list(shares), list(shares.values()), episodes, low, high)
+
     @property
-    def has_width(self) -> bool:
-        """Whether the ends differ by more than rounding."""
-        return self.high - self.low > _ROUNDING
+    def mean(self) -> float:
+        return sum(map(float.__mul__, self.values, self.shares))
+
+    def mirrored(self) -> Stratum:
+        """Return the same with all signs changed, so that upper ends become lower ones."""
+        values = [-value for value in self.values]
+        return Stratum(values, self.shares, self.episodes, -self.high, -self.low)
 
 
-def wilson_interval(successes: int, trials: int) -> Interval:
-    """Return Wilson's 95 % score interval of a success rate, 0 to 1, of independent trials.
+class TaskRates(NamedTuple):
+    """What the episodes of a task contribute to k rates, such as those of two policies.
 
-    There is at least one trial.
+    Attributes:
+        contributions: shape (episodes, k); a rate is their mean, weighted.
+        weights: how much each episode counts, shape (episodes,).
+        has_trials: whether a rate is of any trials, shape (k,); it is 0 otherwise.
     """
-    rate = successes / trials
-    weight = Z_95 * Z_95 / trials
-    center = (rate + weight / 2) / (1 + weight)
-    deviation = math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials))
-    half_width = Z_95 * deviation / (1 + weight)
-    # The formula gives exactly 0 and 1 at the ends; floating point may not.
-    low = 0.0 if successes == 0 else center - half_width
-    high = 1.0 if successes == trials else center + half_width
-    return Interval(low, high)
+
+    contributions: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    has_trials: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, rows: Rows) -> TaskRates:
+        """Return the rates of a task with at least one trial.
+
+        Of two policies with one seed each, an episode that only the first one solved has the row
+        ``(1, 1, 0, 1)`` and contributes 1 to the first rate and 0 to the second.
+
+        Args:
+            rows: successes and trials of each rate by episode, shape (episodes, 2 k).
+        """
+        successes = rows[:, 0::2]
+        trials = rows[:, 1::2]
+        all_trials = trials.sum(axis=0)
+        divisors = np.maximum(all_trials, 1)
+        # An episode weighs as much as its share of the trials, the mean over the rates.
+        weights = (trials / divisors).sum(axis=1)
+        weights /= weights.sum()
+        contributions = successes / divisors / weights[:, np.newaxis]
+        return cls(contributions, weights, all_trials > 0)
+
+    def combined(self, *factors: float) -> Stratum:
+        """Return the sum of the rates times a factor each, such as 1 and -1 for their difference.
+
+        A rate without trials is left out.
+        """
+        used = np.where(self.has_trials, factors, 0.0)
+        low = float(np.minimum(used, 0).sum())
+        high = float(np.maximum(used, 0).sum())
+        return Stratum.of(self.contributions @ used, low, high, self.weights)
 
 
-def resampled_rates(tasks: Sequence[Rows], rng: np.random.Generator, draws: int = DRAWS) -> Draws:
-    """Return bootstrapped success rates: in each draw, episodes are drawn with replacement.
+def mean_interval(strata: Sequence[Stratum], alpha: float = ALPHA) -> Interval | None:
+    """Return the score interval of a sum of means, one for each task; None with too few episodes.
 
-    Episodes with equal rows are drawn together, as multinomial counts. The distribution is that of
-    drawing single episodes, but the time does not depend on their number, nor the result on their
-    order.
+    It takes more episodes than tasks.
 
     Args:
-        tasks: for each task its episodes, shape (episodes, 2 k): k pairs of successes and trials,
-            one pair for each rate. Each task is resampled by itself.
-        rng: source of the resamples.
-        draws: number of resamples.
+        strata: of each task. For a mean over tasks, their values are divided by the number of
+            tasks.
+        alpha: share of such intervals that may miss the true value.
+    """
+    if _has_too_few(strata):
+        return None
+    critical = critical_value(alpha)
+    high = _upper_end(strata, critical)
+    high_of_mirrored = _upper_end([stratum.mirrored() for stratum in strata], critical)
+    return Interval(0.0 - high_of_mirrored, high)  # not the negative, which of 0 is −0
+
+
+def interval_of_values(
+    tasks: Sequence[ArrayLike], low: float = 0.0, high: float = 1.0, alpha: float = ALPHA
+) -> Interval | None:
+    """Return the score interval of a mean over tasks; None with too few values.
+
+    It takes more values than tasks.
+
+    Args:
+        tasks: for each task its values, which are independent of each other.
+        low: the least value that is possible.
+        high: the largest one.
+        alpha: share of such intervals that may miss the true value.
+    """
+    part = 1 / len(tasks)
+    strata = []
+    for values in tasks:
+        parts = part * np.asarray(values, dtype=np.float64)
+        strata.append(Stratum.of(parts, part * low, part * high))
+    return mean_interval(strata, alpha)
+
+
+def ratio_interval(tasks: Sequence[TaskRates]) -> Interval | None:
+    """Return the 95 % score interval of a ratio of two mean rates; None with too few episodes.
+
+    It holds the ratios r for which the interval of the first rate less r times the second has 0. If
+    the second rate is 0 there is none.
+
+    Args:
+        tasks: for each task the two rates.
+    """
+    part = 1 / len(tasks)
+    critical = critical_value()
+
+    # Ratios from 0 to infinity are searched as r / (1 + r), from 0 to 1, which is called balance.
+    def difference(balance: float) -> list[Stratum]:
+        return [task.combined(part * (1 - balance), -part * balance) for task in tasks]
+
+    def above(balance: float) -> float:
+        return -_upper_end(difference(balance), critical)
+
+    def below(balance: float) -> float:
+        return -_upper_end([stratum.mirrored() for stratum in difference(balance)], critical)
+
+    first = sum(stratum.mean for stratum in difference(0))
+    second = -sum(stratum.mean for stratum in difference(1))
+    if second <= _ROUNDING or _has_too_few(difference(0)):
+        return None
+    estimate = first / (first + second)
+    low = 0.0
+    if first > _ROUNDING:
+        low = _root(below, estimate, 0.0)
+    high = _root(above, estimate, 1.0)
+    if high == 1:
+        return Interval(low / (1 - low), math.inf)
+    return Interval(low / (1 - low), high / (1 - high))
+
+
+def share_interval(tasks: Sequence[TaskRates]) -> Interval | None:
+    """Return the 95 % score interval of the share of a gap that something closes.
+
+    Of the rates first, second and third it is (first - second) / (third - second): a gap from 60 to
+    80 % that becomes one from 75 to 80 % is closed by three quarters. The interval holds the shares
+    s for which the interval of first - (1 - s) second - s third has 0.
+
+    Args:
+        tasks: for each task the three rates.
 
     Returns:
-        Unweighted means over the tasks, shape (draws, k); nan where a resample has no trial.
+        None with too few episodes, or if the interval of the gap, third - second, does not lie
+        above 0: then any share would do.
     """
-    rates = []
-    for rows in tasks:
-        # Shapes (kinds, 2 k) and (kinds,): the distinct rows, and how many episodes have each.
-        kinds, counts = np.unique(rows, axis=0, return_counts=True)
-        drawn_counts = rng.multinomial(len(rows), counts / len(rows), size=draws)  # (draws, kinds)
-        rates.append(rates_of(drawn_counts @ kinds))
-    return np.asarray(np.mean(rates, axis=0), dtype=np.float64)
+    part = 1 / len(tasks)
+    critical = critical_value()
+    gap = mean_interval([task.combined(0, -part, part) for task in tasks])
+    if gap is None or gap.low <= 0:
+        return None
+
+    def difference(share: float) -> list[Stratum]:
+        return [task.combined(part, part * (share - 1), -part * share) for task in tasks]
+
+    def above(share: float) -> float:
+        return -_upper_end(difference(share), critical)
+
+    def below(share: float) -> float:
+        return -_upper_end([stratum.mirrored() for stratum in difference(share)], critical)
+
+    of_none = sum(stratum.mean for stratum in difference(0))
+    of_all = sum(stratum.mean for stratum in difference(1))
+    estimate = of_none / (of_none - of_all)
+    return Interval(_end(below, estimate, -1.0), _end(above, estimate, 1.0))
 
 
-def rates_of(counts: Rows) -> Draws:
-    """Divide successes by trials in each of k pairs of columns: ``(1, 2, 3, 3)`` → ``(0.5, 1)``.
-
-    Returns:
-        Shape (rows, k); nan without a trial.
-    """
-    successes = counts[:, 0::2]
-    trials = counts[:, 1::2]
-    with np.errstate(invalid="ignore"):
-        return np.asarray(successes / trials)
+def _end(function: Callable[[float], float], inside: float, step: float) -> float:
+    """Return where a function is 0, on the side of `step` from a place where it is negative."""
+    for _ in range(_MOST_DOUBLINGS):
+        if function(inside + step) >= 0:
+            return _root(function, inside, inside + step)
+        step *= 2
+    return math.copysign(math.inf, step)
 
 
-def percentile_interval(values: Draws, sizes: Sequence[int]) -> Interval | None:
-    """Return the middle 95 % of resampled values; None unless there are more episodes than tasks.
+def _has_too_few(strata: Sequence[Stratum]) -> bool:
+    episodes = sum(stratum.episodes for stratum in strata)
+    return episodes <= len(strata) + _ROUNDING
+
+
+class _Moments(NamedTuple):
+    """A sum of means: its expectation, its variance, and its third central moment."""
+
+    mean: float
+    variance: float
+    third: float
+
+
+def _upper_end(strata: Sequence[Stratum], critical: float) -> float:
+    """Return the largest sum of means that a score test does not reject.
 
     Args:
-        values: one for each resample, shape (draws,); nan counts as the smallest value for the
-            lower end, and as the largest one for the upper end.
-        sizes: number of episodes of each task.
+        strata: of each task.
+        critical: standard errors by which the sum as observed may be below a true one.
     """
-    if sum(sizes) <= len(sizes):
-        return None
-    level = _lower_level(sizes)
-    lows = np.where(np.isnan(values), -np.inf, values)
-    highs = np.where(np.isnan(values), np.inf, values)
-    return Interval(
-        float(np.quantile(lows, level, method="inverted_cdf")),
-        float(np.quantile(highs, 1 - level, method="inverted_cdf")),
-    )
+    estimate = sum(stratum.mean for stratum in strata)
+    most = sum(stratum.high for stratum in strata)
+    if most - estimate <= _ROUNDING:
+        return most
+
+    def excess(tilt: float) -> float:
+        """Return by how many standard errors too many the estimate is below an expectation."""
+        moments = _tilted(strata, tilt)
+        distance = moments.mean - estimate
+        if distance <= _ROUNDING:
+            return -critical
+        error = max(math.sqrt(moments.variance), _ROUNDING)
+        # A sum with a long tail to the left is often further below its expectation than a normal
+        # one. The correction is used only here, where it makes the interval longer.
+        skewness = moments.third / error**3
+        correction = max(0.0, -skewness / 6) * (critical**2 - 1)
+        return distance / error - correction - critical
+
+    # About that of a rate of one half; the search doubles it as often as it needs to.
+    tilt = 2 * critical * math.sqrt(sum(stratum.episodes for stratum in strata))
+    for _ in range(_MOST_DOUBLINGS):
+        if excess(tilt) >= 0:
+            return min(most, _tilted(strata, _root(excess, 0.0, tilt)).mean)
+        tilt *= 2
+    return most
 
 
-def resampled_interval(values: Draws, sizes: Sequence[int], least: float = 0.0) -> Interval | None:
-    """Return the 95 % bootstrap interval of a rate or a gap; None with too few episodes.
+def _tilted(strata: Sequence[Stratum], tilt: float) -> _Moments:
+    """Return the moments of a sum whose expectation is larger than observed, the more with tilt.
 
-    If all resamples have the same value, the bootstrap shows no spread, and the interval is that of
-    `without_spread`. Episodes are also too few if so many resamples have no trial that an end is
-    not bounded, or if the others all have the same value.
+    The means lose a degree of freedom for each task; the variance makes up for it.
+    """
+    mean = 0.0
+    variance = 0.0
+    third = 0.0
+    episodes = 0.0
+    for stratum in strata:
+        moments = _tilted_values(stratum, tilt / stratum.episodes)
+        mean += moments.mean
+        variance += moments.variance / stratum.episodes
+        third += moments.third / stratum.episodes**2
+        episodes += stratum.episodes
+    inflation = episodes / (episodes - len(strata))
+    return _Moments(mean, variance * inflation, third * inflation**1.5)
+
+
+def _tilted_values(stratum: Stratum, tilt: float) -> _Moments:
+    """Return the moments of an episode's value if large values are more frequent than observed.
+
+    The shares are those of the largest likelihood among all with the same expectation: a value's
+    share is divided by a norm less tilt times the value. What is left falls to the largest value
+    that is possible, although it was not seen.
+    """
+    norm = max(_norm(stratum, tilt), tilt * stratum.high)
+    left = 1.0
+    mean = 0.0
+    values = []
+    shares = []
+    for value, share in zip(stratum.values, stratum.shares, strict=True):
+        tilted_share = share / (norm - tilt * value)
+        values.append(value)
+        shares.append(tilted_share)
+        left -= tilted_share
+        mean += tilted_share * value
+    if left > _ROUNDING:
+        values.append(stratum.high)
+        shares.append(left)
+        mean += left * stratum.high
+    variance = 0.0
+    third = 0.0
+    for value, share in zip(values, shares, strict=True):
+        deviation = value - mean
+        variance += share * deviation**2
+        third += share * deviation**3
+    return _Moments(mean, variance, third)
+
+
+def _norm(stratum: Stratum, tilt: float) -> float:
+    """Return the norm with which tilted shares add up to 1, by Newton's method.
+
+    Their sum falls with the norm, ever slower, so the steps rise to the norm from one below it: the
+    one with which the largest value alone has a share of 1.
+    """
+    largest = max(stratum.values)
+    norm = tilt * largest + stratum.shares[stratum.values.index(largest)]
+    for _ in range(_MOST_STEPS):
+        surplus = -1.0
+        slope = 0.0
+        for value, share in zip(stratum.values, stratum.shares, strict=True):
+            distance = norm - tilt * value
+            surplus += share / distance
+            slope += share / distance**2
+        if surplus <= _ROUNDING:
+            break
+        norm += surplus / slope
+    return norm
+
+
+def _root(function: Callable[[float], float], below: float, above: float) -> float:
+    """Return where a function is 0, by the Illinois method: a false position that cannot stall.
 
     Args:
-        values: one for each resample, shape (draws,); nan if it has no trial.
-        sizes: number of episodes of each task.
-        least: the smallest value that is possible: 0 for a rate, -1 for a gap.
+        function: of one variable.
+        below: where it is negative.
+        above: where it is 0 or more; it may be smaller than `below`.
     """
-    interval = percentile_interval(values, sizes)
-    if interval is None or not np.isfinite(interval).all():
-        return None
-    if interval.has_width:
-        return interval
-    if np.isnan(values).any():
-        return None
-    return without_spread(interval.low, sum(sizes), least)
-
-
-def without_spread(value: float, episodes: int, least: float = 0.0) -> Interval:
-    """Return a 95 % interval if all observed episodes have the same value, -1 to 1.
-
-    Among all possible episodes, some may have other values, from `least` to 1: at most the share
-    that is the upper end of Wilson's interval for 0 successes in as many episodes. For rates of 0
-    and 1 this is Wilson's interval on episodes.
-    """
-    other_share = wilson_interval(0, episodes).high
-    same_part = (1 - other_share) * value
-    return Interval(same_part + other_share * least, same_part + other_share)
-
-
-def _lower_level(sizes: Sequence[int]) -> float:
-    """Return the quantile, somewhat below 0.025, at which the bootstrap's lower ends are taken.
-
-    Args:
-        sizes: number of episodes of each task.
-
-    Resampled means have a variance too small by (n - 1) / n, and normal quantiles instead of
-    Student's; quantiles further out correct both (the expanded percentile interval of Hesterberg,
-    The American Statistician 69, 2015).
-    """
-    with extra_needed("Intervals of several seeds or tasks need SciPy", "report"):
-        from scipy import special  # SciPy's statistics take a second to import
-
-    episodes = sum(sizes)
-    degrees_of_freedom = episodes - len(sizes)  # one less for the mean of each task
-    widening = math.sqrt(episodes / degrees_of_freedom)
-    return float(special.ndtr(widening * special.stdtrit(degrees_of_freedom, ALPHA / 2)))
+    value_below = function(below)
+    value_above = function(above)
+    last = 0.0
+    place = above
+    for _ in range(_MOST_STEPS):
+        rise = value_above - value_below
+        place = (below * value_above - above * value_below) / rise
+        value = function(place)
+        if abs(value) <= _PRECISION:
+            break
+        # An end that stays twice counts half, so that the next place is nearer to it.
+        if value > 0:
+            above = place
+            value_above = value
+            if last > 0:
+                value_below /= 2
+        else:
+            below = place
+            value_below = value
+            if last < 0:
+                value_above /= 2
+        last = value
+    return place

@@ -4,24 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.stats.cells import Cell
-from roboirg.stats.intervals import (
-    DRAWS,
-    Draws,
-    Interval,
-    Rows,
-    percentile_interval,
-    rates_of,
-    resampled_interval,
-    resampled_rates,
-    without_spread,
-)
+from roboirg.stats.intervals import Interval, Rows, TaskRates, mean_interval, ratio_interval
 
 
 class Overlap(NamedTuple):
@@ -124,31 +115,36 @@ def _overlap(first: Cell, second: Cell) -> Overlap:
     )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Gap:
     """Difference between two cells of a task, or the unweighted mean over several tasks.
 
     Attributes:
         value: success rate of the first less that of the second on the same episodes, -1 to 1.
-        interval: of the value, from the paired bootstrap over episodes.
+        interval: 95 %, of the value; None with too few episodes.
         p_value: of the null hypothesis of no difference; not corrected.
         retention: success rate of the first by that of the second; None if the latter is 0.
-        retention_interval: of the retention; ends that the data do not bound are infinite.
         tasks: number of tasks with pairs.
         episodes: number of paired episodes.
         trials: number of paired trials, of both.
         overlap: of their trials.
+        rates_of_tasks: of each task the first rate and the second.
     """
 
     value: float
     interval: Interval | None
     p_value: float
     retention: float | None
-    retention_interval: Interval | None
     tasks: int
     episodes: int
     trials: int
     overlap: Overlap
+    rates_of_tasks: Sequence[TaskRates] = field(repr=False, compare=False)
+
+    @cached_property
+    def retention_interval(self) -> Interval | None:
+        """95 %, of the retention; None without one, or with too few episodes."""
+        return ratio_interval(self.rates_of_tasks)
 
 
 class PairedRates(NamedTuple):
@@ -160,13 +156,17 @@ class PairedRates(NamedTuple):
 
 def paired_rates(tasks: Sequence[Pairs]) -> PairedRates | None:
     """Return the rates over the tasks that have pairs; None if no task has any."""
-    sums = [pairs.rows.sum(axis=0) for pairs in tasks if len(pairs.rows)]
-    if not sums:
+    rates = []
+    for pairs in tasks:
+        if len(pairs.rows):
+            successes, trials, other_successes, other_trials = pairs.rows.sum(axis=0).tolist()
+            rates.append((successes / trials, other_successes / other_trials))
+    if not rates:
         return None
-    return PairedRates._make(np.mean(rates_of(np.array(sums)), axis=0).tolist())
+    return PairedRates._make(np.mean(rates, axis=0).tolist())
 
 
-def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = DRAWS) -> Gap | None:
+def measure_gap(tasks: Sequence[Pairs]) -> Gap | None:
     """Measure by how much two success rates on the same episodes differ, as means over tasks.
 
     Returns the difference with its interval and p-value, and the ratio of the rates. None if no
@@ -174,35 +174,26 @@ def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = D
 
     Args:
         tasks: for each task, the results of both sides, paired by episode.
-        rng: source of the resamples.
-        draws: number of resamples.
     """
     paired = [pairs for pairs in tasks if len(pairs.rows)]
     rates = paired_rates(paired)
     if rates is None:
         return None
-    rows = [pairs.rows for pairs in paired]
-    sizes = list(map(len, rows))  # episodes of each task
-    drawn = resampled_rates(rows, rng, draws)  # rates of both sides, shape (draws, 2)
-    drawn_gaps = drawn[:, 0] - drawn[:, 1]
+    part = 1 / len(paired)
+    rates_of_tasks = [TaskRates.of(pairs.rows) for pairs in paired]
+    strata = [task.combined(part, -part) for task in rates_of_tasks]
     differences = np.concatenate([pairs.differences for pairs in paired])
     overlaps = np.sum([pairs.overlap for pairs in paired], axis=0)
-
-    retention: float | None = None
-    retention_interval: Interval | None = None
-    if rates.second:
-        retention = rates.first / rates.second
-        retention_interval = _retention_interval(drawn, sizes, rates)
     return Gap(
         value=rates.first - rates.second,
-        interval=resampled_interval(drawn_gaps, sizes, least=-1.0),
+        interval=mean_interval(strata),
         p_value=sign_flip_test(differences),
-        retention=retention,
-        retention_interval=retention_interval,
+        retention=rates.first / rates.second if rates.second else None,
         tasks=len(paired),
-        episodes=sum(sizes),
+        episodes=len(differences),
         trials=sum(pairs.trials for pairs in paired),
         overlap=Overlap._make(overlaps.tolist()),
+        rates_of_tasks=rates_of_tasks,
     )
 
 
@@ -237,29 +228,6 @@ def sign_flip_test(differences: NDArray[np.int64]) -> float:
     positive = int(sizes[nonzero > 0].sum())
     is_as_far = np.abs(signed_sums) >= abs(2 * positive - total)
     return min(1.0, float(chances[is_as_far].sum()))
-
-
-def _retention_interval(drawn: Draws, sizes: Sequence[int], rates: PairedRates) -> Interval | None:
-    """Return the 95 % interval of the retention, the first rate divided by the second.
-
-    The second rate is not 0, but may be 0 in a resample: then its retention is infinite or nan.
-
-    Args:
-        drawn: both rates in each resample, shape (draws, 2).
-        sizes: number of episodes of each task.
-        rates: as measured.
-    """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        retentions = drawn[:, 0] / drawn[:, 1]
-    interval = percentile_interval(retentions, sizes)
-    if interval is None:
-        return None
-    if interval.has_width:
-        return Interval(max(0.0, interval.low), interval.high)
-    # All resamples have the same ratio: the widest one that the intervals of both rates admit.
-    first = without_spread(rates.first, sum(sizes))
-    second = without_spread(rates.second, sum(sizes))
-    return Interval(first.low / second.high, first.high / second.low)
 
 
 def holm(p_values: Sequence[float]) -> tuple[float, ...]:

@@ -10,6 +10,9 @@ from pathlib import Path
 
 from roboirg.core.errors import InvalidValueError
 
+MOST_BYTES = 1 << 30
+"""Of a file of which no lower limit is known."""
+
 
 def open_regular(path: Path) -> BufferedReader:
     """Open a file for reading; a pipe or a device, which could block for ever, is refused.
@@ -26,7 +29,7 @@ def open_regular(path: Path) -> BufferedReader:
     return os.fdopen(file, "rb")
 
 
-def read_regular(path: Path, most: int) -> bytes:
+def read_regular(path: Path, most: int = MOST_BYTES) -> bytes:
     """Return the content of a file of at most `most` bytes.
 
     Raises:

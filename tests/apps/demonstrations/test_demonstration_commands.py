@@ -51,13 +51,18 @@ def test_a_dry_run_says_how_big_it_gets_and_writes_nothing(
     own = "from roboirg.policies.builtin.random_policy import RandomPolicy as Own\n"
     (tmp_path / "policy_lying_here.py").write_text(own)
     monkeypatch.chdir(tmp_path)
-    words = ("export", "demonstrations", *FEW, *within(**choices), "--dry-run", "--out")
+    before = sorted(tmp_path.rglob("*"))
 
-    code, out, err = roboirg(*words, tmp_path / "data")
+    code, out, err = roboirg("export", "demonstrations", *FEW, *within(**choices), "--dry-run")
 
     assert (code, out) == (0, "")
     assert err == size
-    assert not (tmp_path / "data").exists()
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_an_export_without_a_folder_is_refused(roboirg):
+    code, _, err = roboirg("export", "demonstrations", *FEW)
+    assert (code, err) == (2, "roboirg: No folder given; name one with --out, such as data.\n")
 
 
 def test_an_export_tells_its_progress_and_its_end(roboirg, tmp_path, synthetic):

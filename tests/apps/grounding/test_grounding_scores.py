@@ -3,6 +3,7 @@
 import functools
 import json
 import math
+import os
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from roboirg.apps.grounding.items.answer_file import Answer, read_answers, write
 from roboirg.apps.grounding.items.grounding_item import (
     LETTERS,
     QUESTION_KINDS,
+    read_items,
     write_items,
 )
 from roboirg.apps.grounding.items.verdicts import guess_chance, judge_reply, right_reply
@@ -341,6 +343,14 @@ def test_items_of_several_splits_are_not_scored_together():
     dataset = [*items(), replace(items()[0], split="val")]
     with pytest.raises(InvalidValueError, match="several splits, wordings or versions"):
         score_answers(dataset, [Answer(items()[0].id, "choice", "A")], "m")
+
+
+def test_items_that_are_a_pipe_are_refused(tmp_path):
+    """To open it would wait for ever."""
+    os.mkfifo(tmp_path / "items.jsonl")
+
+    with pytest.raises(InvalidValueError, match=r"holds no .*not a regular file"):
+        read_items(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -360,9 +360,9 @@ def test_the_card_says_what_the_dataset_holds(tmp_path, monkeypatch, snapshot):
     assert card.replace(__version__, "VERSION") == snapshot
 
 
-def test_a_set_of_no_episode_is_refused(tmp_path):
+def test_a_setting_that_a_task_lacks_is_refused(tmp_path):
     words = ["--tasks", "StopCube", "--settings", "spatial", "--out", str(tmp_path / "set")]
-    with pytest.raises(InvalidValueError, match="None of these episodes"):
+    with pytest.raises(InvalidValueError, match="no spatial setting in StopCube"):
         CliRunner().invoke(app, ["export", "grounding", *words], catch_exceptions=False)
 
 

@@ -1,4 +1,4 @@
-"""`roboirg language ...` and `roboirg export ...`."""
+"""The commands `roboirg language …` and `roboirg export instructions`."""
 
 import csv
 import json
@@ -12,53 +12,88 @@ from typer.testing import CliRunner
 from roboirg import main as cli
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 
-WORDINGS = """name = "test"
-tasks = ["StopCube"]
-[commands]
-all = ["Press the button when the cube reaches the target {visit}."]
-"""
+
+@pytest.fixture
+def stopcube_wordings(tmp_path):
+    """A user's file of words that has one command, for StopCube."""
+    file = tmp_path / "test.toml"
+    file.write_text(
+        'name = "test"\ntasks = ["StopCube"]\n[commands]\n'
+        'all = ["Press the button when the cube reaches the target {visit}."]\n'
+    )
+    return file
+
+
+def exported_rows(out, *options):
+    """Return what `export instructions` writes to a file of JSON lines."""
+    call("export", "instructions", "--out", out, *options)
+    return [json.loads(line) for line in out.read_text().splitlines()]
+
+
+def test_show_prints_the_words_of_a_user_s_file(stopcube_wordings):
+    """The file has this one command."""
+    printed = call("show", "StopCube", "0", "--words", "--wordings", stopcube_wordings)
+    assert "Press the button when the cube reaches the target" in printed
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_instructions_in_words_from_outside(tmp_path):
-    file = tmp_path / "test.toml"
-    out = tmp_path / "rows.jsonl"
-    file.write_text(WORDINGS)
-    assert "Press the button when" in call("show", "StopCube", "0", "--words", "--wordings", file)
+def test_exported_instructions_in_words_of_a_user_s_file_are_those_of_its_tasks(
+    stopcube_wordings, tmp_path
+):
+    """Without `--tasks`, since the file serves StopCube only. *Own* means: no whole sentence."""
+    plan = plan_file(wordings=str(stopcube_wordings), forms="implicit")
 
-    words = plan_file(wordings=str(file), forms="implicit")
-    call("export", "instructions", "--out", out, "--plan", words)
-    rows = [json.loads(line) for line in out.read_text().splitlines()]
-    assert {row["task"] for row in rows} == {"StopCube"}  # all of the file
+    rows = exported_rows(tmp_path / "rows.jsonl", "--plan", plan)
+
+    assert {row["task"] for row in rows} == {"StopCube"}
     assert {row["wordings"].partition("@")[0] for row in rows} == {"test"}
     assert {row["whole_sentence"] for row in rows} == {"own"}
+
+
+def test_a_task_that_a_user_s_file_lacks_is_refused(stopcube_wordings):
+    """The file serves StopCube only."""
     with pytest.raises(InvalidValueError, match="has no words of BinFill"):
-        call("show", "BinFill", "0", "--words", "--wordings", file)
+        call("show", "BinFill", "0", "--words", "--wordings", stopcube_wordings)
 
 
-def test_the_same_bytes_every_time_and_only_what_is_asked_for(tmp_path):
-    files = [tmp_path / "one.jsonl", tmp_path / "two.jsonl"]
-    plan = plan_file(stages=[1, 2, 3, 5], distractor="competing", frame="camera", forms="implicit")
-    words = ("--tasks", "ButtonUnmask,StopCube", "--split", "val", "--plan", plan)
-    settings = ("--settings", "spatial,direct,contextual")
+def test_two_exports_of_instructions_have_the_same_bytes_and_leave_nothing_else(tmp_path):
+    first = tmp_path / "one.jsonl"
+    second = tmp_path / "two.jsonl"
 
-    for file in files:
-        call("export", "instructions", "--out", file, *words, *settings)
+    exported_rows(first, "--tasks", "ButtonUnmask,StopCube", "--split", "val")
+    exported_rows(second, "--tasks", "ButtonUnmask,StopCube", "--split", "val")
 
-    assert files[0].read_bytes() == files[1].read_bytes()
-    assert sorted(tmp_path.iterdir()) == files
+    assert first.read_bytes() == second.read_bytes()
+    assert sorted(tmp_path.iterdir()) == [first, second]
 
-    rows = [json.loads(line) for line in files[0].read_text().splitlines()]
-    said = {(row["task"], row["setting"]) for row in rows}
-    assert len(said) == 5
-    assert ("StopCube", "spatial") not in said
+
+def test_exported_instructions_are_those_of_the_asked_tasks_settings_and_split(tmp_path):
+    """StopCube has no spatial setting, and `all` may lack it."""
+    rows = exported_rows(
+        tmp_path / "rows.jsonl", "--tasks", "ButtonUnmask,StopCube", "--split", "val",
+        "--settings", "all",
+    )  # fmt: skip
+
     assert {row["split"] for row in rows} == {"val"}
-    assert {row["frame"] for row in rows} == {None, "camera"}
+    settings = {(row["task"], row["setting"]) for row in rows}
+    assert ("ButtonUnmask", "spatial") in settings
+    assert ("StopCube", "direct") in settings
+    assert ("StopCube", "spatial") not in settings
 
-    contextual = next(row for row in rows if row["setting"] == "contextual")
+
+def test_exported_instructions_follow_the_options_of_a_plan(tmp_path):
+    """Places of the camera's frame, and a dialogue with a competing remark in stage 3."""
+    plan = plan_file(stages=[1, 2, 3, 5], distractor="competing", frame="camera", forms="implicit")
+
+    spatial, *_, contextual = exported_rows(
+        tmp_path / "rows.jsonl", "--tasks", "ButtonUnmask", "--plan", plan,
+        "--settings", "spatial,contextual",
+    )  # fmt: skip
+
+    assert (spatial["setting"], spatial["frame"]) == ("spatial", "camera")
+    assert (contextual["setting"], contextual["distractor"]) == ("contextual", "competing")
     stages = [turn["stage"] for turn in contextual["turns"]]
-    assert stages[1:3] == ["reinforcement", "distractor"]
-    assert contextual["distractor"] == "competing"
+    assert stages == ["introduction", "reinforcement", "distractor", "command"]
 
 
 @pytest.mark.parametrize(
@@ -66,53 +101,76 @@ def test_the_same_bytes_every_time_and_only_what_is_asked_for(tmp_path):
     [
         ("o.jsonl", ("--settings", "spatail"), UnknownNameError, "Did you mean 'spatial'"),
         ("o.jsonl", ("--plan", plan_file(stages="2,5")), InvalidValueError, "must be one of"),
-        ("o.jsonl", ("--tasks", "StopCube", "--settings", "spatial"), InvalidValueError, "None of"),
+        ("o.jsonl", ("--tasks", "StopCube", "--settings", "spatial"), InvalidValueError, "no spat"),
         ("o.csv", (), UnknownNameError, "There is no format 'csv'"),
         ("", (), InvalidValueError, "is not a file in an existing folder"),
         ("nowhere/o.jsonl", (), InvalidValueError, "is not a file in an existing folder"),
     ],
 )
-def test_what_is_wrong_is_one_sentence(tmp_path, out, words, kind, sentence):
+def test_a_wrong_option_of_an_export_is_one_sentence_and_nothing_is_written(
+    tmp_path, out, words, kind, sentence
+):
+    """Cases are a misspelled setting, wrong stages, a task without places, a bad format, bad
+    paths."""
     with pytest.raises(kind, match=sentence):
         call("export", "instructions", "--out", tmp_path / out, *words)
     assert not list(tmp_path.iterdir())
 
 
 def test_stats_print_tables(monkeypatch, snapshot):
+    """Counts of words and patterns, 150 characters wide."""
     monkeypatch.setenv("COLUMNS", "150")
     printed = call("language", "stats", "--tasks", "VideoPlaceButton,VideoUnmask,PickXtimes")
     assert printed == snapshot
 
 
 def test_stats_of_all_splits_leave_out_empty_tables():
+    """StopCube has sequential relations, and no places."""
     printed = call("language", "stats", "--split", "all", "--tasks", "StopCube")
     assert "Relations" in printed
     assert "Landmark" not in printed
 
 
+SCENARIO_FILE = """
+tasks = ["PickXtimes", "SwingXtimes"]
+[[scenario]]
+frame = "far"
+pool = "train"
+setting = "spatial"
+introduction = "Look at the cube {place}."
+say.color = ["the cube <there place: there>"]
+"""
+"""It breaks a rule: *there* goes with words for where something is, ``{place:spot}``."""
+
+
+def check_scenarios(folder, *options):
+    """Return the outcome of `roboirg language check-scenarios` on the file above."""
+    file = folder / "mine.toml"
+    file.write_text(SCENARIO_FILE)
+    words = ["language", "check-scenarios", str(file), "--seeds", "0", *options]
+    return CliRunner().invoke(cli.app, words)
+
+
 @pytest.mark.usefixtures("in_this_process")
 def test_an_author_sees_texts_and_the_broken_rule_in_each_task(tmp_path, snapshot):
-    file = tmp_path / "mine.toml"
-    file.write_text(
-        'tasks = ["PickXtimes", "SwingXtimes"]\n'
-        '[[scenario]]\nframe = "far"\npool = "train"\nsetting = "spatial"\n'
-        'introduction = "Look at the cube {place}."\n'
-        'say.color = ["the cube <there place: there>"]\n'
-    )
-    words = ["language", "check-scenarios", str(file), "--seeds", "0"]
-    result = CliRunner().invoke(cli.app, words)
+    """The whole print is compared with a stored one; the command fails, as a rule is broken."""
+    result = check_scenarios(tmp_path)
 
     assert isinstance(result.exception, RoboIRGError)
     assert f"{result.stdout}{result.exception}" == snapshot
 
-    result = CliRunner().invoke(cli.app, [*words, "--scenario", "fear"])
+
+@pytest.mark.usefixtures("in_this_process")
+def test_the_check_refuses_a_misspelled_scenario_with_the_right_name(tmp_path):
+    """The file has one scenario, "far"."""
+    result = check_scenarios(tmp_path, "--scenario", "fear")
     assert str(result.exception) == "There is no scenario 'fear'; known: far. Did you mean 'far'?"
 
 
-@pytest.fixture
-def rating(tmp_path, in_this_process):
-    """A folder with sheets for raters, of two tasks that share frames."""
-    out = tmp_path / "rating"
+@pytest.fixture(scope="module")
+def rating(tmp_path_factory):
+    """A folder with texts for raters: sheets, and a key that tells the scenario of each text."""
+    out = tmp_path_factory.mktemp("raters") / "rating"
     settings = ("--settings", "direct,reasoning")
     call("language", "sample", "--out", out, "--tasks", "PickXtimes,SwingXtimes", *settings)
     return out
@@ -124,29 +182,41 @@ def read_key(rating):
         return {row["number"]: row for row in csv.DictReader(file)}
 
 
-def test_raters_get_the_texts_of_the_key_in_other_orders(rating):
-    key = read_key(rating)
-    frames = {(row["setting"], row["frame"]) for row in key.values()}
-    assert len(frames) == len(key)
-
-    orders = set()
+def read_sheets(rating):
+    """Return for each rater the numbers and texts in the order of the sheet."""
+    sheets = []
     for path in rating.glob("sheet-*.csv"):
         _, *rows = csv.reader(path.open())
-        assert {row[0]: row[1] for row in rows} == {name: row["text"] for name, row in key.items()}
-        orders.add(tuple(row[0] for row in rows))
-    assert len(orders) == len(list(rating.glob("sheet-*.csv"))) == 3
+        sheets.append([(row[0], row[1]) for row in rows])
+    return sheets
+
+
+def test_raters_get_one_text_of_each_scenario(rating):
+    """The two tasks share scenarios ("frames")."""
+    rows = read_key(rating).values()
+    assert len({(row["setting"], row["frame"]) for row in rows}) == len(rows)
+
+
+def test_three_raters_get_the_texts_of_the_key_in_other_orders(rating):
+    texts = {number: row["text"] for number, row in read_key(rating).items()}
+    first, second, third = read_sheets(rating)
+
+    assert dict(first) == dict(second) == dict(third) == texts
+    assert len({tuple(first), tuple(second), tuple(third)}) == 3
 
 
 def test_raters_table_has_intervals_around_equal_ratings(rating):
+    """Two raters give 4 to every text; other scenarios could still be rated otherwise."""
     key = read_key(rating)
     ratings = dict.fromkeys(key, 4.0)
 
     for _, _, rated, interval, _ in rate_words.rows(key, [ratings, ratings]):
         low, high = interval.split(" to ")
         assert rated == "4.0"
-        assert float(low) < 4.0 < float(high), "frames that are all alike leave room for others"
+        assert float(low) < 4.0 < float(high)
 
 
 def test_an_empty_rating_is_refused_with_its_number(rating):
+    """The sheet is as it was written: no rating is filled in."""
     with pytest.raises(SystemExit, match=r"rates text \d+ ''; it must be a number"):
         rate_words.read_ratings(rating / "sheet-1.csv", read_key(rating))

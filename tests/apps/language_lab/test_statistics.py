@@ -1,6 +1,7 @@
 """Counting what instructions are made of, and drawing it."""
 
 import functools
+import sys
 
 import pytest
 
@@ -17,29 +18,46 @@ TASKS = ("PickXtimes", "BinFill", "VideoUnmask", "VideoPlaceButton", "VideoPlace
 
 
 @functools.cache
-def said():
-    """All implicit forms of the test split of some tasks."""
+def implicit_instructions():
+    """Return the implicit instructions of the 50 test episodes of these tasks, in all settings."""
     episodes = list(split_episodes(TASKS, ["test"]))
     told = instructions(episodes, plain_settings(), ("implicit",), InstructionOptions())
-    return tuple(instruction for _, instruction in told)
+    return tuple(said for _, said in told)
 
 
 def test_expressions_are_counted_once_per_scene():
-    counts = corpus_statistics.expression_counts(said())
-    assert corpus_statistics.expression_counts(said() * 2) == counts
-    assert "explicit" not in counts
-    for setting, by_class in counts.items():
-        assert max(by_class.values()) <= 50 * (3 if setting == "spatial" else len(TASKS))
+    """A referring expression is a word such as *it*: twice the same instructions count once."""
+    said = implicit_instructions()
+    counts = corpus_statistics.expression_counts(said)
+    assert corpus_statistics.expression_counts(said * 2) == counts
+
+
+def test_an_expression_is_counted_in_50_scenes_of_a_task_at_most():
+    """Three of the five tasks have a spatial setting."""
+    counts = corpus_statistics.expression_counts(implicit_instructions())
+
+    for setting, count_by_expression in counts.items():
+        tasks = 3 if setting == "spatial" else 5
+        assert max(count_by_expression.values()) <= 50 * tasks, setting
+
+
+def test_each_setting_has_its_expressions_and_explicit_has_none():
+    """An expression is the class of a word that refers back; *explicit* has no such words."""
+    counts = corpus_statistics.expression_counts(implicit_instructions())
+
     assert {"it", "them", "that", "former", "latter", "first", "second"} <= set(counts["direct"])
     assert {"that", "each", "other"} <= set(counts["reasoning"])
     assert {"it", "that", "there"} == set(counts["spatial"])
+    assert "explicit" not in counts
 
-    order = corpus_statistics.expression_order(counts)
-    assert set(order) == {name for by_class in counts.values() for name in by_class}
-    assert order.index("it") < order.index("former") < order.index("there")
+
+def test_expressions_are_in_a_fixed_order_and_none_is_left_out():
+    """The order is that of the types, and does not depend on the counts."""
+    counts = {"direct": {"there": 2, "it": 5}, "spatial": {"former": 1, "there": 1}}
+    assert corpus_statistics.expression_order(counts) == ("it", "former", "there")
 
 
 def test_without_matplotlib_one_sentence_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(MissingDependencyError, match=r"\[report\]"):
         figure_style.check_figure_support()

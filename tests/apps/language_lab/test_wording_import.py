@@ -24,11 +24,10 @@ TASKS = tuple(all_tasks())
 
 
 @functools.cache
-def imported(*tasks):
-    """The import of some tasks of the stand-in; open."""
+def imported(task):
+    """Return the open words of one task, imported from the stand-in of RoboMME's repository."""
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
-        chosen = {name: all_tasks()[name] for name in tasks}
-        patch.setattr(robomme_import, "all_tasks", lambda: chosen)
+        patch.setattr(robomme_import, "all_tasks", lambda: {task: all_tasks()[task]})
         _, wordings = robomme_import.import_robomme(make_clone(Path(folder)), "stand-in")
     register_wordings(wordings)
     return wordings
@@ -41,36 +40,62 @@ def one_task(monkeypatch):
     monkeypatch.setattr(robomme_import, "all_tasks", lambda: tasks)
 
 
-@pytest.mark.parametrize("task", slow_but(["BinFill", "VideoUnmask"], TASKS))
-def test_each_goal_has_the_sentence_of_the_source_and_each_setting_stays(task):
-    wordings = imported(task)
+each_task = pytest.mark.parametrize("task", slow_but(["BinFill", "VideoUnmask"], TASKS))
+
+
+@each_task
+def test_each_goal_has_the_sentence_of_the_source(task):
+    """The stand-in is asked once by the import, and once here without it."""
+    sentences = imported(task).tasks[task].literals
     for goal in train_goals(task):
-        assert wordings.tasks[task].literals[unordered(goal)] == sentence(task, goal)
+        assert sentences[unordered(goal)] == sentence(task, goal)
+
+
+@each_task
+def test_the_explicit_setting_says_the_sentence_of_the_source(task):
+    """Two published training episodes of each task."""
     for episode in train_episodes(task, 0, 2):
-        said = instruct(episode, wordings=wordings.identity)
+        said = instruct(episode, wordings=imported(task).identity)
         assert said.text == sentence(task, episode.goal, episode.difficulty)
-        assert expressible(episode, wordings=wordings.identity) == expressible(episode)
+
+
+@each_task
+def test_imported_sentences_leave_each_other_setting_as_it_is(task):
+    """Whole sentences are said in *explicit* only."""
+    for episode in train_episodes(task, 0, 2):
+        assert expressible(episode, wordings=imported(task).identity) == expressible(episode)
+
+
+def import_command(folder, *options):
+    """Return the outcome of `roboirg language import-robomme`, which writes FOLDER/out.toml."""
+    clone = make_clone(folder / "clone")
+    words = ["language", "import-robomme", str(clone), "--out", str(folder / "out.toml")]
+    return CliRunner().invoke(cli.app, [*words, *options])
 
 
 def test_the_command_writes_a_file_that_is_read_again(one_task, tmp_path):
-    clone = make_clone(tmp_path / "clone")
+    """The name and a digest make the identity of the words."""
+    outcome = import_command(tmp_path, "--name", "stand-in")
+
     out = tmp_path / "out.toml"
-    words = ["language", "import-robomme", str(clone), "--out", str(out)]
-    call = CliRunner().invoke(cli.app, [*words, "--name", "stand-in"])
+    identity = read_wordings(out).identity
+    assert re.fullmatch("stand-in@[0-9a-f]{8}", identity)
+    assert outcome.stdout == f"VideoRepick: 3 sentences\nWrote {identity}: {out}\n"
 
-    assert call.exit_code == 0
 
-    found = read_wordings(out)
-    lines = ("VideoRepick: 3 sentences", f"Wrote {found.identity}: {out}")
-    assert call.stdout.splitlines() == [*lines]
-    assert re.fullmatch("stand-in@[0-9a-f]{8}", found.identity)
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [([], "give it another name"), (["--name", "a b"], "the name 'a b'")],
+    ids=["robomme", "a b"],
+)
+def test_a_name_that_is_bad_or_robomme_s_is_refused_and_nothing_is_written(
+    one_task, tmp_path, options, complaint
+):
+    """Without a name it would be "robomme", which only RoboMME's own sentences may have."""
+    outcome = import_command(tmp_path, *options)
 
-    # Only RoboMME's sentences may have its name, and a bad name is refused before the work.
-    out.unlink()
-    for more, complaint in (([], "give it another name"), (["--name", "a b"], "the name 'a b'")):
-        call = CliRunner().invoke(cli.app, [*words, *more])
-        assert complaint in str(call.exception)
-        assert not out.exists()
+    assert complaint in str(outcome.exception)
+    assert not (tmp_path / "out.toml").exists()
 
 
 ASKED = r"RoboMME's get_language_goal, asked for a goal of VideoRepick \((?:once|\d times)\), "
@@ -90,6 +115,7 @@ ASKED = r"RoboMME's get_language_goal, asked for a goal of VideoRepick \((?:once
     ],
 )
 def test_a_sentence_that_cannot_be_used_is_named(one_task, tmp_path, body, complaint):
+    """`body` is what RoboMME's function returns for each goal."""
     clone = make_clone(tmp_path)
     file = clone / robomme_import.FILE
     file.write_text(f"def get_language_goal(self, env):\n    return {body}\n")
@@ -98,17 +124,26 @@ def test_a_sentence_that_cannot_be_used_is_named(one_task, tmp_path, body, compl
         robomme_import.import_robomme(clone, "stand-in")
 
 
-def test_only_one_file_is_loaded_and_nothing_is_left_behind(one_task, tmp_path, monkeypatch):
-    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+def test_only_one_file_is_loaded_and_no_module_is_left_behind(one_task, tmp_path):
+    """RoboMME's package itself, which here would end the process, needs a simulator."""
     clone = make_clone(tmp_path)
     (clone / "src/robomme/__init__.py").write_text("raise SystemExit")
-    before = list(sys.path)
+    path = list(sys.path)
     modules = set(sys.modules)
 
     robomme_import.import_robomme(clone, "stand-in")
 
-    assert sys.path == before
+    assert sys.path == path
     assert not [name for name in set(sys.modules) - modules if "robomme" in name]
+
+
+def test_an_import_writes_no_bytecode_into_the_clone(one_task, tmp_path, monkeypatch):
+    """Python's option not to write any is set during the import alone."""
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    clone = make_clone(tmp_path)
+
+    robomme_import.import_robomme(clone, "stand-in")
+
     assert not list(clone.rglob("__pycache__"))
     assert not sys.dont_write_bytecode
 
@@ -123,6 +158,7 @@ def test_only_one_file_is_loaded_and_nothing_is_left_behind(one_task, tmp_path, 
     ],
 )
 def test_a_folder_without_the_function_is_refused(tmp_path, content, complaint):
+    """`content` is that of RoboMME's file of sentences; None if there is no such file."""
     if content is not None:
         file = tmp_path / robomme_import.FILE
         file.parent.mkdir(parents=True)

@@ -22,7 +22,7 @@ from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.apps.leaderboard.run_verification import verify_run
 from roboirg.core.errors import RoboIRGError
 from roboirg.language.scenarios.wording_file import read_wordings
-from roboirg.records.action_log import action_path, read_actions
+from roboirg.records.action_log import ACTION_FOLDER, action_path, read_actions
 from roboirg.records.merging import merge_runs
 from roboirg.records.packs import MANIFEST, opened_run
 from roboirg.records.run_files import PLAN_FILE
@@ -425,11 +425,13 @@ def _without(name):
     return build
 
 
-def _swollen(good):
-    """Let the archive say of all files but the manifest that they have 4 GiB."""
+def _swollen(good, only=b""):
+    """Let the archive say of all files but the manifest that they have 4 GiB, or of some only."""
     content = bytearray(good)
     for found in re.finditer(rb"PK\x01\x02", good):
-        if not good.startswith(MANIFEST.encode(), found.start() + 46):
+        name_start = found.start() + 46
+        is_meant = good.startswith(only, name_start)
+        if is_meant and not good.startswith(MANIFEST.encode(), name_start):
             struct.pack_into("<I", content, found.start() + 24, (4 << 30) - 2)
     return bytes(content)
 
@@ -468,6 +470,18 @@ def test_a_pack_that_is_none_is_refused_and_leaves_nothing_behind(name, run):
 
     assert says in refusal(read_pack, path)
     assert sorted(run.parent.rglob("*")) == before
+
+
+def test_what_a_command_does_not_read_of_a_pack_is_not_unpacked(run, monkeypatch):
+    """Videos that are too large, or not those of the manifest, keep nobody from the records."""
+    monkeypatch.setattr("roboirg.records.packs.MOST_PACKED_BYTES", 10 << 30)
+    path = pack(run)
+    path.write_bytes(_swollen(path.read_bytes(), only=b"videos/"))
+
+    assert "unpacks to more than" in refusal(read_pack, path)
+    with opened_run(path, [ACTION_FOLDER]) as folder:
+        assert len(read_records(folder)) == 2
+        assert not (folder / "videos").exists()
 
 
 def test_a_warning_about_a_pack_names_the_pack(run, caplog):

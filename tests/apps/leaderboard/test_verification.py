@@ -1,6 +1,7 @@
 """Honest runs hold; altered ones do not."""
 
 import json
+import re
 import shutil
 from collections import Counter
 from dataclasses import replace
@@ -11,7 +12,7 @@ from forgeries import FORGERIES, forge
 from selection import slow_but
 from typer.testing import CliRunner
 
-from roboirg.apps.leaderboard import commands
+from roboirg.apps.leaderboard import commands, record_check
 from roboirg.apps.leaderboard.record_check import RecordCheck
 from roboirg.apps.leaderboard.run_verification import Verification, verify_run
 from roboirg.main import app
@@ -85,6 +86,32 @@ def test_what_was_altered_does_not_hold(name, forged):
     assert words in "\n".join(found.findings)
 
 
+def test_of_a_flipped_event_both_sides_are_printed(forged):
+    def flipped(lines, _folder, _rng):
+        lines[0]["events"][1]["holds"] = False
+        return lines
+
+    forge(forged, flipped)
+    (found,) = verify_run(forged).checks
+    (sentence,) = found.findings
+
+    assert re.fullmatch(
+        r"events, entry 2: .* EventRecord\(.*False\); .* EventRecord\(.*True\)\.", sentence
+    )
+
+
+@pytest.mark.parametrize(
+    ("recorded", "expected", "sentence"),
+    [
+        ((1, 2, 3), (1, 5, 3), "goal, entry 2: the record says 2; it should be 5."),
+        ((1,), (1, 5), "goal, entry 2: the record says None; it should be 5."),
+        ({"a": 1, "b": (2, 4)}, {"a": 1, "b": (2, 3)}, "goal.b, entry 2: the record says 4; it s"),
+    ],
+)
+def test_of_two_values_the_place_where_they_differ_is_named(recorded, expected, sentence):
+    assert record_check._difference("goal", recorded, expected).startswith(sentence)
+
+
 def with_all(**fields):
     """Return a change of the same fields of all records."""
 
@@ -121,7 +148,7 @@ def test_records_in_other_words_of_the_same_pool_are_checked_but_for_their_words
         return lines
 
     forge(forged, heard_later)
-    assert "instruction: the record says" in str(verify_run(forged).checks)
+    assert "instruction, entry 1: the record says" in str(verify_run(forged).checks)
 
     forge(forged, FORGERIES["failure to success"][0])
     assert "outcome: the record says 'success'" in str(verify_run(forged).checks)
@@ -138,7 +165,7 @@ def test_a_record_has_the_words_of_its_plan_and_of_its_metadata(forged):
 
     assert found.faults[0] == "1 record in words that the plan does not name."
     assert found.faults[1].startswith("The records have several words of StopCube/test: ")
-    assert "its metadata name different ones" in str(found.checks)
+    assert "words: the record says 'StopCube/test@0a0a0a0a0a0a'; it should" in str(found.checks)
 
 
 @pytest.mark.parametrize("words", ["StopCube/train@0a0a0a0a0a0a", "anything", "none"])

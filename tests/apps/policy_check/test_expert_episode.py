@@ -80,7 +80,7 @@ def test_a_policy_that_does_what_the_expert_does_fits():
     ]
 
     assert told.verdict == "pass"
-    assert " m from what it did" in told.message
+    assert "expected at most 0.0109 m, half of that of holding still" in told.message
 
 
 def test_without_a_renderer_nothing_is_compared(monkeypatch):

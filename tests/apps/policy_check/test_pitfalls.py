@@ -21,7 +21,7 @@ def planted(check, words, verdict="warn"):
     return note
 
 
-@planted("reset forgets", "a queue of actions outlives the episode", "fail")
+@planted("reset forgets", "belongs to the previous episode: a queue of actions", "fail")
 class KeepsQueue(OneByOne):
     def __init__(self, seed=0):
         super().__init__(seed)
@@ -37,13 +37,13 @@ class KeepsQueue(OneByOne):
         return self.queue.popleft()
 
 
-@planted("gripper", "change the sign")
+@planted("gripper", "got -1 or less and 1 or more; change the sign")
 class InvertsGripper(Honest):
     def gripper(self, observation):
         return -super().gripper(observation)
 
 
-@planted("gripper", "stretch the range")
+@planted("gripper", "Expected -1 whenever the expert holds a cube, got 0 to 0")
 class GripperFromZero(Honest):
     def gripper(self, observation):
         return (super().gripper(observation) + 1) / 2
@@ -78,8 +78,8 @@ def test_the_expert_s_error_is_told():
     (told,) = [finding for finding in results_of(Honest) if finding.check == "expert"]
     assert told.verdict == "pass"
     assert told.message == (
-        "At 20 moments of an expert's episode the answers are 0.000207 rad from what it did; "
-        "holding still would be 0.0499."
+        "Distance from what an expert did at 20 moments: expected at most 0.0249 rad, half of that "
+        "of holding still, got 0.000207."
     )
 
     (told,) = [

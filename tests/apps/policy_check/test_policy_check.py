@@ -146,12 +146,12 @@ def test_a_sound_policy_passes_everything():
 @pytest.mark.parametrize(
     ("kind", "check", "words"),
     [
-        (Shapeless, "acts without a video", "got shape (3, 7)"),
-        (NotFinite, "acts without a video", "finite number"),
+        (Shapeless, "acts without a video", "expected shape (n, 8) with n >= 1, got shape (3, 7)"),
+        (NotFinite, "acts without a video", "value 0 of row 0: expected a finite number, got nan"),
         (Raising, "acts without a video", "'depth'; the observation has end_effector, front_rgb,"),
-        (Elephant, "reset forgets", "differs by up to 0.27"),
-        (Dice, "deterministic", "Two equal episodes differ by up to"),
-        (Growing, "deterministic", "the number of actions"),
+        (Elephant, "reset forgets", "value 0 of row 0 in answer 1: expected 0.01, got 0.16"),
+        (Dice, "deterministic", " in answer "),
+        (Growing, "deterministic", "answer 1: expected 4 actions, got 7"),
         (Unwritable, "reports", "the policy's metadata: 'rate' is nan; it must be a text"),
         (Priceless, "reports", "usage() has None as 'calls'; it must be a number."),
     ],
@@ -166,7 +166,10 @@ def test_what_is_allowed_is_noted():
     assert "as the policy declares" in notes["deterministic"]
     assert "set the attribute version" in notes["version"]
     assert found(f"{__name__}:HonestDice", "fail") == {}
-    assert "9 of 12 actions" in found(f"{__name__}:Reckless", "note")["range without a video"]
+    assert found(f"{__name__}:Reckless", "note")["range without a video"] == (
+        "9 of 12 actions have a number outside the usual range of joint_angle; farthest is value 1 "
+        "of action 2: expected -1.76 to 1.76, got 9. The robot executes them as well as it can."
+    )
     assert "It is privileged" in found("oracle", "note")["loads"]
 
 
@@ -176,7 +179,7 @@ def test_what_is_allowed_is_noted():
         ("nothing", "There is no policy 'nothing'"),
         ("openpi://127.0.0.1:9?connect=0.1", "cannot be reached"),
         ("openpi://127.0.0.1:9?conect=0.1", "Did you mean 'connect'?"),
-        (object(), "It has no reset()."),
+        (object(), "Expected reset() and act(), got no reset()."),
     ],
 )
 def test_what_cannot_be_tried_is_told(spec, words):

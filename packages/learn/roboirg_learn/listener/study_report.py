@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from roboirg.extension.commands import write_atomically
 from roboirg.extension.episodes import all_settings
-from roboirg.extension.pages import markdown_table, without_spread
+from roboirg.extension.pages import ALPHA, interval_of_values, markdown_table
 from roboirg_learn.listener.listener_study import HELD_OUT, RIVAL, VARIANTS, StudyAnswer
 
 
@@ -46,8 +46,6 @@ _NOTE = (
 
 Verdicts = NDArray[np.float64]
 """Of one task: 1 where an answer is right, else 0; shape (training seeds, episodes)."""
-UPPER_END = 0.975
-"""Quantile of the upper end of a 95 % interval."""
 
 
 class ListenerCell(NamedTuple):
@@ -63,71 +61,52 @@ class TrainedRate(NamedTuple):
 
     Attributes:
         rate: the mean over all trainings.
-        interval: its 95 % interval.
+        interval: its 95 % interval; None with too few scenes.
         by_seed: the rate of each training.
     """
 
     rate: float
-    interval: tuple[float, float]
+    interval: tuple[float, float] | None
     by_seed: tuple[float, ...]
 
 
 def trained_rate(tasks: Sequence[Verdicts]) -> TrainedRate:
     """Return the mean share of right answers over tasks, with its 95 % interval.
 
-    The interval adds the variance between trainings, which all answer the same instructions, to
-    that between scenes within tasks. It is Student's with Satterthwaite's degrees of freedom, so
-    that few trainings that differ make it long; with a single one it is over scenes only.
+    The distance of an end has two parts whose squares add (MOVER: Zou and Donner, Statistics in
+    Medicine 27, 2008): that of the score interval over scenes, and, with several trainings, which
+    all answer the same instructions, that of Student's interval over trainings.
 
     Args:
         tasks: of each task 1 for a right answer, else 0: (training seeds, episodes).
     """
     by_seed = np.mean([verdicts.mean(axis=1) for verdicts in tasks], axis=0)
     rate = float(by_seed.mean())
-    variance = _variance_of_mean(tasks, by_seed)
-    if not variance.total:
-        count = sum(verdicts.shape[1] for verdicts in tasks)
-        interval: tuple[float, float] = without_spread(rate, count)
-    else:
-        from scipy import special  # SciPy's statistics take a second to import
-
-        quantile = float(special.stdtrit(variance.freedom, UPPER_END))
-        half_width = quantile * math.sqrt(variance.total)
-        interval = max(0.0, rate - half_width), min(1.0, rate + half_width)
+    over_scenes = interval_of_values([verdicts.mean(axis=0) for verdicts in tasks])
+    interval = None
+    if over_scenes is not None:
+        reach = _reach_of_trainings(by_seed)
+        low, high = over_scenes
+        interval = (
+            max(0.0, rate - math.hypot(rate - low, reach)),
+            min(1.0, rate + math.hypot(high - rate, reach)),
+        )
     return TrainedRate(rate, interval, tuple(by_seed.tolist()))
 
 
-class _Variance(NamedTuple):
-    """The variance of a mean, with Satterthwaite's degrees of freedom; both 0 without spread."""
-
-    total: float
-    freedom: float
-
-
-def _variance_of_mean(tasks: Sequence[Verdicts], by_seed: Verdicts) -> _Variance:
-    """Return the variance of the mean: that between trainings, and that between scenes.
+def _reach_of_trainings(by_seed: Verdicts) -> float:
+    """Return how far Student's interval over trainings reaches; 0 with a single one.
 
     Args:
-        tasks: of each task 1 for a right answer, else 0: (training seeds, episodes).
-        by_seed: (training seeds,) the mean over tasks.
+        by_seed: (training seeds,) the rate of each.
     """
     seeds = len(by_seed)
-    trainings = float(by_seed.var(ddof=1)) / seeds if seeds > 1 else 0.0
-    scenes = 0.0
-    count = 0
-    for verdicts in tasks:
-        episodes = verdicts.shape[1]
-        scenes += float(verdicts.mean(axis=0).var()) / max(1, episodes - 1)
-        count += episodes
-    scenes /= len(tasks) ** 2
+    if seeds == 1:
+        return 0.0
+    from scipy import special  # SciPy's statistics take a second to import
 
-    # Satterthwaite: the variances added are one estimate with so many degrees of freedom.
-    total = trainings + scenes
-    if not total:
-        return _Variance(0.0, 0.0)
-    trainings_part = trainings**2 / max(1, seeds - 1)
-    scenes_part = scenes**2 / max(1, count - len(tasks))
-    return _Variance(total, total**2 / (trainings_part + scenes_part))
+    quantile = float(special.stdtrit(seeds - 1, 1 - ALPHA / 2))
+    return quantile * float(by_seed.std(ddof=1)) / math.sqrt(seeds)
 
 
 def write_study(answers: Iterable[StudyAnswer], about: Mapping[str, Any], folder: Path) -> Path:
@@ -217,7 +196,10 @@ def _with_interval(rate: TrainedRate | None) -> str:
     """Return a rate in percent with its interval, as in "50.0 (40.0–60.0)"."""
     if rate is None:
         return _NO_RATE
-    return f"{_percent([rate.rate])} ({_percent(rate.interval, '–')})"
+    ends = "too few scenes"
+    if rate.interval is not None:
+        ends = _percent(rate.interval, "–")
+    return f"{_percent([rate.rate])} ({ends})"
 
 
 def _percent(rates: Iterable[float], between: str = ", ") -> str:

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import roboirg
 from roboirg.extension.episodes import plain_settings
-from roboirg.extension.pages import holm, markdown_table, published_rows
+from roboirg.extension.pages import (
+    ALPHA,
+    holm,
+    markdown_table,
+    published_gap_interval,
+    published_rows,
+)
 from roboirg_learn.policy.paper_experiment import CONTEXT, MAIN, SYSTEMS, row_name
 
 if TYPE_CHECKING:
@@ -23,8 +29,6 @@ WITHOUT_MEMORY_SYSTEM, *OTHER_SYSTEMS = SYSTEMS.values()
 LESS_WITHOUT_MEMORY = "less that of the row without memory, in points"
 TRIALS = 150
 """Rollouts behind a published rate."""
-Z_95 = 1.96
-ALPHA = 0.05
 _POINTS = "* p ≤ 0.05 with Holm's correction over the row. In parentheses: 95 % intervals."
 INTRODUCTION = """\
 # The paper's experiment with small policies
@@ -44,7 +48,7 @@ class Difference(NamedTuple):
 
     Attributes:
         value: the first less the second, from -1 to 1.
-        interval: 95 %; None with too few episodes, or if all published rates are 0 or 100.
+        interval: 95 %; None with too few episodes.
         p_value: two-sided, not corrected.
     """
 
@@ -250,8 +254,8 @@ def _gaps(
 def _published_difference(first: Rates, second: Rates) -> Difference:
     """Return the mean difference of two published rates over the tasks that the first has.
 
-    Interval and p-value are of a normal approximation, with `TRIALS` rollouts for each rate. The
-    rollouts of the two are taken as independent, because only their rates are known.
+    They have `TRIALS` rollouts for each rate, and those of the two are taken as independent,
+    because only their rates are known. The p-value is of a normal approximation.
     """
     total = 0.0
     variance = 0.0  # of one rollout of each, summed over tasks
@@ -266,11 +270,12 @@ def _published_difference(first: Rates, second: Rates) -> Difference:
             count += 1
     value = total / count
     standard_error = math.sqrt(variance / TRIALS / count**2)
+    tasks = [task for task, rate in first.items() if rate is not None]
+    interval = published_gap_interval(first, second, tasks, TRIALS)
     if not standard_error:
-        return Difference(value, None, 1.0)
-    margin = Z_95 * standard_error
+        return Difference(value, interval, 1.0)
     p_value = math.erfc(abs(value) / standard_error / math.sqrt(2))  # two-sided
-    return Difference(value, (value - margin, value + margin), p_value)
+    return Difference(value, interval, p_value)
 
 
 def _retention(settings: Sequence[str], changes: Differences, published: _Published) -> str:

@@ -174,7 +174,7 @@ class _Columns:
             return others
 
         rates = {}
-        for measured in measure_groups(groups, reference, is_mean=lambda _key: True):
+        for measured in measure_groups(groups, reference):
             (options,) = measured.key
             rates[self.title(options)] = _rate(measured)
         return rates

@@ -12,7 +12,6 @@ from functools import partial
 from typing import NamedTuple
 
 import msgspec
-import numpy as np
 
 from roboirg.analysis.measures.measure import Measured, pair, with_holm
 from roboirg.analysis.results.frame import Frame
@@ -34,10 +33,9 @@ from roboirg.stats.cells import (
     Cell,
     Key,
     Trial,
-    clustered_interval,
+    rate_interval,
     rows_of,
 )
-from roboirg.stats.intervals import SEED
 from roboirg.stats.paired_tests import measure_gap
 
 LANGUAGE_USE = "language use"
@@ -95,14 +93,12 @@ def arm_figures(frame: Frame) -> tuple[ArmFigure, ...]:
     `CONTRASTS` for which it played the arms, in each setting. They are measured by setting first,
     and sorted by policy run afterwards.
     """
-    rng = np.random.default_rng(SEED)
     groups = _trials_by_group(frame)
     figures = []
-    # The order of these is part of the results: they draw from one generator.
     for group in sorted(groups, key=lambda group: options_sort_key(group.options)):
         for contrast in CONTRASTS:
             key = ArmKey(group.run, group.options, contrast)
-            figure = _figure(key, groups[group].values(), rng)
+            figure = _figure(key, groups[group].values())
             if figure is not None:
                 figures.append(figure)
     runs = list(dict.fromkeys(group.run for group in groups))
@@ -134,7 +130,7 @@ def _trials_by_group(frame: Frame) -> dict[_Group, Trials]:
     return groups
 
 
-def _figure(key: ArmKey, trials: Iterable[Arms], rng: np.random.Generator) -> ArmFigure | None:
+def _figure(key: ArmKey, trials: Iterable[Arms]) -> ArmFigure | None:
     """Measure one figure, the gap between two rates over the same trials.
 
     None if no trial was played in all control arms that the figure needs.
@@ -142,7 +138,6 @@ def _figure(key: ArmKey, trials: Iterable[Arms], rng: np.random.Generator) -> Ar
     Args:
         key: policy run, options and the figure.
         trials: for each trial, its results by control arm.
-        rng: source of the resamples.
     """
     first: dict[str, Cell] = {}
     second: dict[str, Cell] = {}
@@ -151,11 +146,11 @@ def _figure(key: ArmKey, trials: Iterable[Arms], rng: np.random.Generator) -> Ar
         if sides is not None:
             _count(sides.first, first)
             _count(sides.second, second)
-    gap = measure_gap(pair(first, second), rng)
+    gap = measure_gap(pair(first, second))
     if gap is None:
         return None
-    interval = clustered_interval(list(first.values()), rng)
-    other_interval = clustered_interval(list(second.values()), rng)
+    interval = rate_interval(first.values())
+    other_interval = rate_interval(second.values())
     return Measured(key, first, second, interval, gap, other_interval=other_interval)
 
 
@@ -219,15 +214,19 @@ def _language_use(arms: Arms) -> Sides | None:
 def _paraphrases(arms: Arms) -> Sides | None:
     """Count whether all paraphrases of an instruction were solved, against each for itself.
 
-    The first side has for each paraphrase a success only if all were solved, so its mean is a rate
-    over as many results as the second side's. None with fewer than two paraphrases.
+    Of three paraphrases, two of which were solved, the first side has three failures, and the
+    second side two successes and a failure: both have a result for each paraphrase, so that they
+    can be paired. None with fewer than two paraphrases.
+
+    Args:
+        arms: the results of one scene by control arm, in any order; other arms are left out.
     """
-    results = [result for arm, result in sorted(arms.items()) if paraphrase_number(arm)]
-    if len(results) <= 1:
+    each = [result for arm, result in sorted(arms.items()) if paraphrase_number(arm)]
+    if len(each) <= 1:
         return None
-    is_each_solved = all(map(_is_success, results))
-    as_if_alike = [_with_outcome(result, is_success=is_each_solved) for result in results]
-    return Sides(as_if_alike, results)
+    is_all_solved = all(map(_is_success, each))
+    all_or_none = [_with_outcome(result, is_success=is_all_solved) for result in each]
+    return Sides(all_or_none, each)
 
 
 CONTRASTS = (

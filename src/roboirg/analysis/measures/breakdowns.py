@@ -114,7 +114,6 @@ def break_down(frame: Frame, breakdown: Breakdown) -> tuple[Measured[LabelKey], 
             return groups.get(key._replace(options=REFERENCE_OPTIONS), NOTHING)
         return by_options.get((key.run, REFERENCE_OPTIONS), NOTHING)
 
-    # Sorted before they are measured, because all draw from one generator.
     groups = {key: by_label[key] for key in sorted(keys, key=sort_key)}
     return measure_groups(groups, explicit, family=lambda key: key.run)
 

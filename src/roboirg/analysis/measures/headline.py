@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roboirg.analysis.measures.measured_floors import measured_floors, settings_at_chance
 from roboirg.analysis.results.frame import RunNames
@@ -19,15 +20,7 @@ from roboirg.analysis.results.run_cells import Cells
 from roboirg.core.plain_text import counted
 from roboirg.language.settings import EXPLICIT
 from roboirg.stats.cells import Cell
-from roboirg.stats.intervals import (
-    SEED,
-    Draws,
-    Interval,
-    Rows,
-    rates_of,
-    resampled_interval,
-    resampled_rates,
-)
+from roboirg.stats.intervals import Interval, Rows, TaskRates, mean_interval
 from roboirg.stats.paired_tests import Pairs
 from roboirg.stats.rates import interval_note, points
 
@@ -43,8 +36,7 @@ class Headline:
     Attributes:
         settings: over which the gap is the mean; a setting's is the mean over its tasks.
         gap: to explicit on the same episodes, -1 to 1.
-        interval: from the paired bootstrap over episodes, which all settings share; None with too
-            few episodes.
+        interval: 95 %, over episodes, which all settings share; None with too few episodes.
         episodes: number of episodes.
         is_complete: whether every planned trial of these cells has a verdict.
     """
@@ -120,19 +112,17 @@ def measure_headline(
     rows_of_tasks = [rows for rows in map(_paired_rows, tasks) if len(rows)]
     if not rows_of_tasks:
         return None
-    # As measured: a single "draw" of all episodes, shape (1,).
-    gap = _mean_gap([rates_of(rows.sum(axis=0, keepdims=True)) for rows in rows_of_tasks])
-    if np.isnan(gap):
-        return None  # a setting has no trials in any task
-
-    rng = np.random.default_rng(SEED)
-    resampled_gaps = _mean_gap([resampled_rates([rows], rng) for rows in rows_of_tasks])
-    episodes = list(map(len, rows_of_tasks))  # of each task
+    factors = _factors(rows_of_tasks)
+    if factors is None:
+        return None
+    strata = []
+    for rows, factors_of_task in zip(rows_of_tasks, factors, strict=True):
+        strata.append(TaskRates.of(rows).combined(*factors_of_task))
     return Headline(
         settings=tuple(settings),
-        gap=float(gap[0]),
-        interval=resampled_interval(resampled_gaps, episodes, least=-1.0),
-        episodes=sum(episodes),
+        gap=sum(stratum.mean for stratum in strata),
+        interval=mean_interval(strata),
+        episodes=sum(map(len, rows_of_tasks)),
         is_complete=all(task.is_complete for task in tasks),
     )
 
@@ -188,19 +178,25 @@ def _paired_rows(task: _TaskCells) -> Rows:
     return rows[rows.any(axis=1)]
 
 
-def _mean_gap(rates: Sequence[Draws]) -> Draws:
-    """Return the gap to explicit in each draw, the mean over tasks and then over k settings.
+def _factors(tasks: Sequence[Rows]) -> NDArray[np.float64] | None:
+    """Return how much each task's rates count in the headline number, shape (tasks, 2 k).
+
+    The number is the mean over k settings of the gap to explicit, each the mean over the tasks that
+    have the setting. With two settings, of which a task alone has the first one, that task's rates
+    in it and in explicit count 1/2 and -1/2. Rates without trials are not counted.
 
     Args:
-        rates: for each task the rates in each setting and in explicit, one next to the other, shape
-            (draws, 2 k); nan where a task has no episode in a setting.
+        tasks: for each task its results, as of `_paired_rows`.
 
     Returns:
-        Shape (draws,); nan if a setting has no episode in any task.
+        None if a setting has no trials in any task.
     """
-    # Shape (tasks, draws, k).
-    gaps = np.stack([task_rates[:, 0::2] - task_rates[:, 1::2] for task_rates in rates])
-    tasks_with_gap = (~np.isnan(gaps)).sum(axis=0)
-    with np.errstate(invalid="ignore"):
-        gaps_of_settings = np.nansum(gaps, axis=0) / tasks_with_gap
-    return np.asarray(gaps_of_settings.mean(axis=1))
+    trials = np.array([rows.sum(axis=0)[1::2] for rows in tasks])
+    tasks_with_trials = np.count_nonzero(
+        trials, axis=0
+    )  # of each setting, and of explicit next to it
+    if not tasks_with_trials.all():
+        return None
+    gaps = np.resize([1.0, -1.0], trials.shape)
+    settings = trials.shape[1] / 2
+    return np.asarray(gaps / tasks_with_trials / settings)

@@ -13,8 +13,6 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, Generic, NamedTuple, TypeVar
 
-import numpy as np
-
 from roboirg.analysis.results.frame import suite
 from roboirg.analysis.results.option_labels import REFERENCE_OPTIONS
 from roboirg.analysis.results.policy_run import PolicyRun
@@ -29,12 +27,11 @@ from roboirg.stats.cells import (
     Columns,
     Counts,
     Key,
-    cell_interval,
-    clustered_interval,
     gather,
+    rate_interval,
     rows_of,
 )
-from roboirg.stats.intervals import SEED, Interval
+from roboirg.stats.intervals import Interval
 from roboirg.stats.paired_tests import Gap, Pairs, holm, measure_gap
 
 ALL_TASKS = "all tasks"
@@ -299,7 +296,6 @@ def measure_groups(
     second_reference: Callable[[K], ByTask] = _no_reference,
     *,
     family: Callable[[K], object] = lambda _key: None,
-    is_mean: Callable[[K], bool] = lambda _key: False,
     with_intervals: bool = True,
 ) -> tuple[Measured[K], ...]:
     """Measure success in groups of trials, and its gaps to others on the same episodes.
@@ -310,19 +306,14 @@ def measure_groups(
         second_reference: returns others with which they are compared, too.
         family: returns the same value for groups that are read together: p-values of their gaps
             are corrected over all of them.
-        is_mean: whether a group is a mean over tasks even if it has only one.
         with_intervals: whether rates have intervals.
     """
-    rng = np.random.default_rng(SEED)
     measured = []
     for key, cells in groups.items():
-        # The order of these is part of the results: they draw from one generator.
-        interval = None
-        if with_intervals:
-            interval = _interval(cells, rng, is_mean=is_mean(key))
+        interval = rate_interval(cells.values()) if with_intervals else None
         others = reference(key)
-        gap = measure_gap(pair(cells, others), rng)
-        second_gap = measure_gap(pair(cells, second_reference(key)), rng)
+        gap = measure_gap(pair(cells, others))
+        second_gap = measure_gap(pair(cells, second_reference(key)))
         measured.append(Measured(key, cells, others, interval, gap, second_gap))
     return with_holm(measured, family)
 
@@ -350,20 +341,6 @@ def with_holm(
         for number, p_value in zip(p_values, corrected_p_values, strict=True):
             corrected[number] = replace(rows[number], p_holm=p_value)
     return tuple(corrected)
-
-
-def _interval(cells: ByTask, rng: np.random.Generator, *, is_mean: bool) -> Interval | None:
-    """Return the 95 % interval of a success rate; None with too few episodes.
-
-    Args:
-        cells: the trials by task.
-        rng: source of the resamples.
-        is_mean: whether the rate is a mean over tasks, even if only one has a verdict.
-    """
-    judged = [cell for cell in cells.values() if cell.verdicts]
-    if len(judged) == 1 and not is_mean:
-        return cell_interval(judged[0], rng)
-    return clustered_interval(judged, rng)
 
 
 def pair(cells: ByTask, others: ByTask) -> list[Pairs]:
@@ -441,6 +418,5 @@ def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
         lambda key: with_options(key, replace(key.options, form="resolved")),
         # What is read together: a policy run's tasks, its suites, its averages over all tasks.
         family=lambda key: (key.policy_run, is_task(key), key.scope == ALL_TASKS),
-        is_mean=lambda key: not is_task(key),
     )
     return {summary.key: summary for summary in found}

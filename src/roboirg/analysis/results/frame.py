@@ -87,6 +87,18 @@ def _attributed(name: str) -> Callable[[Summary], str | None]:
     return read
 
 
+def _used(name: str, kind: str, meaning: str, key: str = "") -> FrameColumn:
+    """Return a column of what the policy's models cost, by a key of the result's usage."""
+
+    def read(result: Summary) -> float | None:
+        amount = result.usage.get(key or name)
+        if amount is None or kind == "decimal":
+            return amount
+        return int(amount)
+
+    return FrameColumn(name, kind, meaning, "unknown, or no model", read)
+
+
 COLUMNS: Mapping[str, FrameColumn] = {
     column.name: column
     for column in (
@@ -140,6 +152,10 @@ COLUMNS: Mapping[str, FrameColumn] = {
             "prompt", "text", "whether the prompt was heard whole, or cut", path="prompt_verdict"
         ),
         _field("guessed", "flag", "whether the words had no meaning for the policy, so it guessed"),
+        _used("model_calls", "number", "calls of models by the policy", "calls"),
+        _used("input_tokens", "number", "tokens that these models read"),
+        _used("output_tokens", "number", "tokens that they wrote"),
+        _used("cost_usd", "decimal", "price of these calls, US$"),
         _field("steps", "number", "control steps that the policy played"),
         _field("demonstration_steps", "number", "frames of the video before its turn"),
         _field("wordings", "text", "pool or file of other words", "own words", "options.wordings"),
@@ -384,8 +400,7 @@ class _Groups(NamedTuple):
 def _sorted(rows: Sequence[_FrameRow], policies: Sequence[str]) -> Frame:
     """Sort rows by policy run, task, options, episode and policy seed; return them as a frame.
 
-    The order must not depend on which episode ended first: random numbers of the bootstrap are
-    drawn for one group of rows after the other.
+    The order must not depend on which episode ended first, as tables and groups follow it.
 
     Args:
         rows: in any order.

@@ -41,8 +41,10 @@ from roboirg.analysis.results.option_labels import (
 from roboirg.analysis.results.run_cells import cells_of
 from roboirg.analysis.tables.arm_table import make_arm_table
 from roboirg.analysis.tables.facts_table import make_facts_table
+from roboirg.analysis.tables.rewriter_table import make_rewriter_table
 from roboirg.analysis.tables.subgoal_table import make_subgoal_table
 from roboirg.analysis.tables.table import (
+    PARTIAL_MARK,
     POLICY,
     Column,
     Entry,
@@ -50,8 +52,10 @@ from roboirg.analysis.tables.table import (
     Table,
     named_columns,
 )
+from roboirg.analysis.tables.table_notes import PARTIAL_NOTE
 from roboirg.core import failures
 from roboirg.core.errors import InvalidValueError
+from roboirg.language.settings import settings_of
 from roboirg.stats.cells import NOTHING, Key, rows_of
 from roboirg.stats.rates import (
     NOT_APPLICABLE,
@@ -59,6 +63,7 @@ from roboirg.stats.rates import (
     percent,
     percent_range,
 )
+from roboirg.tasks import all_tasks
 from roboirg.util.discovery import with_entries
 
 UNATTRIBUTED = "not attributed"
@@ -125,6 +130,7 @@ def make_forms_table(data: RunData) -> Table:
         InvalidValueError: no episode was played in both forms.
     """
     rows = []
+    notes = [_FORMS_NOTE]
     for average in _implicit_averages(data):
         gap = average.gap
         if gap is None:
@@ -140,7 +146,11 @@ def make_forms_table(data: RunData) -> Table:
         )
         cells = (*map(str, counts), *gap_words(gap, average.p_holm))
         key = average.key
-        group = f"{data.frame.names[key.policy_run]}, {key.scope}"
+        scope = key.scope
+        if gap.tasks < len(_tasks_with(key)) or not average.counts.is_complete:
+            scope += f" {PARTIAL_MARK}"
+            notes = [_FORMS_NOTE, PARTIAL_NOTE]
+        group = f"{data.frame.names[key.policy_run]}, {scope}"
         rows.append(Row(group, key.options.setting, cells))
     if not rows:
         raise InvalidValueError(
@@ -155,8 +165,17 @@ def make_forms_table(data: RunData) -> Table:
             "95 % interval", "p",
         ),
         rows=rows,
-        notes=(_FORMS_NOTE,),
+        notes=notes,
     )  # fmt: skip
+
+
+def _tasks_with(key: ScopeKey) -> list[str]:
+    """Return the tasks of a suite, or of all suites, that have a setting."""
+    found = []
+    for name, task in all_tasks().items():
+        if key.scope in (task.suite, ALL_TASKS) and key.options.setting in settings_of(task):
+            found.append(name)
+    return found
 
 
 def _implicit_averages(data: RunData) -> Sequence[ScopeSummary]:
@@ -483,7 +502,8 @@ _OURS = (
     RunTable("failure-names", make_failure_name_table),
     RunTable("heard", make_heard_table, " (how many prompts were cut)"),
     RunTable("arms", make_arm_table, " (what control arms show)"),
-    RunTable("subgoals", make_subgoal_table, " (of planners)"),
+    RunTable("subgoals", make_subgoal_table, " (of planners, and what models cost)"),
+    RunTable("rewriters", make_rewriter_table, " (the share of the gap that each closes)"),
     RunTable("facts", make_facts_table, " (what a methods section needs)"),
 )
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import operator
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
-
-import numpy as np
 
 from roboirg.analysis.comparability import AllDifferences, differences_of
 from roboirg.analysis.measures.chance import floor_level
@@ -49,8 +48,7 @@ from roboirg.core.errors import check_names
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.records.record import Job
-from roboirg.stats.cells import cell_interval
-from roboirg.stats.intervals import SEED
+from roboirg.stats.cells import rate_interval
 from roboirg.stats.rates import percent
 from roboirg.tasks import all_tasks, every_task
 
@@ -58,6 +56,16 @@ OWN_NAME = "RoboIRGBench"
 COVERAGE = "coverage"
 
 WHICH = (*PAPER_TABLES, COVERAGE)
+
+_read_fairness = operator.attrgetter(
+    "conditions.split",
+    "conditions.wordings",
+    "conditions.environment.max_steps",
+    "conditions.environment.meshes",
+    "language",
+    "versions.environment_version",
+)
+"""Returns what must be equal in a comparison of policies, as in `roboirg.records.mixing`."""
 
 
 def make_table(
@@ -141,19 +149,18 @@ def _policy_rows(table: PaperTable, columns: Sequence[Column], results: TableRes
 
     Averages over tasks are added where the table has columns for them.
     """
-    # One generator for all, so the resamples behind an interval depend on the entries before it.
-    rng = np.random.default_rng(SEED)
     rows = []
     for policy_run, options, label in table.subjects(results.shown, results.names):
         entries = {}
         for task in results.tasks:
             key = CellKey(policy_run, task, options)
-            entries[task] = _entry(key, results, rng)
-        rows.append(table.row(options, label, with_averages(columns, entries)))
+            entries[task] = _entry(key, results)
+        row = table.row(options, label, with_averages(columns, entries))
+        rows.append(replace(row, conditions=_read_fairness(policy_run)))
     return rows
 
 
-def _entry(key: CellKey, results: TableResults, rng: np.random.Generator) -> Entry:
+def _entry(key: CellKey, results: TableResults) -> Entry:
     """Return the table's entry for a policy in a task and setting: rate, interval, and marks.
 
     Marks show that some trials ended in an error or are missing. Without a planned episode the
@@ -172,8 +179,9 @@ def _entry(key: CellKey, results: TableResults, rng: np.random.Generator) -> Ent
         percent=None if rate is None else percent(rate),
         marks=marks,
         counts=cell.counts,
-        interval=cell_interval(cell, rng),
+        interval=rate_interval([cell]),
         differences=results.differences.get(key),
+        episodes=frozenset(cell.by_episode()),
     )
 
 
@@ -188,7 +196,8 @@ def _applies(task: str, options: InstructionOptions) -> bool:
 def _floor_rows(floor: str, columns: Sequence[Column], results: TableResults) -> Iterator[Row]:
     """Yield rows with the expected success of a listener that does not understand instructions.
 
-    There is a row for each setting and split that any policy played, over the same episodes.
+    There is a row for each setting and split that any policy played, over the same episodes; none
+    where the floor was not measured.
 
     Args:
         floor: which listener, such as ``chance``.
@@ -196,20 +205,26 @@ def _floor_rows(floor: str, columns: Sequence[Column], results: TableResults) ->
         results: of the policies.
     """
     judged = {key: cell for key, cell in results.shown.items() if cell.verdicts}
+    language = _only_language(judged)
     jobs = _jobs_by_instructions(judged)
-    # What learners reach was measured for each version of the language; with several it is unknown.
-    languages = {key.policy_run.language for key in judged}
-    language = languages.pop() if len(languages) == 1 else ""
-    has_several_splits = len({instructions.split for instructions in jobs}) > 1
+    splits = {instructions.split for instructions in jobs}
     for instructions in sorted(jobs, key=_instruction_order):
         options = instructions.options
         entries = _floor_entries(floor, options, results.tasks, jobs[instructions], language)
-        if all(entry.percent is None for entry in entries.values()):
-            continue  # the floor has not been measured
         name = floor
-        if has_several_splits:
+        if len(splits) > 1:
             name += f", split {instructions.split}"
-        yield Row(options.setting, name, with_averages(columns, entries), "chance")
+        if any(entry.percent is not None for entry in entries.values()):
+            yield Row(options.setting, name, with_averages(columns, entries), "chance")
+
+
+def _only_language(cells: Iterable[CellKey]) -> str:
+    """Return the version of the language in which some cells were played; empty with several.
+
+    What learners reach was measured for each version, so of several it is unknown.
+    """
+    languages = {key.policy_run.language for key in cells}
+    return languages.pop() if len(languages) == 1 else ""
 
 
 def _floor_entries(

@@ -33,6 +33,8 @@ _COSTS = {
     "missed": "misses",
 }
 """What a planner costs: keys of a record's usage, and their headings."""
+_FROM_WHOLE = 100
+"""Means from here on have no decimals."""
 _UNKNOWN_IF_ABSENT = ("input_tokens", "output_tokens", "cost_usd")
 """What a service may not report, so that the records of its replies lack it."""
 
@@ -59,11 +61,11 @@ def make_subgoal_table(data: RunData) -> Table:
     It has a row for each task in each setting of a policy, from the whole records of its episodes.
 
     Raises:
-        InvalidValueError: no record holds a subgoal, or the failure of a planner.
+        InvalidValueError: no record holds a subgoal, the failure of a planner, or a call.
     """
     counts_by_cell = _count_in_cells(data)
     if not counts_by_cell:
-        raise InvalidValueError("No planner of the runs named a subgoal; their records hold none.")
+        raise InvalidValueError("No policy of the runs named a subgoal or asked a model.")
     # Only failures and costs that occur have columns.
     occurring: set[str] = set()
     for counts in counts_by_cell.values():
@@ -81,7 +83,7 @@ def make_subgoal_table(data: RunData) -> Table:
         notes.append(f"Failed episodes, by what the planner did: {meanings}.")
     return Table(
         key="subgoals",
-        title="Subgoals of planners",
+        title="Subgoals of planners, and what models cost",
         heads=("policy and setting", "task"),
         columns=_columns(failures, costs),
         rows=rows,
@@ -130,8 +132,8 @@ def _count_in_cells(data: RunData) -> dict[CellKey, Counter[str]]:
 
 
 def _has_planner(counts: Counter[str]) -> bool:
-    """Return whether a planner named a subgoal or failed in the episodes that were counted."""
-    return any(counts[name] for name in (*SUBGOAL_VERDICTS, *PLANNER_FAILURES))
+    """Return whether a planner named a subgoal or failed, or a model was asked, in an episode."""
+    return any(counts[name] for name in (*SUBGOAL_VERDICTS, *PLANNER_FAILURES, "calls"))
 
 
 def _words(counts: Counter[str], failures: Iterable[str], costs: Iterable[str]) -> Iterator[str]:
@@ -152,5 +154,13 @@ def _words(counts: Counter[str], failures: Iterable[str], costs: Iterable[str]) 
     for failure in failures:
         yield str(counts[failure])
     for cost in costs:
-        mean = counts[cost] / counts["episodes"]  # NaN if an episode's cost is unknown
-        yield "unknown" if math.isnan(mean) else f"{mean:.3g}"
+        yield _mean_text(counts[cost] / counts["episodes"])
+
+
+def _mean_text(mean: float) -> str:
+    """Return a mean cost: ``0.0125``, ``4``, ``1234``; *unknown* for NaN, an unknown cost."""
+    if math.isnan(mean):
+        return "unknown"
+    if mean >= _FROM_WHOLE:
+        return f"{mean:.0f}"
+    return f"{mean:.3g}"

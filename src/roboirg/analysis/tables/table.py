@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Literal, NamedTuple
@@ -42,6 +42,7 @@ class Entry:
         interval: 95 %, of the rate; None if it is unknown.
         differences: from the published rate's conditions; None without a published rate.
         style: color of the text in a terminal, or empty.
+        episodes: which ones the rate is of, in any form that tells others apart; None if unknown.
     """
 
     percent: Decimal | None = None
@@ -54,6 +55,7 @@ class Entry:
     interval: Interval | None = None
     differences: Differences | None = None
     style: str = ""
+    episodes: Hashable = None
 
     @property
     def text(self) -> str:
@@ -111,12 +113,15 @@ class Row:
         name: of the row in its group.
         cells: one for each column, as an entry or as its word.
         source: origin of its rates.
+        conditions: what must be equal in rows that are compared, such as the split; None if nothing
+            is known to differ.
     """
 
     group: str
     name: str
     cells: Sequence[Entry | str]
     source: Source = "ours"
+    conditions: Hashable = None
 
     @property
     def position(self) -> tuple[str, str, Source]:
@@ -231,6 +236,7 @@ def average(entries: Sequence[Entry]) -> Entry:
         percent=mean_percent(rates),
         marks=PARTIAL_MARK if is_partial else "",
         differences=merged(entry.differences for entry in applying),
+        episodes=tuple(entry.episodes for entry in applying),
     )
 
 
@@ -282,12 +288,12 @@ def _with_change(entry: Entry, reference: Entry) -> Entry:
 def with_best(rows: Iterable[Row]) -> Iterator[Row]:
     """Yield rows, group by group, with the best entry of the group marked in each column.
 
-    Only rows of the same source compete: played policies with played ones, published with
-    published. None is the best if all have the same rate, only one has a rate, or one is
-    incomplete.
+    Only rows of the same source and conditions compete, such as published policies with published
+    ones. None is the best if all have the same rate, only one has a rate, one is incomplete, or
+    they are of different episodes.
     """
     for group in grouped(rows, lambda row: row.group):
-        for rivals in grouped(group, lambda row: row.source):
+        for rivals in grouped(group, lambda row: (row.source, row.conditions)):
             columns = zip(*(row.entries for row in rivals), strict=True)
             best_rates = list(map(_best_rate, columns))
             for row in rivals:
@@ -299,8 +305,15 @@ def with_best(rows: Iterable[Row]) -> Iterator[Row]:
 
 
 def _best_rate(rivals: Sequence[Entry]) -> Decimal | None:
-    """Return the best of several rates; None if they are equal, or if one is incomplete."""
-    rates = {entry.percent for entry in rivals if entry.percent is not None}
-    if len(rates) <= 1 or any(entry.marks for entry in rivals):
+    """Return the best of several rates; None if they are equal, or cannot be compared."""
+    rates = set()
+    episodes = set()
+    for entry in rivals:
+        if entry.marks:
+            return None
+        if entry.percent is not None:
+            rates.add(entry.percent)
+            episodes.add(entry.episodes)
+    if len(rates) <= 1 or len(episodes) > 1:
         return None
     return max(rates)

@@ -36,6 +36,7 @@ from roboirg.tasks import every_task
 RATES_NOTE = (
     "Success rate in percent, the mean over policy seeds; averages are unweighted means over tasks."
 )
+PARTIAL_NOTE = f"{PARTIAL_MARK} a partial average: a task is incomplete or was not played."
 _FLOORS_NOTE = (
     "Rows without a policy are expected success. chance: a guess among the goals that fit the "
     "command; first-mention, last-mention, elimination (a value that is not named), surface (key "
@@ -203,7 +204,7 @@ def _count_notes(cells: Sequence[Counts], entries: Sequence[Entry]) -> Iterator[
             f"{verb_for(missing, 'are')} still to be played."
         )
     if any(PARTIAL_MARK in entry.marks for entry in entries):
-        yield f"{PARTIAL_MARK} a partial average: a task is incomplete or was not played."
+        yield PARTIAL_NOTE
     if errors or missing:
         yield "Incomplete entries have no arrow, and their columns no best entry."
 
@@ -248,6 +249,9 @@ def _average_notes(columns: Sequence[Column], rows: Sequence[Row]) -> Iterator[s
     Such an average is compared with explicit's over the same tasks, which is not the one that is
     printed: the note warns of subtracting the two.
     """
+    played_rows = [row for row in rows if row.source == "ours"]
+    if played_rows:
+        rows = played_rows  # of what was played, whatever the paper or the floors have
     played = []  # the numbers of the columns of tasks that were played
     for number, column in enumerate(columns):
         has_rate = any(row.entries[number].percent is not None for row in rows)

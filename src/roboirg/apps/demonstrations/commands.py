@@ -18,6 +18,7 @@ from roboirg.cli.options import (
     Workers,
     add_working_directory,
 )
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
@@ -41,7 +42,10 @@ _TEST_WORDS = (
 
 def export_demonstrations(
     context: typer.Context,
-    out: Annotated[Path, typer.Option(help="Folder of the dataset.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the dataset.", show_default="required, but for --dry-run"),
+    ] = None,
     format: Annotated[  # noqa: A002
         str,
         typer.Option(help="One of {roboirg.apps.demonstrations.export_format:export_formats}."),
@@ -88,15 +92,17 @@ def export_demonstrations(
         tasks=names,
         split=split,
         episodes=parse_episodes(words.given("episodes", episodes), split, names),
-        settings=words.settings(settings),
+        settings=words.settings(settings, names),
         forms=words.forms(),
         options=training_words(split, words.options()),
         format=format,
         pictures=cast("Any", pictures),
         **chosen,
     ).validated()
+    if out is None and not dry_run:
+        raise InvalidValueError("No folder given; name one with --out, such as data.")
     _print_size(export_plan)
-    if not dry_run:
+    if out is not None and not dry_run:
         _export(export_plan, out, workers, trajectories)
 
 

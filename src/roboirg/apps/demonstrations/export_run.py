@@ -46,6 +46,7 @@ from roboirg.policies.builtin.waypoint_expert import (
 from roboirg.util.atomic_write import locked, write_atomically
 from roboirg.util.parallel_map import parallel_map
 from roboirg.util.parquet_support import check_parquet_support
+from roboirg.util.regular_file import read_regular
 
 WORK_FOLDER = ".export"
 EXPORT_FILE = "meta/export.json"
@@ -191,7 +192,7 @@ def _opened(plan: ExportPlan, out: Path) -> Iterator[Path]:
 def _read_fingerprint(path: Path) -> str | None:
     """Return the fingerprint of an export in a file; None if there is none."""
     try:
-        return str(json.loads(path.read_text(encoding="utf-8"))["fingerprint"])
+        return str(json.loads(read_regular(path))["fingerprint"])
     except (OSError, ValueError, KeyError):
         return None
 

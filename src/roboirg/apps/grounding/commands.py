@@ -65,9 +65,10 @@ def export_grounding(
     words = PlanWords(context, plan, "grounding", ("every_variant", "frames", "frames_every"))
     options = words.options()
     check_options(options)
+    names = words.tasks(tasks, options.wordings)
     request = ExportRequest(
-        episodes=_episode_names(words, words.tasks(tasks, options.wordings), split),
-        settings=words.settings(settings),
+        episodes=_episode_names(words, names, split),
+        settings=words.settings(settings, names),
         forms=words.forms(),
         options=options,
         wordings_file=words.fields.get("wordings"),

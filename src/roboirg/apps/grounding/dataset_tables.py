@@ -12,6 +12,7 @@ import msgspec
 from roboirg.apps.grounding.items.grounding_item import GroundingItem
 from roboirg.util.atomic_write import replacing
 from roboirg.util.parquet_support import check_parquet_support
+from roboirg.util.regular_file import read_regular
 
 DATA = "data"
 ROWS_PER_GROUP = 256
@@ -73,7 +74,7 @@ class _PictureFiles:
         ``{"bytes": b"…", "path": "pictures/3f9c.png"}``, the path as items have it.
         """
         if path not in self._contents:
-            self._contents[path] = (self._folder / path).read_bytes()
+            self._contents[path] = read_regular(self._folder / path)
         return {"bytes": self._contents[path], "path": path}
 
 

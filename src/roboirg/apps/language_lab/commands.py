@@ -55,7 +55,7 @@ def export_instructions(
     words = PlanWords(context, plan)
     options = words.options()
     names = words.tasks(tasks, options.wordings)
-    chosen = words.settings(settings)
+    chosen = words.settings(settings, names)
     episodes = list(split_episodes(names, parse_splits(words.given("split", split))))
     rows = rows_of(episodes, chosen, words.forms(FORMS), options)
     if not rows:
@@ -128,7 +128,7 @@ def score_shortcuts(
         scenes = LEARNING_SCENES
     options = replace(words.options(), form=words.form())
     names = words.tasks(tasks, options.wordings)
-    chosen = words.settings(settings)
+    chosen = words.settings(settings, names)
     rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learning=scenes)
     if not rows:
         raise InvalidValueError(
@@ -139,7 +139,12 @@ def score_shortcuts(
 
 
 def _sources(splits: Sequence[str], seeds: int) -> str:
-    """Return which scenes are scored, for a title: ``test and 200 random scenes per task``."""
+    """Return which scenes are scored, for a title: ``test and 200 random scenes per task``.
+
+    Args:
+        splits: names.
+        seeds: number of random scenes for each task; 0 for none.
+    """
     sources = list(splits)
     if seeds:
         sources.append(f"{seeds:,} random scenes per task")
@@ -270,7 +275,8 @@ def sample_texts(
     from roboirg.apps.language_lab.scenarios.rating_sample import RATERS, draw_sample, key, sheet
     from roboirg.util.atomic_write import write_atomically
 
-    texts = draw_sample(known_tasks(tasks), known_settings(settings), seed)
+    names = known_tasks(tasks)
+    texts = draw_sample(names, known_settings(settings, names), seed)
     if not texts:
         raise InvalidValueError(f"There are no words of {tasks} in {settings}.")
     for rater in RATERS:

@@ -48,7 +48,7 @@ def expression_counts(instructions: Iterable[Instruction]) -> ClassCounts:
 
 
 def expression_order(counts: ClassCounts) -> tuple[str, ...]:
-    """Return the classes that occur, in the order of their definition."""
+    """Return the classes of referring expressions that have counts, as `Expression` orders."""
     found = classes_in(counts)
     return tuple(name for name in get_args(Expression) if name in found)
 
@@ -62,10 +62,10 @@ def classes_in(counts: ClassCounts) -> set[str]:
 
 
 def metadata_counts(instructions: Iterable[Instruction], name: str) -> ClassCounts:
-    """Return how often each value of a metadata entry occurs, by task.
+    """Return how often each value of an entry of the instructions' metadata occurs, by task.
 
     For the entry ``relation``: ``{"StopCube": {"one later": 7}}``. If an entry is a list, each of
-    its values counts; None does not.
+    its values counts; None does not, and instructions without the entry do not.
     """
     counts: dict[str, Counter[str]] = {}
     for instruction in instructions:

@@ -33,7 +33,10 @@ def rows_of(
     forms: Sequence[str],
     options: InstructionOptions,
 ) -> list[ExportRow]:
-    """Return a row for each instruction that episodes have in some settings and forms."""
+    """Return a row for each instruction that episodes have in some settings and forms.
+
+    Settings that a task lacks, or that cannot express an episode, have none.
+    """
     said = instructions(episodes, settings, forms, options)
     return [row(episode, instruction) for episode, instruction in said]
 
@@ -49,7 +52,12 @@ def encode(rows: Sequence[ExportRow], kind: ExportFormat) -> bytes:
 
 
 def format_of(path: Path) -> ExportFormat:
-    """Return the format that the ending of a file names, if it can be written here."""
+    """Return the format that the ending of a file names: ``words.parquet`` gives ``parquet``.
+
+    Raises:
+        UnknownNameError: no format has that ending.
+        MissingDependencyError: it needs a package that is not installed.
+    """
     kind = known_name("format", path.suffix.removeprefix("."), EXPORT_FORMATS)
     if kind == "parquet":
         check_parquet_support()
@@ -57,14 +65,15 @@ def format_of(path: Path) -> ExportFormat:
 
 
 def _jsonl(rows: Sequence[ExportRow]) -> bytes:
-    """Return a line of JSON for each row."""
+    """Return a line of JSON for each row, in UTF-8."""
     return "".join(f"{json.dumps(columns, ensure_ascii=False)}\n" for columns in rows).encode()
 
 
 def _parquet(rows: Sequence[ExportRow]) -> bytes:
-    """Return the content of a Parquet file with the rows; all have the columns of the first one.
+    """Return the content of a Parquet file with the rows.
 
-    Columns are texts unless `_NUMBERS` or a list of columns next to it names them.
+    All rows must have the columns of the first one. Columns are texts unless `_NUMBERS` or one of
+    the lists of columns next to it names them.
     """
     check_parquet_support()
     import pyarrow as pa

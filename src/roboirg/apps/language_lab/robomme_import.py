@@ -51,11 +51,15 @@ def _wording_text(function: SentenceFunction, name: str) -> str:
     """Return the text of a wording file, TOML, with RoboMME's sentence for each goal.
 
     Each goal has an entry such as ``[[literal]]``, ``task = "PickXtimes"``, ``when = { color =
-    "red", repeats = 2 }``, ``text = "Pick up the red cube twice."``.
+    "red", repeats = 2 }``, ``text = "Pick up the red cube twice."``. The file is read again by
+    `parse_wordings`.
 
     Args:
         function: RoboMME's, which returns the sentences.
         name: of the wordings.
+
+    Raises:
+        InvalidValueError: the function does not give one usable sentence for each goal.
     """
     tasks = all_tasks()
     source = f"The first sentences of {FUNCTION} in RoboMME's repository."
@@ -80,6 +84,8 @@ def _wording_text(function: SentenceFunction, name: str) -> str:
 def _load_function(root: Path) -> SentenceFunction:
     """Return the function `get_language_goal` of a clone of RoboMME's repository.
 
+    The file with it is executed, as nothing else gives its sentences.
+
     Raises:
         InvalidValueError: the folder lacks its file, or the file cannot be loaded or lacks it.
     """
@@ -100,6 +106,9 @@ def _load_function(root: Path) -> SentenceFunction:
 
 def _sentences(function: SentenceFunction, task: Task) -> dict[Goal, str]:
     """Return RoboMME's sentence for every goal that the published scenes of a task allow.
+
+    Goals count only in scenes whose own goal has as many fields, since the difficulty decides how
+    many picks or colors a goal has.
 
     Raises:
         InvalidValueError: the function gives two sentences for a goal, or none.
@@ -131,6 +140,12 @@ def _published_episodes(task: Task) -> Iterator[PublishedEpisode]:
 
 def _first_sentence(function: SentenceFunction, task: str, goal: Goal, difficulty: str) -> str:
     """Return the first sentence that RoboMME's function gives for a goal of a task.
+
+    Args:
+        function: RoboMME's ``get_language_goal``.
+        task: name.
+        goal: to be said.
+        difficulty: of the episode, ``hard``; the sentence may depend on it.
 
     Raises:
         InvalidValueError: the function raises, or does not return sentences.

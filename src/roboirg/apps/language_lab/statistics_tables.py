@@ -15,7 +15,7 @@ from roboirg.language.settings import setting_names
 from roboirg.language.token_counts import SHORT_LIMIT, USUAL_LIMIT, count_tokens
 from roboirg.tasks import every_task
 
-_BY_TASK = {
+_METADATA_ENTRY_BY_TITLE = {
     "Reasoning patterns (scenes)": "pattern",
     "Relations (scenes)": "relation",
     "Landmark classes (targets)": "landmark_classes",
@@ -27,12 +27,13 @@ _BY_TASK = {
 def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
     """Yield tables for the terminal: lengths of the texts, and how often each kind of words occurs.
 
-    A table that would be empty is left out.
+    They are by setting, and those of metadata entries, such as ``pattern``, by task. Of the latter,
+    a table of an entry that no instruction has is left out.
     """
     yield _word_count_table(instructions)
     yield _token_count_table(instructions)
     yield expression_table(corpus_statistics.expression_counts(instructions))
-    for title, name in _BY_TASK.items():
+    for title, name in _METADATA_ENTRY_BY_TITLE.items():
         counts = corpus_statistics.metadata_counts(instructions, name)
         if counts:
             classes = sorted(corpus_statistics.classes_in(counts))
@@ -82,19 +83,19 @@ def _token_count_table(instructions: Sequence[Instruction]) -> Table:
 
 
 def _share_over(counts: Sequence[int], limit: int) -> str:
-    """Return how many counts are over a limit: ``12.5%``."""
+    """Return which share of counts is over a limit, as a percentage: ``12.5%``."""
     return f"{fmean(count > limit for count in counts):.1%}"
 
 
 def _count_table(
     title: str, kind: str, counts: ClassCounts, rows: Sequence[str], columns: Sequence[str]
 ) -> Table:
-    """Return a table of counts, such as how often each setting uses each class of expression.
+    """Return a table of counts: how often each setting uses each class of expression, for example.
 
     Args:
         title: above the table.
-        kind: heads the first column: what the rows are.
-        counts: by row, then by column.
+        kind: heads the first column: what the rows are, ``setting``.
+        counts: by row, then by column: ``{"direct": {"it": 50}}``.
         rows: names of all rows in order; those without counts are left out.
         columns: names of all columns in order; those without counts are left out.
     """
@@ -109,7 +110,13 @@ def _count_table(
 
 
 def _table(title: str, first: str, numbers: Sequence[str]) -> Table:
-    """Return an empty table with a column of names, and columns of numbers."""
+    """Return an empty table with a column of names, and columns of numbers.
+
+    Args:
+        title: above the table.
+        first: heads the column of names.
+        numbers: head the columns of numbers.
+    """
     table = Table(title=title, title_justify="left", title_style="bold")
     table.add_column(first)
     for name in numbers:

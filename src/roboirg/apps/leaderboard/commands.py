@@ -40,11 +40,13 @@ def verify(
     Example: roboirg leaderboard verify runs/first --sample 10%
     """
     from roboirg.apps.leaderboard.run_verification import verify_run
+    from roboirg.records.action_log import ACTION_FOLDER
     from roboirg.records.packs import opened_run
     from roboirg.records.run_files import run_folder
     from roboirg.util.processor import worker_count
 
-    with opened_run(run_folder(run)) as folder, progress_bar("records") as show:
+    opened = opened_run(run_folder(run), [ACTION_FOLDER])
+    with opened as folder, progress_bar("records") as show:
         verification = verify_run(
             folder,
             sample=_share(sample),

@@ -6,18 +6,20 @@ checked by playing them again. Each difference is a *finding*, one sentence.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+import msgspec
 import numpy as np
 
 from roboirg.apps.leaderboard.action_replay import prepared_job, replay
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.versions import WORDS
 from roboirg.records.action_log import ActionLog, read_actions
-from roboirg.records.record import Record
+from roboirg.records.record import Record, UtteranceRecord
 from roboirg.records.record_codec import read_record
 from roboirg.records.store import RECORDS_FILE
 from roboirg.runs.job_instruction import (
@@ -52,7 +54,7 @@ _WORD_FACTS = ("metadata", "words", "attribution")
 """Of all these, those that follow from words, which cannot be checked if others are installed. What
 was said is then taken from the record, and only when it was heard is checked."""
 
-_MOST_SHOWN = 160
+_MOST_SHOWN = 1000
 """Characters of a value in a finding."""
 
 
@@ -147,7 +149,7 @@ def _version_findings(record: Record) -> Iterator[str]:
             f"words: the record says {record.words!r}, which are no words of {record.words_owner}."
         )
     if record.words != record.metadata.get("words"):
-        yield "words: the record and its metadata name different ones."
+        yield _difference("words", record.words, record.metadata.get("words"))
 
 
 def _check_unplayed(record: Record, *, has_actions: bool) -> RecordCheck:
@@ -190,10 +192,16 @@ def _check_played(record: Record, log: ActionLog) -> RecordCheck:
     has_same_hash = record.end_state == again.end_state
     verdict = _verdict(deviation, has_same_hash=has_same_hash, is_elsewhere=is_elsewhere)
     if verdict == "different":
-        findings.append(f"end_state: when played again, it differs by {deviation:.2g} (m, rad, s).")
+        # The hash covers more than the numbers, so it is compared after them.
+        stored_end = (*log.end_state.tolist(), record.end_state)
+        played_end = (*played.end_state.tolist(), again.end_state)
+        findings.append(_difference("end_state", stored_end, played_end))
     is_as_long = len(played.rows) == len(log.rows)
     if not (is_as_long and np.array_equal(played.requests, log.requests)):
-        findings.append("actions: some of them come after the end of the episode.")
+        findings.append(
+            "actions: some of them come after the end of the episode, which takes "
+            f"{len(played.rows)} of {len(log.rows)}."
+        )
     return RecordCheck(record.slug, tuple(findings), verdict, deviation, may_move_differently)
 
 
@@ -237,9 +245,9 @@ def _verdict(deviation: float, *, has_same_hash: bool, is_elsewhere: bool) -> Re
     return "different"
 
 
-def _utterances(record: Record) -> tuple[tuple[str, str], ...]:
-    """Return the stage and the text of each utterance of a record."""
-    return tuple((utterance.stage, utterance.text) for utterance in record.instruction)
+def _utterances(record: Record) -> tuple[UtteranceRecord, ...]:
+    """Return the utterances of a record without the steps at which they were heard."""
+    return tuple(msgspec.structs.replace(said, step=None) for said in record.instruction)
 
 
 def _differences(record: Record, expected: Record, fields: tuple[str, ...]) -> Iterator[str]:
@@ -251,14 +259,26 @@ def _differences(record: Record, expected: Record, fields: tuple[str, ...]) -> I
             yield _difference(name, value, expected_value)
 
 
-def _difference(name: str, recorded: object, expected: object) -> str:
-    """Return the finding that a field of a record is not as it should be."""
-    return f"{name}: the record says {_short(recorded)}; it should be {_short(expected)}."
+def _difference(place: str, recorded: object, expected: object) -> str:
+    """Return a finding that names where two values first differ, and what stands there in both.
+
+    If the second of three events differs, that is ``events, entry 2: the record says Event(…); it
+    should be Event(…).`` In mappings the place is named by its key, ``goal.count``. What is missing
+    in one of them is None.
+    """
+    if isinstance(recorded, tuple) and isinstance(expected, tuple):
+        pairs = itertools.zip_longest(recorded, expected)
+        for number, (entry, expected_entry) in enumerate(pairs, start=1):
+            if entry != expected_entry:
+                return _difference(f"{place}, entry {number}", entry, expected_entry)
+    if isinstance(recorded, dict) and isinstance(expected, dict):
+        for key in {**recorded, **expected}:
+            if recorded.get(key) != expected.get(key):
+                return _difference(f"{place}.{key}", recorded.get(key), expected.get(key))
+    return f"{place}: the record says {_short(recorded)}; it should be {_short(expected)}."
 
 
 def _short(value: object) -> str:
-    """Return a value as a text of limited length; of several entries, their number and the last."""
-    if isinstance(value, tuple) and len(value) > 1:
-        return f"{len(value)} entries, the last {_short(value[-1])}"
+    """Return a value as a text of limited length."""
     text = repr(value)
     return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}…"

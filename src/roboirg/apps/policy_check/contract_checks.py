@@ -30,6 +30,7 @@ from roboirg.policies.by_name.finding import look_up, read_policy
 from roboirg.policies.contract.batch_policy import BatchedEpisode
 from roboirg.policies.contract.policy_calls import policy_metadata, policy_subgoal, policy_usage
 from roboirg.policies.contract.policy_version import read_version
+from roboirg.policies.prompt_length.tokenizer_file import prompt_limit
 
 
 def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
@@ -47,7 +48,8 @@ def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
     except (Exception, SystemExit) as error:  # the policy's own code runs here
         raise CheckAbortedError("loads", "fail", describe_error(error)) from error
     if missing:
-        raise CheckAbortedError("loads", "fail", f"It has no {missing[0]}().")
+        words = f"Expected reset() and act(), got no {missing[0]}()."
+        raise CheckAbortedError("loads", "fail", words)
     if hasattr(policy, "attach"):
         raise CheckAbortedError(
             "loads", "note", "It is privileged: it needs a simulator, which is not available here."
@@ -63,6 +65,7 @@ def check_requirements(player: PolicyPlayer) -> Iterator[CheckResult]:
     """
     try:
         needs = PolicyNeeds.of(player.policy)
+        prompt_limit(needs)  # raises if the tokenizer cannot be read
     except RoboIRGError as error:
         raise CheckAbortedError("requirements", "fail", str(error)) from error
     player.needs = needs
@@ -127,23 +130,25 @@ def _describe_actions(
         rollout: what the policy returned.
     """
     sizes = [len(chunk) for chunk in rollout.chunks]
-    outside = 0
-    for chunk in rollout.chunks:
-        is_outside = (chunk < space.low) | (chunk > space.high)
-        outside += int(is_outside.any(axis=1).sum())
     yield CheckResult(
         f"acts {when}",
         "pass",
         f"Chunks of {', '.join(map(str, sizes))} actions of {space.size} numbers, "
         f"{rollout.dtype}, all finite.",
     )
+    actions = np.concatenate(rollout.chunks)
+    excess = np.maximum(space.low - actions, actions - space.high)  # above 0 outside the range
+    outside = int((excess > 0).any(axis=1).sum())
     if outside:
+        row, column = np.unravel_index(excess.argmax(), excess.shape)
         have = verb_for(outside, "have")
         yield CheckResult(
             f"range {when}",
             "note",
-            f"{outside} of {counted(sum(sizes), 'action')} {have} a number outside the usual "
-            f"range of {space.name}; the robot executes them as well as it can.",
+            f"{outside} of {counted(len(actions), 'action')} {have} a number outside the usual "
+            f"range of {space.name}; farthest is value {column} of action {row}: expected "
+            f"{space.low[column]:.3g} to {space.high[column]:.3g}, got "
+            f"{actions[row, column]:.3g}. The robot executes them as well as it can.",
         )
 
 
@@ -182,7 +187,7 @@ def check_determinism(player: PolicyPlayer) -> Iterator[CheckResult]:
         yield CheckResult(
             "deterministic",
             "fail",
-            f"Two equal episodes differ by up to {difference}; if that is intended, set "
+            f"Two equal episodes differ: {difference}; if that is intended, set "
             "deterministic = False.",
         )
     else:
@@ -210,13 +215,13 @@ def check_reset(player: PolicyPlayer) -> Iterator[CheckResult]:
     before = player.play(name, player.without_video, calls=2 * CALLS).chunks
     if _has(before, after.chunks[0]) and not _has(before, expected.chunks[0]):
         message = (
-            "The first answer after reset() belongs to the previous episode: a queue of actions "
-            "outlives the episode; empty it in reset()."
+            f"The first answer after reset(), {describe_difference(expected, after)}, belongs to "
+            "the previous episode: a queue of actions outlives the episode; empty it in reset()."
         )
     else:
         message = (
-            "A second episode with the same object differs by up to "
-            f"{describe_difference(expected, after)} from the same episode played first."
+            "A second episode with the same object differs from the same episode played first: "
+            f"{describe_difference(expected, after)}."
         )
     yield CheckResult(name, "fail", message)
 

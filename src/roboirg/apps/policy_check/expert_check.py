@@ -53,11 +53,12 @@ def check_expert(player: PolicyPlayer, record: RecordExpert | None) -> Iterator[
     still_error = _error(holding_still, moments)
     answer_error = _error(answers, moments)
     unit = "rad" if player.space is JOINT_ANGLE else "m"
+    most = FITS * still_error
     yield CheckResult(
         _NAME,
-        "pass" if answer_error <= FITS * still_error else "note",
-        f"At {len(moments)} moments of an expert's episode the answers are {answer_error:.3g} "
-        f"{unit} from what it did; holding still would be {still_error:.3g}.",
+        "pass" if answer_error <= most else "note",
+        f"Distance from what an expert did at {len(moments)} moments: expected at most {most:.3g} "
+        f"{unit}, half of that of holding still, got {answer_error:.3g}.",
     )
 
 
@@ -105,15 +106,14 @@ def _check_gripper(answers: Chunks, moments: list[ExpertMoment]) -> Iterator[Che
     gap = GRIPPER_GAP * (given.max() - given.min())
     if gap > 0 and opened.max() + gap < closed.min():
         message = (
-            f"It is {closed.min():.2g} or more whenever the expert holds a cube and "
-            f"{opened.max():.2g} or less whenever its gripper is open; +1 opens and -1 closes, so "
-            "change the sign."
+            "Expected +1 whenever the expert's gripper is open and -1 whenever it holds a cube, "
+            f"got {opened.max():.2g} or less and {closed.min():.2g} or more; change the sign."
         )
     elif gap > 0 and closed.max() + gap < opened.min() and closed.min() > -gap:
         message = (
-            f"It is between {closed.min():.2g} and {closed.max():.2g} whenever the expert holds a "
-            "cube; -1 closes and 0 leaves it half open, so stretch the range from 0 ... 1 (or from "
-            "meters) to -1 ... +1."
+            "Expected -1 whenever the expert holds a cube, got "
+            f"{closed.min():.2g} to {closed.max():.2g}, and 0 leaves it half open; stretch the "
+            "range from 0 ... 1 (or from meters) to -1 ... +1."
         )
     else:
         return

@@ -10,10 +10,12 @@ import numpy as np
 
 from roboirg.apps.policy_check.check_result import ending_checks
 from roboirg.apps.policy_check.expert_episode import ExpertEpisode, Rows
-from roboirg.core.actions import ActionSpace, check_chunk
+from roboirg.core.actions import ActionSpace
+from roboirg.core.plain_text import counted
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies.by_name.finding import make_policy
 from roboirg.policies.contract.base import Policy, close_policy
+from roboirg.policies.contract.policy_calls import check_rows
 from roboirg.policies.contract.synthetic_episodes import SyntheticEpisode, SyntheticEpisodes
 
 CALLS = 3
@@ -122,7 +124,7 @@ class PolicyPlayer:
         for _ in range(calls):
             with ending_checks(check, "act(): "):
                 actions = policy.act(observation)
-                chunk = check_chunk(actions, self.space)
+                chunk = check_rows(actions, self.space)
             chunks.append(chunk.copy())  # a policy may reuse its array
             dtype = str(np.asarray(actions).dtype)
             observation = episodes.after(episode, len(chunk))
@@ -138,7 +140,7 @@ class PolicyPlayer:
         answers: Chunks = []
         for moment in episode.moments:
             actions = policy.act(copy.deepcopy(moment.observation))
-            answers.append(check_chunk(actions, self.space).copy())
+            answers.append(check_rows(actions, self.space).copy())
         return answers
 
     def make_fresh(self) -> Policy:
@@ -163,14 +165,19 @@ def are_equal(one: SyntheticRollout, other: SyntheticRollout) -> bool:
     return all(map(np.array_equal, one.chunks, other.chunks))
 
 
-def describe_difference(one: SyntheticRollout, other: SyntheticRollout) -> str:
-    """Return the largest difference of two rollouts in words, such as ``0.012``.
+def describe_difference(expected: SyntheticRollout, other: SyntheticRollout) -> str:
+    """Return where two rollouts first differ, with the numbers of both.
 
-    If their chunks have different shapes, it is ``the number of actions``.
+    An example is ``value 3 of row 0 in answer 2: expected 0.1, got 0.112``, or where an answer has
+    another number of actions, ``answer 1: expected 5 actions, got 4``. Answers are counted from 1,
+    rows and values from 0. It is empty if they are equal.
     """
-    largest = 0.0
-    for chunk, other_chunk in zip(one.chunks, other.chunks, strict=True):
-        if chunk.shape != other_chunk.shape:
-            return "the number of actions"
-        largest = max(largest, float(np.abs(chunk - other_chunk).max()))
-    return f"{largest:.3g}"
+    for answer, (chunk, got) in enumerate(zip(expected.chunks, other.chunks, strict=True), 1):
+        if len(chunk) != len(got):
+            return f"answer {answer}: expected {counted(len(chunk), 'action')}, got {len(got)}"
+        for row, column in np.argwhere(chunk != got):
+            return (
+                f"value {column} of row {row} in answer {answer}: expected "
+                f"{chunk[row, column]:.6g}, got {got[row, column]:.6g}"
+            )
+    return ""

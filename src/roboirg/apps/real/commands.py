@@ -50,10 +50,11 @@ def plan(
     from roboirg.tasks import find_tasks
 
     has_all_settings = settings.strip().lower() == ALL
+    names = find_tasks(parse_names("task", tasks))
     study = make_study(
         policy,
-        tasks=find_tasks(parse_names("task", tasks)),
-        settings=None if has_all_settings else known_settings(settings),
+        tasks=names,
+        settings=None if has_all_settings else known_settings(settings, names),
         trials=trials,
         demonstrations=demonstrations,
         seed=seed,

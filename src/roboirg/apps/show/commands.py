@@ -50,9 +50,8 @@ def show(
     options = word_options(**context.obj)
     check_options(options)
     task_settings = settings_of(get_task(task))
-    chosen = known_settings(settings)
-    # Without any that the task has, the first refusal of one says why.
-    shown = [setting for setting in chosen if setting in task_settings] or chosen
+    chosen = known_settings(settings, [task])
+    shown = [setting for setting in chosen if setting in task_settings]
     if words:
         _print_words(found, shown, options)
         return

@@ -1,9 +1,13 @@
-"""The fields of the goal that words leave to their context, and their terms.
+"""Which fields of the goal a command leaves to what was said before, and how they follow from it.
 
-Most fields of a command are those of the goal. That of amounts holds several, colors with their
-counts: a scenario leaves all of them open, ``<them amounts: them>``, or it states the counts and
-leaves the first colors, ``{counts.0} of <them colors.0: them>``. Colors of which it says nothing
-are stated after its words: *two of that color and one green one*.
+Most fields of a command, such as ``color``, are those of the goal. One holds several: ``cubes``,
+for goals that count cubes, has *amounts*, colors with their counts, such as *2 red and 1 blue*.
+Its words leave all of them open, ``<them amounts: them>``, or they state the counts and leave the
+first colors open, ``{counts.0} of <them colors.0: them>``. Colors of which they say nothing are
+stated after them: *two of that color and one green one*.
+
+``<them amounts: them>`` is a pointer: words that point back (an anaphor), after their class and the
+slot that they stand for.
 """
 
 from __future__ import annotations
@@ -14,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from roboirg.language.instruction import Term
 from roboirg.language.scenarios.declared import (
     ChoosingRemark,
-    SaidValues,
+    DiscourseHistory,
     chosen_term,
     pointed_term,
 )
@@ -35,27 +39,50 @@ _NOUNS = ("cube", "one", "one")
 
 
 def amount_texts(numbers: str, size: int) -> list[Text]:
-    """Return the text for each of some colors in a list: *two red cubes*, *one blue one*."""
+    """Return the texts that name some colors with their numbers: *two red cubes*, *one blue one*.
+
+    Args:
+        numbers: the slot of the numbers, ``counts``.
+        size: how many colors.
+
+    Returns:
+        A text with slots for each, ``{counts.0} {colors.0} [counts.0: cube|cubes]``.
+    """
     return [amount_text(numbers, at, _NOUNS[at]) for at in range(size)]
 
 
 @functools.cache  # the same few for every episode
 def amount_text(numbers: str, at: int, noun: str = "cube") -> Text:
-    """Return a color with its number and a noun, to be filled: *two red cubes*."""
+    """Return the text that names a color with its number, with slots to be filled.
+
+    ``{counts.0} {colors.0} [counts.0: cube|cubes]`` becomes *two red cubes*.
+
+    Args:
+        numbers: the slot of the numbers, ``counts``.
+        at: index of the color.
+        noun: in the singular.
+    """
     number = f"{numbers}.{at}"
     return parse(f"{{{number}}} {{colors.{at}}} [{number}: {noun}|{noun}s]")
 
 
 def stated_counts(words: Text) -> int:
-    """Return how many counts words state: 1 for ``{counts.0} of <them colors.0: them>``."""
+    """Return for how many colors some words state the count.
+
+    1 for ``{counts.0} of <them colors.0: them>``, *two of them*.
+    """
     return len([slot for slot in slots_said(words) if slot.name.startswith("counts.")])
 
 
 def hidden_fields(words: Text, fields: Sequence[str]) -> Sequence[str]:
-    """Return those of a command's fields whose values its words leave to what was said before.
+    """Return the fields of the goal whose values some words leave to what was said before.
 
-    *it* leaves all of them; *two of them*, which states a count, leaves ``colors.0``; words that do
-    not point back leave none.
+    *it* leaves all of `fields` open; *two of them*, which states a count, leaves ``colors.0``;
+    *the red cube*, which does not point back, leaves none.
+
+    Args:
+        words: for a field of the command.
+        fields: of the goal that this field holds: itself, or colors and counts.
     """
     if not any(pointers_in(words)):
         return ()
@@ -65,35 +92,45 @@ def hidden_fields(words: Text, fields: Sequence[str]) -> Sequence[str]:
     return fields
 
 
-def hidden_term(field: str, words: Text, remark: ChoosingRemark | None, said: SaidValues) -> Term:
-    """Return the term of a field: how its value follows from what was said before.
+def hidden_term(
+    field: str, words: Text, remark: ChoosingRemark | None, history: DiscourseHistory
+) -> Term:
+    """Return how the value of a field follows from what was said before, as a term to compute.
 
-    Of *Red or blue? Take the latter.*, the field ``color`` has the second of the listed values.
+    After *Red or blue?*, the words *the latter* give the field ``color`` the second of the two:
+    ``Term("rank", ("red", "blue"), rank=2)``.
 
     Args:
-        field: of the goal, which the command leaves to its context.
-        words: for the field of the command that holds it, with the words that point back.
-        remark: words before the command that have chosen one of a list, if there are any.
-        said: what was said before.
+        field: of the goal; one of `hidden_fields`.
+        words: for the field of the command that holds it; they point back.
+        remark: words before the command that have chosen one of a list of two, if there are any.
+        history: what was named before.
+
+    Raises:
+        LookupError: the words point back too few times.
     """
     base, _, number = field.partition(".")
     pointer = _pointer_of(field, words)
+    # The slot of the numbers, if the pointer is for several colors, each with its number.
     numbers_slot = NUMBERS.get(pointer.of)
     if numbers_slot and base == "colors":
-        return Term("same", said.operands(field))  # "the same ones": each color as it was said
+        return Term("same", history.operands(field))  # "the same ones": each color as it was said
     if remark:
-        return chosen_term(pointer, remark, said)
-    if numbers_slot:
+        return chosen_term(pointer, remark, history)
+    if numbers_slot:  # "half as many": of the number of this color
         pointer = pointer._replace(of=f"{numbers_slot}.{number or 0}")
-    return pointed_term(pointer, said)
+    return pointed_term(pointer, history)
 
 
 def _pointer_of(field: str, words: Text) -> Pointer:
-    """Return which of a command's words that point back stand for a field of the goal.
+    """Return which pointer in some words stands for a field of the goal.
 
-    Next to stated counts, *two of those and one of these*, the first are for ``colors.0`` and the
-    second for ``colors.1``. Else the last ones are for all fields. Raises LookupError if there are
-    too few.
+    A pointer is words that point back. If counts are stated, *two of those and one of these*, the
+    first one is for ``colors.0`` and the second one for ``colors.1``. Else the last one is for all
+    fields.
+
+    Raises:
+        LookupError: there are too few.
     """
     pointers = list(pointers_in(words))
     if not stated_counts(words):

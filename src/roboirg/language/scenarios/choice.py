@@ -1,11 +1,12 @@
-"""Choose what is said of an episode: a scenario, and an offer that it says.
+"""Choose what is said of an episode: a scenario, and the content plan that it puts into words.
 
-All scenarios are equally likely, so that no frame, which is the name of a scenario, goes with a
-value.
+All scenarios are equally likely, so that no situation, such as a school trip, goes with a value.
 
-- *scenario*: what a person says of a task, with slots for values.
-- *offer*: one way to lead to the goal: which fields of the command can point back, and at what.
-- *match*: a scenario with an offer that it can say; one match of an episode is drawn.
+- *scenario*: a template for a text, with slots for values: an introduction, *{person} likes
+  {color}.*, and words for the fields of the command, *it*. Its name is its ``frame``.
+- *content plan*: one way to say the goal without naming it in the command, whatever the scenario:
+  which fields of the command are pronouns, and what the introduction names instead.
+- *match*: a scenario with a content plan that it can put into words; one of them is drawn.
 - *remark*: words before the command that choose one of two values.
 """
 
@@ -23,95 +24,107 @@ from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.request import InstructionRequest
 from roboirg.language.scenarios.amounts import hidden_fields
-from roboirg.language.scenarios.introduced import (
-    Introduced,
-    IntroducedValue,
-    Offer,
-    Values,
-    goal_values,
-    several,
+from roboirg.language.scenarios.content_plans import CONTENT_PLANNERS
+from roboirg.language.scenarios.fillers import (
+    ANY_LIST,
+    ContentPlan,
+    Filler,
+    Fillers,
+    FillersBySlot,
+    goal_fillers,
+    list_fillers,
 )
 from roboirg.language.scenarios.markup import Slot, slots_said
-from roboirg.language.scenarios.offers import OFFERS
 from roboirg.language.scenarios.scenario import PERSON, Scenario
 from roboirg.language.settings import all_settings
 
-_DESCRIBED = ("place", "clue", "beside", "counted", "aside", "rest", "kept")
-"""Slots for what is described; a scenario fits the things that have those that it names."""
+_DESCRIPTION_SLOTS = ("place", "clue", "beside", "counted", "aside", "rest", "kept")
+"""Slots that only some content plans fill: they describe a thing, *the cube in the middle*."""
 BLOCK = 4
 """Number of episodes after which difficulties repeat; see `in_turn`."""
 _USUAL_LENGTHS = (2, 3)
 """Of a list, for a scenario that says nothing about it."""
-_ANY = "any"
-"""The form of a place that is said after a noun, as a spot where there is one."""
+_ANY_FORM = "any"
+"""``{place:any}`` takes a place in whichever form the content plan has it."""
 
 
-class Chosen(NamedTuple):
-    """What is said.
+class ScenarioChoice(NamedTuple):
+    """What is said of an episode.
 
     Attributes:
-        scenario: the scenario.
-        offer: the way in which it leads to the goal.
-        introduced: all values that its words can name.
+        scenario: the template.
+        plan: the way in which it says the goal.
+        fillers: of all slots that its sentences can name.
     """
 
     scenario: Scenario
-    offer: Offer
-    introduced: Introduced
+    plan: ContentPlan
+    fillers: Fillers
 
 
 class _Match(NamedTuple):
-    """A scenario, and an offer that it can say."""
+    """A scenario, and a content plan that it can put into words."""
 
     scenario: Scenario
-    offer: Offer
+    plan: ContentPlan
 
 
 def choose(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
-) -> Chosen | None:
-    """Return what is said of an episode: a scenario with its values; None if none fits.
+) -> ScenarioChoice | None:
+    """Draw the scenario that says an episode, and fill its slots; None if no scenario fits.
 
-    A scenario is what a person says of a task, with slots for values. One is drawn, with the first
-    way to lead to the goal that it can say, an offer; then its list of values and its people.
+    A scenario is a template with slots: *{person} likes {color}. Lift it.* Drawn are, in this
+    order, the scenario with its content plan (which words of the command are pronouns), the values
+    of its list if it says one, and its people. The log of the draws, in the request, has them in
+    this order, too.
+
+    Args:
+        request: the episode, with the random draws.
+        setting: whose content plans are tried, ``direct``.
+        scenarios: of this setting, that may be drawn.
     """
     matches = list(_matches(request, setting, scenarios))
     if not matches:
         return None
-    scenario, offer = _drawn_match(request, setting, matches)
-    values = {**goal_values(request), **offer.values}
-    if offer.listed is None and scenario.fields.list:
-        values |= several("list", _drawn_list(request, scenario))
-    values |= _drawn_people(request, scenario)
-    return Chosen(scenario, offer, Introduced(values))
+    scenario, plan = _draw_match(request, setting, matches)
+    values = {**goal_fillers(request), **plan.values}
+    if plan.list_slot == ANY_LIST and scenario.fields.list:
+        values |= list_fillers("list", _draw_list(request, scenario))
+    values |= _draw_people(request, scenario)
+    return ScenarioChoice(scenario, plan, Fillers(values))
 
 
 def _matches(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
 ) -> Iterator[_Match]:
-    """Yield each way to lead to the goal with each scenario whose words can say it.
+    """Yield each content plan of a setting with each scenario that can put it into words.
 
-    Such a way is an offer of the setting. A scenario says one that leaves the same fields of the
-    goal to the context as its words do: with *it* for the color, an offer that gives the color.
+    A content plan says which fields of the command are pronouns: ``{"color"}``. A scenario, which
+    is a template, has words such as *it* for some fields; only scenarios that have them for exactly
+    the same fields match. All plans of a scenario come in the order of the setting.
     """
-    scenarios_by_hidden: dict[frozenset[str], list[Scenario]] = {}
+    scenarios_by_open_fields: dict[frozenset[str], list[Scenario]] = {}
     for scenario in scenarios:
         if _fits_episode(scenario, request):
-            scenarios_by_hidden.setdefault(_hidden_by(scenario, request), []).append(scenario)
-    for offer in _offers_of(setting)(request):
-        for scenario in scenarios_by_hidden.get(frozenset(offer.fields), []):
-            if _can_say(scenario, offer):
-                yield _Match(scenario, offer)
+            open_fields = _fields_left_open(scenario, request)
+            scenarios_by_open_fields.setdefault(open_fields, []).append(scenario)
+    for plan in _content_planner_of(setting)(request):
+        for scenario in scenarios_by_open_fields.get(frozenset(plan.fields), []):
+            if _can_say(scenario, plan):
+                yield _Match(scenario, plan)
 
 
-def _drawn_match(request: InstructionRequest, setting: str, matches: Sequence[_Match]) -> _Match:
-    """Draw a scenario, with the first of the offers, ways to lead to the goal, that it can say.
+def _draw_match(request: InstructionRequest, setting: str, matches: Sequence[_Match]) -> _Match:
+    """Draw one of the scenarios that match, with the first content plan that it can say.
 
-    In reasoning, the way is drawn first, so that all kinds of reasoning get their turn.
+    Each scenario (a template, known by its `frame`) is equally likely, however many plans it can
+    say. In the reasoning setting the plan is drawn first, so that all kinds of reasoning get their
+    turn, and then one of the scenarios that can say it.
     """
-    if all_settings()[setting].offers == "reasoning":
-        offer_in_turn = _in_turn(request, matches)
-        matches = [match for match in matches if match.offer is offer_in_turn]
+    if all_settings()[setting].content_plans == "reasoning":
+        drawn_plan = _draw_reasoning_plan(request, matches)
+        matches = [match for match in matches if match.plan is drawn_plan]
     by_frame: dict[str, _Match] = {}
     for match in matches:
         by_frame.setdefault(match.scenario.fields.frame, match)
@@ -119,21 +132,28 @@ def _drawn_match(request: InstructionRequest, setting: str, matches: Sequence[_M
     return request.sampler.pick_named(f"{purpose} scenario", by_frame)
 
 
-def _offers_of(setting: str) -> Callable[[InstructionRequest], Iterable[Offer]]:
-    """Return what yields the offers of a setting: its own, or that of one of ours."""
-    offers = all_settings()[setting].offers
-    if not isinstance(offers, str):
-        return offers
-    check_names(f"way to the goal for the offers of {setting}, named", [offers], OFFERS)
-    return OFFERS[offers]
+def _content_planner_of(setting: str) -> Callable[[InstructionRequest], Iterable[ContentPlan]]:
+    """Return the function that yields the content plans of a setting for an episode.
 
+    A setting brings a function of its own, or names one of our settings, whose function it takes.
 
-def misfit(request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]) -> str:
-    """Return why none of some scenarios of a setting fits an episode, for a message.
-
-    If they fit without their introductions, only the words of a place or a clue are lacking.
+    Raises:
+        UnknownNameError: there is no setting of ours with that name.
     """
-    # Without introductions, only the words of places and clues can no longer be lacking.
+    plans = all_settings()[setting].content_plans
+    if not isinstance(plans, str):
+        return plans
+    kind = f"setting for the content_plans of {setting}, named"
+    check_names(kind, [plans], CONTENT_PLANNERS)
+    return CONTENT_PLANNERS[plans]
+
+
+def explain_misfit(request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]) -> str:
+    """Return why none of some scenarios fits an episode: *nothing has the place or clue that …*.
+
+    It is called where `choose` has found none. If one would fit without its introduction, the
+    introduction names a place or a clue, *the cube in the middle*, that the episode lacks.
+    """
     without_introductions: list[Scenario] = []
     for scenario in scenarios:
         texts = {**scenario.texts, "introduction": ((),)}
@@ -143,157 +163,181 @@ def misfit(request: InstructionRequest, setting: str, scenarios: Sequence[Scenar
     return "the goal follows in no way that setting, say, list, derive and needs allow"
 
 
-def _in_turn(request: InstructionRequest, matches: Iterable[_Match]) -> Offer:
-    """Draw one way in which the goal follows, of the kind of reasoning whose turn it is.
+def _draw_reasoning_plan(request: InstructionRequest, matches: Iterable[_Match]) -> ContentPlan:
+    """Draw one of the content plans of some matches, of the kind of reasoning whose turn it is.
 
-    A kind, or pattern, is such as ``color exclusion``. Ways of one pattern are told apart by
-    relation, reference and listed slot, under which they are drawn.
+    Kinds, or patterns, are such as ``color exclusion``; the number of the episode decides which has
+    its turn. Among the plans of that pattern the draw is by name: relation, reference and listed
+    slot, ``one fewer 3``. These names are hash keys, so their spelling has to stay. The plan itself
+    is returned, no copy: `_draw_match` finds its matches by identity.
     """
-    by_pattern: dict[str, dict[str, Offer]] = {}
-    for _, offer in matches:
-        notes = offer.notes
-        name = f"{notes['relation']} {notes['reference']} {offer.listed}"
-        by_pattern.setdefault(str(notes["pattern"]), {})[name] = offer
-    pattern = in_turn(request.episode, list(by_pattern))
-    return request.sampler.pick_named(f"{pattern} derivation", by_pattern[pattern])
+    plans_by_pattern: dict[str, dict[str, ContentPlan]] = {}
+    for _, plan in matches:
+        notes = plan.notes
+        name = f"{notes['relation']} {notes['reference']} {plan.list_slot}"
+        plans_by_pattern.setdefault(str(notes["pattern"]), {})[name] = plan
+    pattern = in_turn(request.episode, list(plans_by_pattern))
+    return request.sampler.pick_named(f"{pattern} derivation", plans_by_pattern[pattern])
 
 
 def in_turn(episode: Episode, patterns: Sequence[str]) -> str:
-    """Return an episode's pattern of those that it allows.
+    """Return which of the reasoning patterns that an episode allows has its turn in it.
 
-    Cycle through the patterns that the episode allows, so that none takes the turns of another.
-    Move on by one more after each block of four episodes: otherwise a task with two patterns
-    would use only one of them in its hard episodes.
+    Of two patterns, A and B, episodes 0 to 7 have A B A B, B A B A. Consecutive episodes cycle
+    through their patterns. After each block of four, in which the difficulties occur in the same
+    order, the cycle moves on by one more: otherwise hard episodes, the last of each block, would
+    all have B.
     """
     return patterns[(episode.index + episode.index // BLOCK) % len(patterns)]
 
 
-def _drawn_people(request: InstructionRequest, scenario: Scenario) -> Values:
-    """Return two different people and their pronouns, by slot; empty if a scenario names none.
+def _draw_people(request: InstructionRequest, scenario: Scenario) -> FillersBySlot:
+    """Draw two different people of a scenario, and return their names and pronouns by slot.
 
-    The slots of the first are ``person``, ``he`` ..., those of the second ``person.2``, ``he.2``
-    ...
+    For Leo and Mia: ``person`` *Leo*, ``he`` *he*, ``him`` *him* …, ``person.2`` *Mia*, ``he.2``
+    *she* … Empty if the scenario names nobody.
     """
     if not scenario.people:
         return {}
     first = request.sampler.pick("person", scenario.people)
     others = [person for person in scenario.people if person is not first]
     second = request.sampler.pick("other person", others)
-    values: dict[str, tuple[IntroducedValue, ...]] = {}
+    values: dict[str, tuple[Filler, ...]] = {}
     for suffix, person in (("", first), (".2", second)):
         # Each person is a row of words in the order of `PERSON`: "Leo", "he", "him" …
         for slot, word in zip(PERSON, person, strict=True):
-            values[f"{slot}{suffix}"] = (IntroducedValue("", "person", word),)
+            values[f"{slot}{suffix}"] = (Filler("", "person", word),)
     return values
 
 
 def _fits_episode(scenario: Scenario, request: InstructionRequest) -> bool:
-    """Return whether an episode has the numbers of colors and values that a scenario needs."""
+    """Return whether an episode has the numbers of colors and values that a scenario needs.
+
+    A scenario is a template. It may need, for example, a goal of two colors, or values enough for
+    the list that it says.
+    """
     needs = scenario.fields.needs
     if needs.colors and len(request.color_values) not in needs.colors:
         return False
     if needs.shown and len(request.scene_colors) not in needs.shown:
         return False
     # A scenario with a list needs enough values for it.
-    return not scenario.fields.list or bool(_possible_lengths(request, scenario))
+    return not scenario.fields.list or bool(_possible_list_lengths(request, scenario))
 
 
-def _hidden_by(scenario: Scenario, request: InstructionRequest) -> frozenset[str]:
-    """Return the fields of the goal that a scenario leaves to its context."""
+def _fields_left_open(scenario: Scenario, request: InstructionRequest) -> frozenset[str]:
+    """Return the fields of the goal for which the command of a scenario has pronouns.
+
+    A scenario with ``say.color = ["<it color: it>"]`` gives ``{"color"}``: its command, *Lift it*,
+    leaves the color to the introduction.
+    """
     hidden: set[str] = set()
     for name in scenario.said:
         hidden.update(hidden_fields(scenario.text(f"say.{name}"), request.fields_in(name)))
     return frozenset(hidden)
 
 
-def _can_say(scenario: Scenario, offer: Offer) -> bool:
-    """Return whether a scenario has the words for an offer, a way to lead to the goal.
+def _can_say(scenario: Scenario, plan: ContentPlan) -> bool:
+    """Return whether a scenario, a template, has the sentences that a content plan needs.
 
-    It has to introduce the list of the offer, if that has one, derive the goal as the offer does,
-    and name nothing in its introduction for which the offer has no words. Both leave the same
-    fields of the goal open.
+    A content plan is one way to say the goal. The scenario has to list values of the slot of which
+    the plan lists some, reason as the plan does, and name nothing in its introduction that the plan
+    does not fill. It is assumed that its command has pronouns for the fields of the plan.
     """
-    if offer.listed not in (None, scenario.fields.list):
+    if plan.list_slot not in (ANY_LIST, scenario.fields.list):
         return False
     derive = scenario.fields.derive  # how the goal follows; in reasoning scenarios only
     if derive is not None:
-        if derive.pattern != offer.notes["pattern"]:
+        if derive.pattern != plan.notes["pattern"]:
             return False
-        if offer.notes["relation"] not in (None, *derive.relations):
+        if plan.notes["relation"] not in (None, *derive.relations):
             return False
-    return all(_has_words(slot, offer) for slot in slots_said(scenario.text("introduction")))
+    return all(_can_fill(slot, plan) for slot in slots_said(scenario.text("introduction")))
 
 
-def _has_words(slot: Slot, offer: Offer) -> bool:
-    """Return whether an offer has words for a slot of a sentence, such as ``{place:spot}``.
+def _can_fill(slot: Slot, plan: ContentPlan) -> bool:
+    """Return whether a content plan has words for a slot of a sentence, such as ``{place:spot}``.
 
-    An offer is a way to lead to the goal. Values of the goal always have words. A place must have
-    them in the form that is asked for, such as ``spot``.
+    Only slots for descriptions, such as places, depend on the plan; values of the goal always have
+    words. A place must be sayable in the form that the slot asks for: ``spot`` after *It's dusty*,
+    none after a noun, ``any`` for either.
     """
-    if slot.name.partition(".")[0] not in _DESCRIBED:
+    if slot.name.partition(".")[0] not in _DESCRIPTION_SLOTS:
         return True
-    values = offer.values.get(slot.name, ())
+    values = plan.values.get(slot.name, ())
     if not values:
         return False
-    return values[0].kind != "place" or slot.form in (_ANY, values[0].form)
+    return values[0].kind != "place" or slot.form in (_ANY_FORM, values[0].form)
 
 
-def _possible_lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
-    """Return the possible numbers of values in the list that a scenario introduces: ``[2, 3]``.
+def _possible_list_lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
+    """Return how many values the list that a scenario introduces can have: ``[2, 3]``.
 
-    It holds all values of the goal and perhaps others: with one color of three in the scene, 1 to
-    3, of which those are left that the scenario allows, or else the usual ones.
+    The list holds all values of the goal in its slot, and perhaps others that the scene allows: if
+    red is meant in a scene of three colors, it can have 1 to 3 values. Of these numbers, those are
+    returned that the scenario asks for, or else the usual ones, 2 and 3.
     """
     slot = scenario.fields.list
     num_in_goal = len(request.values_in(slot))
     if not num_in_goal:  # a slot of another task of the file
         return []
-    num_in_scene = num_in_goal + len(_others(request, slot))
+    num_in_scene = num_in_goal + len(_other_values(request, slot))
     wanted = scenario.fields.needs.list or _USUAL_LENGTHS
     return [length for length in wanted if num_in_goal <= length <= num_in_scene]
 
 
-def _drawn_list(request: InstructionRequest, scenario: Scenario) -> Sequence[IntroducedValue]:
+def _draw_list(request: InstructionRequest, scenario: Scenario) -> Sequence[Filler]:
     """Draw the values that a scenario lists: the goal's among others of the scene, in any order.
 
-    For the goal red it may be *blue, red*.
+    For the goal red it may be *blue, red*. Three draws: the length, the other values, the order.
     """
     slot = scenario.fields.list
-    members = list(goal_values(request)[slot])
+    members = list(goal_fillers(request)[slot])
     kind = members[0].kind
-    size = request.sampler.pick("list length", _possible_lengths(request, scenario))
-    choices = list(itertools.permutations(_others(request, slot), size - len(members)))
+    size = request.sampler.pick("list length", _possible_list_lengths(request, scenario))
+    choices = list(itertools.permutations(_other_values(request, slot), size - len(members)))
     for other in request.sampler.pick("listed others", choices):
-        members.append(IntroducedValue(REFERENCE, kind, other))
+        members.append(Filler(REFERENCE, kind, other))
     return request.sampler.pick("list order", list(itertools.permutations(members)))
 
 
-def _others(request: InstructionRequest, slot: str) -> list[str | int]:
-    """Return the values that a slot could have in the scene, without those of the goal."""
+def _other_values(request: InstructionRequest, slot: str) -> list[str | int]:
+    """Return the values that a slot of the goal could have in the scene, but has not.
+
+    In a scene of red, blue and green cubes with the goal red, ``["blue", "green"]`` for ``color``.
+    """
     possible = dict.fromkeys(itertools.chain.from_iterable(request.alternatives(slot)))
     for meant in request.values_in(slot):
         possible.pop(meant.value, None)
     return list(possible)
 
 
-def rival_values(request: InstructionRequest, introduced: Introduced) -> Iterator[Introduced]:
-    """Yield the values of the goal with one more, that is not meant, for remarks that name it.
+def fillers_with_rival(request: InstructionRequest, fillers: Fillers) -> Iterator[Fillers]:
+    """Yield the fillers of an episode with one value more that is not meant, each time another one.
 
-    For the goal red, the slot ``rival color`` is blue, then green, as far as neither was named in a
-    list.
+    Distracting remarks name it, *Blue is out of fashion*. For the goal red, the slot ``rival
+    color`` is blue, then green, and so on; values that the list names are left out.
+
+    Args:
+        request: the episode.
+        fillers: of the slots of its scenario.
     """
-    already_named = [value.value for value in introduced.values.get("list", ())]
+    already_named = [value.value for value in fillers.values.get("list", ())]
     already_named += [value.value for value in request.goal_values]
     kinds = {value.slot: value.slot_type for value in request.goal_values}
     for slot, kind in kinds.items():
         for other in _possible_rivals(request, slot):
             if other not in already_named:
-                rival = IntroducedValue(REFERENCE, kind, other)
-                yield introduced.with_values(**{f"rival {slot}": (rival,)})
+                rival = Filler(REFERENCE, kind, other)
+                yield fillers.with_values(**{f"rival {slot}": (rival,)})
 
 
 def _possible_rivals(request: InstructionRequest, slot: str) -> Sequence[str | int]:
-    """Return the values of which a competing remark can speak: any color, or what the scene has."""
+    """Return the values of a slot that a distracting remark can name: the goal's may be among them.
+
+    Of colors these are all that the task knows, whether or not they are in the scene; of numbers
+    and moments those that other goals of the scene have.
+    """
     if slot in COLOR_SLOTS:
         return request.task.things.colors
-    return _others(request, slot)
+    return _other_values(request, slot)

@@ -23,10 +23,16 @@ def words_of(
     setting: str = EXPLICIT,
     wordings: str | None = None,
 ) -> str:
-    """Return which words a task has in a pool, such as ``PickXtimes/test@1a2b3c4d5e6f``.
+    """Return the name of the words that a task has in a pool: ``PickXtimes/test@1a2b3c4d5e6f``.
 
-    ``PickXtimes/test/lab@3c4d5e6f1a2b`` in a setting *lab* whose own file serves the task.
-    `wordings` may be the identity of an open wording file, whose words come before ours.
+    The part after *@* is a digest of the words, so equal names mean equal words; records keep the
+    name. ``PickXtimes/test/lab@3c4d5e6f1a2b`` in a setting *lab* whose own file serves the task.
+
+    Args:
+        task: its name.
+        pool: ``train`` or ``test``.
+        setting: in which they are said.
+        wordings: the identity of an open wording file, whose words come before ours; None for ours.
     """
     name = f"{task}/{pool}"
     if task in setting_scenarios(setting):
@@ -42,7 +48,8 @@ def language_label(
 ) -> str:
     """Return the version of the language, followed by the words of each task in some settings.
 
-    ``4.7.0 PickXtimes/test@1a2b3c4d5e6f``; each task counts in the explicit setting, too.
+    ``4.7.0 PickXtimes/test@1a2b3c4d5e6f``; each task counts in the explicit setting, too, and each
+    name once. The arguments are as for `words_of`.
     """
     names = (EXPLICIT, *settings)
     words: list[str] = []
@@ -57,11 +64,12 @@ def words_digest(
 ) -> str:
     """Return a hash of all that can be said of a task in a pool; ``none`` without words.
 
-    It counts one file: the setting's own, or else the task's. A file that another package brings
+    It is of one file: the setting's own, or else the task's. A file that another package brings
     for tasks of ours changes the digest of no other setting.
 
     Neither comments nor the order of scenarios and of their sentences change it. The order of a
-    list does, since its entries are drawn by their numbers.
+    list does, since its entries are drawn by their numbers. Published records have these digests,
+    so what is hashed must stay as it is.
     """
     words = task_words(task, setting, wordings)
     if words is None:
@@ -80,7 +88,7 @@ def words_digest(
 
 
 def _scenarios_in(words: TaskScenarios, pool: PoolName) -> list[list[str]]:
-    """Return each scenario of a pool as text, its fields and sentences, in a fixed order.
+    """Return each scenario of a pool as two texts, its fields and its sentences, in a fixed order.
 
     So the same scenarios in another order of the file give the same list.
     """

@@ -1,6 +1,7 @@
 """Whole sentences for single goals, such as RoboMME's: read them, and say them.
 
-They serve the explicit setting, instead of commands.
+A wording file may have them, *Pick up the red cube twice.* for one goal; the explicit setting says
+them instead of commands with slots.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from roboirg.language.phrases import TaggedText, plain
 from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.scenarios.markup import parse
 from roboirg.language.scenarios.scenario import TaskScenarios
-from roboirg.language.scenarios.written import Mistakes, converted, fields_of, shown
+from roboirg.language.scenarios.written import Mistakes, convert, excerpt, read_table
 from roboirg.tasks import goals_of
 from roboirg.tasks.splits.splits import get_episode
 
@@ -28,12 +29,12 @@ Literals = Mapping[Goal, str]
 
 
 class LiteralFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A sentence as it was written.
+    """A whole sentence of a wording file, as its author wrote it.
 
     Attributes:
-        task: whose goal it states.
-        when: the goal, a value for each of its slots.
-        text: the sentence.
+        task: whose goal it states: ``PickXtimes``.
+        when: the goal, a value for each of its slots: ``{"color": "red", "repeats": 2}``.
+        text: the sentence: *Pick up the red cube twice.*
     """
 
     task: str
@@ -48,23 +49,33 @@ def read_literals(
 
     ``{"StopCube": {<goal>: "Stop it at the third visit."}}``; the goal as `unordered` has it. What
     is wrong with a sentence is added to `mistakes`, and the sentence is left out.
+
+    Args:
+        written: a table for each sentence, as it stands in the file.
+        tasks: those that the file serves.
+        mistakes: of the file.
     """
     sentences_by_task: dict[str, dict[Goal, str]] = {task: {} for task in tasks}
     for number, table in enumerate(written, 1):
         part = mistakes.at(f"literal {number}")
-        literal = fields_of(table, LiteralFields, part)
+        literal = read_table(table, LiteralFields, part)
         if literal is None:
             continue
         if literal.task not in tasks:
             part.check_names("task", [literal.task], tasks)
             continue
-        with part.kept():
+        with part.collecting():
             _add_literal(literal, sentences_by_task[literal.task], part.where)
     return sentences_by_task
 
 
 def _add_literal(literal: LiteralFields, sentences: dict[Goal, str], where: str) -> None:
-    """Add a sentence to those of its task, by its goal."""
+    """Add a sentence to those of its task, by its goal.
+
+    Raises:
+        InvalidValueError: the goal or the text is wrong, or the goal has a sentence already;
+            `where` names the sentence.
+    """
     goal = _goal(literal, where)
     if goal in sentences:
         raise InvalidValueError(
@@ -76,29 +87,33 @@ def _add_literal(literal: LiteralFields, sentences: dict[Goal, str], where: str)
 def _goal(literal: LiteralFields, where: str) -> Goal:
     """Return the goal that a sentence is for: ``when = {color = "red", repeats = 2}`` as a goal.
 
-    It must have a value of the right type for each slot of the task's goals. `where` names the
-    sentence in messages.
+    Raises:
+        InvalidValueError: it has not a value of the right type for each slot of the task's goals;
+            `where` names the sentence.
     """
     example_slots = _example(literal.task).as_mapping()
     if literal.when.keys() != example_slots.keys():
-        given = shown(dict(literal.when))
+        given = excerpt(dict(literal.when))
         raise InvalidValueError(
             f"{where} has when = {given}; it must have a value for {' and '.join(example_slots)}."
         )
     values: dict[str, SlotValue] = {}
     for slot, content in example_slots.items():
         kind = _kind_of(content)
-        values[slot] = converted(literal.when[slot], kind, f"{where}, when.{slot}")
+        values[slot] = convert(literal.when[slot], kind, f"{where}, when.{slot}")
     try:
         return unordered(Goal.of(**values))
     except ValueError:
         raise InvalidValueError(
-            f"{where} has when = {shown(values)}; it must have a count for each color."
+            f"{where} has when = {excerpt(values)}; it must have a count for each color."
         ) from None
 
 
 def _kind_of(content: SlotValue) -> Any:  # noqa: ANN401 - mypy knows no type of a type form
-    """Return the type of what a slot holds: ``str``, ``int``, or a tuple of either."""
+    """Return the type of what a slot holds: ``str``, ``int``, or a tuple of either.
+
+    ``"red"`` gives ``str``, and ``(2, 1)`` gives ``tuple[int, ...]``.
+    """
     if not isinstance(content, tuple):
         return type(content)
     if isinstance(content[0], int):
@@ -113,18 +128,27 @@ def _example(task: str) -> Goal:
 
 
 def _sentence(text: str, where: str) -> str:
-    """Return the words of a sentence, which has no marks."""
+    """Return the text of a whole sentence; it must not be empty or have slots such as ``{color}``.
+
+    Raises:
+        InvalidValueError: it is empty or has slots; `where` names the sentence.
+    """
     try:
         parts = parse(text)
     except ValueError as error:
         raise InvalidValueError(f"{where} {error}.") from None
     if not text.strip() or any(not isinstance(part, TaggedText) for part in parts):
-        raise InvalidValueError(f"{where} has the text {shown(text)}; it must be a whole sentence.")
+        raise InvalidValueError(
+            f"{where} has the text {excerpt(text)}; it must be a whole sentence."
+        )
     return text
 
 
 def literal_refusal(request: InstructionRequest, words: TaskScenarios) -> str | None:
-    """Return why there is no sentence for an episode; None if there is one."""
+    """Return why a wording file has no whole sentence for an episode's goal; None if it has one.
+
+    ``the wording file mine@1a2b3c4d has no sentence of PickXtimes for the goal: red, twice``
+    """
     goal = request.episode.goal
     if unordered(goal) in words.literals:
         return None
@@ -133,14 +157,15 @@ def literal_refusal(request: InstructionRequest, words: TaskScenarios) -> str | 
 
 
 def in_words(goal: Goal) -> str:
-    """Return a goal in words, for messages."""
+    """Return a goal in words, for messages: *red, 3 times*."""
     return describe_goal(goal.as_mapping())
 
 
 def say_literal(request: InstructionRequest, words: TaskScenarios) -> InstructionSpec:
-    """Return the wording file's sentence for an episode, as an instruction without fields.
+    """Return the wording file's sentence for an episode as an instruction of one utterance.
 
-    It means every goal of the scene for which the file has the same sentence.
+    It has no mentions. It means every goal of the scene for which the file has the same sentence,
+    so a vague sentence, *Do it.*, may mean several. The file must have one (`literal_refusal`).
     """
     goal = request.episode.goal
     sentence = words.literals[unordered(goal)]

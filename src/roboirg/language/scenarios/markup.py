@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from typing import Literal, NamedTuple, Union
 
 from roboirg.language.phrases import TaggedText
-from roboirg.language.scenarios.written import shown
+from roboirg.language.scenarios.written import excerpt
 
 Operation = Literal[
     "same", "rank", "other", "without", "minus", "plus", "double", "half", "earlier", "later",
@@ -26,7 +26,7 @@ Operation = Literal[
 MOST_LETTERS = 2_000
 """Of a sentence."""
 _NAME = r"(?:rival )?[a-z]+(?:\.\d)?"
-"""A regular expression for a slot: ``color``, ``list.0``, ``rival color``."""
+"""A regular expression for the name of a slot: ``color``, ``list.0``, ``rival color``."""
 _SLOT = re.compile(rf"\{{(?P<name>{_NAME})(?::(?P<form>[a-z -]+))?\}}")
 _AGREEMENT = re.compile(rf"\[(?P<controller>{_NAME}): ?(?P<one>[^\[\]|]*)\|(?P<many>[^\[\]|]*)\]")
 _POINTER = re.compile(rf"<(?P<expression>[a-z]+) (?P<of>{_NAME}): (?P<words>[^<>]+)>")
@@ -35,11 +35,11 @@ _BRACKET = re.compile(r"[{}<>\[\]|]")
 
 
 class Slot(NamedTuple):
-    """A value in words.
+    """A place in a sentence where a value is said: ``{repeats:times}``.
 
     Attributes:
-        name: of the slot.
-        form: how it is said; None for the usual form of its type.
+        name: of the slot, ``repeats``.
+        form: how it is said, ``times``; None for the usual form of its type.
     """
 
     name: str
@@ -47,12 +47,12 @@ class Slot(NamedTuple):
 
 
 class Agreement(NamedTuple):
-    """Words that agree with a number.
+    """Words in the singular or plural: ``[repeats: lap|laps]``.
 
     Attributes:
-        controller: the slot that decides.
-        one: for a single thing.
-        many: for several.
+        controller: the slot that decides, ``repeats``.
+        one: for a single thing, *lap*.
+        many: for several, *laps*.
     """
 
     controller: str
@@ -66,15 +66,16 @@ Text = tuple[Part, ...]
 
 
 class Pointer(NamedTuple):
-    """Words that point back.
+    """Words that point back at a value (an anaphor): ``<it color: it>``.
 
     Attributes:
-        expression: their class; ``rank`` for a position in a list, whatever it is.
-        of: the slot that they stand for.
+        expression: their class, ``it``; ``rank`` for a position in a list, whatever it is.
+        of: the slot that they stand for, ``color``.
         words: as written, marks included.
         parts: the same, parsed.
-        resolved: what stands for them in the resolved form; empty for the value.
-        operation: how the value follows from that of the slot.
+        resolved: the text that replaces them in the resolved form, parsed; empty for the value.
+        operation: how the value follows from that of the slot; ``same`` until the table of pointers
+            has been asked (`scenario_file`).
     """
 
     expression: str
@@ -86,13 +87,15 @@ class Pointer(NamedTuple):
 
 
 def parse(text: object) -> Text:
-    """Return the parts of a sentence: of ``Lift <it color: it>.`` words, a pointer and a stop.
+    """Return the parts of a sentence, in order.
 
-    Marks are slots for values, ``{color}``, pointers, which point back at a value, and words in
-    singular and plural.
+    ``Lift <it color: it>.`` gives words, ``Pointer("it", "color", "it", …)`` and words. Other marks
+    are slots for values, ``{color}``, and words in singular and plural, ``[repeats: lap|laps]``.
 
     Raises:
-        ValueError: it is none, or it has a bracket that is none of the marks.
+        ValueError: it is no text, not one line of printable ASCII, too long, or has a bracket that
+            belongs to no mark. The message goes on after the name of the sentence: *has a bracket
+            …*.
     """
     sentence = _checked_sentence(text)
     parts: list[Part] = []
@@ -106,36 +109,43 @@ def parse(text: object) -> Text:
 
 
 def _checked_sentence(text: object) -> str:
-    """Return a text as it is; raise ValueError if it cannot be a sentence.
+    """Return a text of a file as it is, if it can be a sentence.
 
-    A sentence is printable ASCII on one line, and not too long.
+    Raises:
+        ValueError: it is no text, not printable ASCII on one line, or too long.
     """
     if isinstance(text, str) and len(text) > MOST_LETTERS:
         raise ValueError(
-            f"has words of {len(text):,} characters, {shown(text)}; at most {MOST_LETTERS:,} are "
+            f"has words of {len(text):,} characters, {excerpt(text)}; at most {MOST_LETTERS:,} are "
             "one sentence"
         )
     if not isinstance(text, str) or not text.isascii() or not text.isprintable():
-        raise ValueError(f"has the words {shown(text)}; they must be printable ASCII on one line")
+        raise ValueError(f"has the words {excerpt(text)}; they must be printable ASCII on one line")
     return text
 
 
 def _plain_words(sentence: str, start: int, end: int) -> list[TaggedText]:
-    """Return the words from one mark to the next as a list of one; empty if there are none.
+    """Return the words from one mark of a sentence to the next: a list of one, or empty.
 
-    Raises ValueError for a bracket that belongs to no mark.
+    Args:
+        sentence: with its marks.
+        start: index of the first character after a mark.
+        end: index of the first character of the next mark.
+
+    Raises:
+        ValueError: there is a bracket, which then belongs to no mark.
     """
     words = sentence[start:end]
     if _BRACKET.search(words):
         raise ValueError(
-            f"has a bracket that is no mark in {shown(sentence)}; marks are like {{color}}, "
+            f"has a bracket that is no mark in {excerpt(sentence)}; marks are like {{color}}, "
             "{repeats:lap}, <it color: it> and [repeats: lap|laps]"
         )
     return [TaggedText(words)] if words else []
 
 
 def _parsed(mark: re.Match[str]) -> Part:
-    """Return the part of a sentence for a mark that was found in it."""
+    """Return the part of a sentence for a mark of it: a `Slot` for ``{color}``."""
     if mark["expression"]:
         return Pointer(mark["expression"], mark["of"], mark["words"], parse(mark["words"]))
     if mark["name"]:
@@ -144,17 +154,24 @@ def _parsed(mark: re.Match[str]) -> Part:
 
 
 def slots_said(text: Text) -> Iterator[Slot]:
-    """Yield the slots that a sentence says outside of its pointers."""
+    """Yield the slots of a sentence that name a value, so not those in its pointers.
+
+    ``{person} likes <it color: it>.`` has the slot ``person``.
+    """
     return (part for part in text if isinstance(part, Slot))
 
 
 def pointers_in(text: Text) -> Iterator[Pointer]:
-    """Yield the pointers of a sentence."""
+    """Yield the pointers of a sentence, the words that point back: ``<it color: it>``."""
     return (part for part in text if isinstance(part, Pointer))
 
 
 def slots_in(text: Text) -> Iterator[str]:
-    """Yield the names of the slots that a sentence says, agrees with or points back at."""
+    """Yield the names of all slots of a sentence: said, agreed with or pointed at.
+
+    ``{person} has [repeats: a lap|laps], lift <it color: it>.`` gives ``person``, ``repeats``,
+    ``color``. A name may come several times.
+    """
     for part in text:
         if isinstance(part, Slot):
             yield part.name

@@ -8,14 +8,17 @@ from roboirg.language.scenarios.markup import Operation
 
 
 class Relation(NamedTuple):
-    """The relation of a number to a reference quantity, or of a position to another one.
+    """How a number follows from another one, or a position in a series from another position.
+
+    *One fewer* gives 2 from 3: ``result = factor * reference + offset`` with the offset -1.
 
     Attributes:
         name: for scenarios and records.
-        operation: of the words that say it, if others are not meant.
-        offset: the result is ``factor * reference + offset``.
-        factor: see `offset`.
-        spells: the number that the words contain; they would give away a result of this value.
+        operation: of the words that say it, ``minus`` for *one fewer than that*.
+        offset: see above.
+        factor: see above.
+        spells: the number that the words contain, 1 for *one fewer*; they would give away a result
+            of this value. None if they contain none.
     """
 
     name: str
@@ -25,7 +28,10 @@ class Relation(NamedTuple):
     spells: int | None = None
 
     def reference(self, result: int) -> int | None:
-        """Return the quantity to introduce; None if it is no whole number, or the result."""
+        """Return the number from which a result follows: 3 for the result 2 and *one fewer*.
+
+        None if that is no whole number, *half* of it, or the result itself.
+        """
         reference = (result - self.offset) / self.factor
         if reference == result or not reference.is_integer():
             return None

@@ -1,4 +1,4 @@
-"""Which explicit sentences are RoboMME's: words with its name must state its goals as it does."""
+"""Whether sentences are RoboMME's: a wording file with its name must state goals as it does."""
 
 from __future__ import annotations
 
@@ -20,7 +20,17 @@ FINGERPRINTS = {
 
 
 def check_robomme_name(name: str, task: str, literals: Literals, where: str) -> None:
-    """Check that words named after RoboMME are RoboMME's in every published episode of a task."""
+    """Check that words named after RoboMME are RoboMME's in every published episode of a task.
+
+    Args:
+        name: of the wordings; only ``robomme`` is checked.
+        task: its name.
+        literals: the sentence of each goal.
+        where: the file, for messages.
+
+    Raises:
+        InvalidValueError: a sentence is another one than RoboMME's.
+    """
     is_known = name == ROBOMME_NAME and task in FINGERPRINTS
     if is_known and fingerprint(task, literals) != FINGERPRINTS[task]:
         raise InvalidValueError(
@@ -30,6 +40,9 @@ def check_robomme_name(name: str, task: str, literals: Literals, where: str) -> 
 
 
 def fingerprint(task: str, literals: Literals) -> str:
-    """Return the hash of what sentences say in RoboMME's published episodes of a task."""
+    """Return a hash of what sentences say in RoboMME's published episodes of a task.
+
+    It is compared with `FINGERPRINTS`. A goal without a sentence counts as an empty one.
+    """
     said = [literals.get(unordered(goal), "") for goal in published_goals(task)]
     return short_hash("\n".join(said))

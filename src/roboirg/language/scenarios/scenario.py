@@ -33,7 +33,11 @@ REMARKS = ("remarks.former", "remarks.latter", "remarks.not_former", "remarks.no
 
 
 class PointerRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"kind": "class"}):
-    """An expression of the closed table; `pointers.toml` explains the fields."""
+    """A row of the table of pointers, words that point back; `pointers.toml` explains the fields.
+
+    The row for *the latter*: ``words = "the latter"``, ``class = "latter"``, ``operation =
+    "rank"``.
+    """
 
     words: str
     kind: str
@@ -44,14 +48,21 @@ class PointerRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename
 
 
 class Derive(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How the goal of a reasoning scenario follows: pattern, and the relations that it can say."""
+    """How the goal of a reasoning scenario follows.
+
+    Attributes:
+        pattern: the kind of reasoning.
+        relations: those that its words can say, ``one fewer``; empty if nothing is computed.
+    """
 
     pattern: PatternName
     relations: Texts = ()
 
 
 class Needs(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What must hold of an episode; nothing about the values of its goal, which it would give away.
+    """What must hold of an episode in which a scenario is said.
+
+    Nothing is about the values of its goal: a scenario for red goals only would give them away.
 
     Attributes:
         colors: possible numbers of colors in the goal.
@@ -71,9 +82,16 @@ People = Mapping[Literal["he", "she"], Texts]
 
 
 class ScenarioFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a scenario's file has besides sentences.
+    """What a scenario's file has besides sentences. Digests depend on the names of these fields.
 
-    `pool` is None for both, in the files of users only.
+    Attributes:
+        frame: the name of the scenario, for its situation: ``school trip``.
+        pool: ``train`` or ``test``; None for both, in the files of users only.
+        setting: in which it is said.
+        list: the slot of the goal of which it lists values, *red or blue*; empty if it does not.
+        derive: how the goal follows; in reasoning only.
+        needs: what must hold of an episode.
+        people: whose names it can say; None for those of `general.toml`.
     """
 
     frame: str
@@ -85,18 +103,19 @@ class ScenarioFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     people: People | None = None
 
     def is_in(self, pool: PoolName) -> bool:
-        """Return whether a pool has the scenario."""
+        """Return whether a pool, ``train`` or ``test``, has the scenario."""
         return self.pool in (None, pool)
 
 
 class Scenario(msgspec.Struct, frozen=True):
-    """A scenario with its sentences parsed.
+    """A scenario: a template for a text, with its sentences parsed.
 
     Attributes:
-        fields: the others, as written.
-        texts: its sentences by field, ``say.color`` has several.
-        people: who can be spoken of, each with his or her pronouns; empty if nobody is.
-        said: the fields of the command that point back.
+        fields: all that is no sentence, as written.
+        texts: its sentences by field; ``say.color`` may have several, of which one is drawn.
+        people: of whom it can speak, each a name with his or her pronouns; empty if it names
+            nobody.
+        said: the fields of the command for which it has words that point back: ``("color",)``.
     """
 
     fields: ScenarioFields
@@ -105,7 +124,7 @@ class Scenario(msgspec.Struct, frozen=True):
     said: Texts
 
     def text(self, field: str) -> Text:
-        """Return the only sentence of a field; empty if it has none."""
+        """Return the first sentence of a field, parsed; empty if it has none."""
         return self.texts.get(field, ((),))[0]
 
 
@@ -117,7 +136,7 @@ class General(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class FileFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A file, with its scenarios as they were written.
+    """The content of a file of words, with its tables as they were written.
 
     Attributes:
         tasks: that it serves.
@@ -125,7 +144,7 @@ class FileFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         source: of a user's words, in a sentence.
         scenario: the table of each scenario.
         commands: of a task, or of `ALL`, by pool; a list is for both pools.
-        stated: words by field, of a task or of `ALL`.
+        stated: by task, or of `ALL`, the words that state the value of each field.
         literal: the table of each whole sentence.
     """
 
@@ -139,14 +158,14 @@ class FileFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TaskScenarios(msgspec.Struct, frozen=True):
-    """The words of a task.
+    """The words of a task: all from which its instructions are made.
 
     Attributes:
-        commands: skeletons, of any fields that a goal can have, by pool.
-        stated: the words that state a field's value.
-        scenarios: all that are said of it.
+        commands: by pool, with slots for the fields of a goal: ``Pick up {color} {repeats}.``
+        stated: the words that state the value of a field: ``the {color} cube``.
+        scenarios: all that are said of it, in all settings.
         file: the name of the file that has them.
-        literals: whole sentences, which explicit says instead of a command.
+        literals: whole sentences by goal, which explicit says instead of a command.
         own: what the file has itself: fields of `stated`, and `COMMANDS`. The rest is of the file
             that the task names.
     """

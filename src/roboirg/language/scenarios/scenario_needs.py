@@ -1,4 +1,4 @@
-"""What the fields of a scenario need of each other, whatever the episode."""
+"""What the fields of a scenario, a text template, need of each other, whatever the episode."""
 
 from __future__ import annotations
 
@@ -21,17 +21,24 @@ _FEWEST_PEOPLE = 2
 
 
 def scenario_settings() -> Mapping[str, Setting]:
-    """Return the settings that scenarios are written for; contextual says those of direct."""
+    """Return the settings for which scenarios are written, by name.
+
+    Explicit has no scenarios, and contextual says those of direct.
+    """
     without_scenarios = ("", "explicit", "contextual")
     return {
         name: setting
         for name, setting in all_settings().items()
-        if setting.offers not in without_scenarios
+        if setting.content_plans not in without_scenarios
     }
 
 
 def sentence_names(stated: Collection[str]) -> list[str]:
-    """Return the fields of a scenario that hold sentences, by the fields that its tasks state."""
+    """Return the names of all fields of a scenario that can hold sentences.
+
+    For a task whose commands state ``color``: ``introduction``, ``cue`` …, ``say.color``,
+    ``resolved.color``.
+    """
     names = ["introduction", *CONTEXTUAL, *REMARKS, "lead", "resolved.lead"]
     for name in stated:
         names += [f"say.{name}", f"resolved.{name}"]
@@ -39,9 +46,15 @@ def sentence_names(stated: Collection[str]) -> list[str]:
 
 
 def check_needs(scenario: Scenario, stated: Collection[str], mistakes: Mistakes) -> None:
-    """Add a mistake for all that a scenario lacks of what its setting and other fields need.
+    """Add a mistake for all that a scenario lacks of what its setting and its other fields need.
 
-    `stated` has the fields of the task's commands: ``color``, ``repeats``.
+    A scenario is a text template: a scenario of the setting ``direct-rival`` must have the remarks
+    that choose one of two values, and one of ``reasoning`` the table ``derive``.
+
+    Args:
+        scenario: whose fields are each of the right type.
+        stated: the fields of the task's commands: ``color``, ``repeats``.
+        mistakes: of the file, at the scenario.
     """
     fields = scenario.fields
     settings = scenario_settings()
@@ -53,7 +66,7 @@ def check_needs(scenario: Scenario, stated: Collection[str], mistakes: Mistakes)
     if not scenario.said:
         mistakes.add(f"has no say; write say.{' or say.'.join(stated)}")
     has_derive = fields.derive is not None
-    if has_derive != (setting.offers == "reasoning"):
+    if has_derive != (setting.content_plans == "reasoning"):
         mistakes.add("must have derive if its setting is reasoning, and only then")
     if fields.people is not None:
         names_of_people = set(itertools.chain.from_iterable(fields.people.values()))
@@ -66,11 +79,14 @@ def check_needs(scenario: Scenario, stated: Collection[str], mistakes: Mistakes)
 
 
 def _check_presence(scenario: Scenario, setting: Setting, mistakes: Mistakes) -> None:
-    """Add a mistake if a scenario lacks a sentence that its setting says, or has an empty one."""
+    """Add a mistake if a scenario lacks a sentence that its setting says, or has an empty one.
+
+    The mistake names all of them: *has no cue and no lead; direct needs introduction, …*.
+    """
     needed: list[str] = ["introduction"]
     if setting.name == "direct":
         needed += CONTEXTUAL
-    if setting.offers == "direct-rival":
+    if setting.content_plans == "direct-rival":
         needed += REMARKS
     lacking: list[str] = []
     for name in dict.fromkeys([*needed, *scenario.texts]):
@@ -83,8 +99,9 @@ def _check_presence(scenario: Scenario, setting: Setting, mistakes: Mistakes) ->
 def _check_sentences(scenario: Scenario, mistakes: Mistakes) -> None:
     """Add a mistake for each sentence of a scenario that does not speak of what it must.
 
-    Remarks that compete name a value that is not meant, remarks that choose point at something, and
-    all words for a field leave the same fields of the goal to the context.
+    Competing remarks name a value that is not meant, ``{rival color}``; remarks that choose point
+    back, ``<former color: the former>``; and all alternatives for a field of the command leave the
+    same fields of the goal to the introduction.
     """
     for text in scenario.texts.get("competing", ()):
         if not any(name.startswith("rival ") for name in slots_in(text)):
@@ -100,7 +117,10 @@ def _check_sentences(scenario: Scenario, mistakes: Mistakes) -> None:
 
 
 def slots_of(stated: Collection[str]) -> set[str]:
-    """Return the slots of a task, and its fields: ``colors`` and ``colors.0``."""
+    """Return the slots that a task's sentences can have for its goal: ``colors`` and ``colors.0``.
+
+    `stated` has the fields of its commands.
+    """
     if AMOUNT_FIELD in stated:
         return {*SLOTS, *stated}
     return {*stated, *(name.partition(".")[0] for name in stated)}

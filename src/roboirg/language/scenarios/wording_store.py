@@ -22,12 +22,19 @@ _OPEN: dict[str, Wordings] = {}
 
 
 def open_wordings(path: str | Path | None, identity: str | None = None) -> str | None:
-    """Open a wording file for this process, and return its identity; None for no file.
+    """Open a wording file for this process, and return its identity; None for our own words.
+
+    ``open_wordings("mine.toml")`` returns ``mine@1a2b3c4d``, the name and a hash of the content. A
+    worker of a run also passes the identity that its episodes need, so that a file that has changed
+    meanwhile is refused.
 
     Args:
-        path: the file, or the identity of wordings that are open; ``train`` or ``test`` for the
+        path: the file, or the identity of wordings that are open; ``train`` or ``test`` for our own
             words of that pool; None for our own words.
         identity: the wordings that are wanted; None for those of the file.
+
+    Raises:
+        InvalidValueError: the file cannot be read, is invalid, or is not the one that is wanted.
     """
     if identity in _OPEN:
         return identity  # it is open already, whatever the path
@@ -49,13 +56,17 @@ def open_wordings(path: str | Path | None, identity: str | None = None) -> str |
 
 
 def register_wordings(wordings: Wordings) -> str:
-    """Make wordings known to this process; return their identity."""
+    """Make wordings known to this process, and return their identity: ``mine@1a2b3c4d``."""
     _OPEN[wordings.identity] = wordings
     return wordings.identity
 
 
 def find_wordings(identity: str) -> Wordings:
-    """Return wordings that this process has opened."""
+    """Return wordings that this process has opened, by their identity.
+
+    Raises:
+        InvalidValueError: they are not open.
+    """
     if identity not in _OPEN:
         raise InvalidValueError(
             f"The wordings {identity!r} are not open; call open_wordings with their file first."
@@ -64,7 +75,7 @@ def find_wordings(identity: str) -> Wordings:
 
 
 def task_words(task: str, setting: str, wordings: str | None) -> TaskScenarios | None:
-    """Return what is said of a task in a setting; None if nothing has been written.
+    """Return the commands and scenarios of a task for a setting; None if nobody has written any.
 
     An open wording file comes before the file of the setting, and this one before the file of the
     task.
@@ -82,10 +93,15 @@ def task_words(task: str, setting: str, wordings: str | None) -> TaskScenarios |
 
 @functools.cache
 def _with_ours(task: str, setting: str, identity: str) -> TaskScenarios | None:
-    """Return the words of a wording file for a task, with ours where the file has none.
+    """Return a wording file's words of a task, completed by our own; None if it lacks the task.
 
     Ours stand in for its commands if it has none at all, for each value that it does not state, and
-    for each setting of which it has no scenario.
+    for each setting of which it has no scenario (text template).
+
+    Args:
+        task: its name.
+        setting: its name.
+        identity: of the wording file, which must be open.
     """
     ours = words_in(setting, task)
     theirs = find_wordings(identity).tasks.get(task)

@@ -1,4 +1,4 @@
-"""What people have written in files: TOML with its values, and complaints that name the place.
+"""Read TOML files that people have written, and collect their mistakes, each with its place.
 
 Anyone may have written it, so nothing in it can take long, or reach a terminal as it is.
 """
@@ -39,10 +39,12 @@ _NOUNS = {"array": "a list", "object": "a table", "str": "a text", "int": "a num
 
 
 class Mistakes:
-    """What is wrong with a file, a line for each mistake.
+    """The mistakes of a file, a line for each, such as ``mine.toml, scenario 'trip' has no cue``.
+
+    They are collected while the file is read, and raised together by `raise_if_any`.
 
     Args:
-        where: the file; complaints begin with it.
+        where: names the file; each line begins with it.
     """
 
     def __init__(self, where: str) -> None:
@@ -53,49 +55,63 @@ class Mistakes:
         return len(self._found)
 
     def at(self, part: str) -> Mistakes:
-        """Return the same mistakes, of which the next ones are in a part of the file."""
+        """Return a view of the same mistakes for a part of the file.
+
+        What is added to it counts for the file as well, and its line names the part.
+        """
         inner = copy.copy(self)
         inner.where = f"{self.where}, {part}"
         return inner
 
     def add(self, complaint: str) -> None:
-        """Remember a mistake: ``has no cue``."""
+        """Add a mistake, the end of a sentence that begins with the place: ``has no cue``."""
         self._add(f"{self.where} {complaint}.")
 
     def check_names(self, kind: str, names: Iterable[str], known: Collection[str]) -> None:
-        """Remember each name that is unknown."""
+        """Add a mistake for each name that is not known, with the known ones that are like it.
+
+        Args:
+            kind: what the names are, ``task``.
+            names: as written.
+            known: all that exist.
+        """
         for name in names:
             if name not in known:
                 self._add(f"{self.where}: {UnknownNameError(kind, name, sorted(known))}")
 
     @contextlib.contextmanager
-    def kept(self) -> Iterator[None]:
-        """Remember the error with which a block ends."""
+    def collecting(self) -> Iterator[None]:
+        """Add the error with which a ``with`` block ends, instead of letting it through."""
         try:
             yield
         except InvalidValueError as error:
             self._add(str(error))
 
-    def refuse(self) -> None:
-        """Raise an error with all mistakes, if there are any."""
+    def raise_if_any(self) -> None:
+        """Raise an InvalidValueError with a line for each mistake, if there are any."""
         if self._found:
             raise InvalidValueError("\n".join(self._found))
 
     def _add(self, line: str) -> None:
-        """Remember a line; raises an error with all of them where a file has too many."""
+        """Add a line once; raise an InvalidValueError with all lines if a file has too many."""
         self._found[clip_text(line, _MOST_LETTERS)] = None
         if len(self) == _MOST_MISTAKES:
-            self._add(f"There may be more mistakes; these are the first {_MOST_MISTAKES}.")
-            self.refuse()
+            more = f"There may be more mistakes; these are the first {_MOST_MISTAKES}."
+            self._found[more] = None
+            self.raise_if_any()
 
 
-def shown(value: object) -> str:
-    """Return the beginning of a value, as complaints have it."""
+def excerpt(value: object) -> str:
+    """Return the beginning of a value as Python writes it, for messages: ``'Lift the…``."""
     return clip_text(repr(value), _MOST_SHOWN)
 
 
-def text_of(path: Path) -> str:
-    """Return the text of a file, without a byte order mark."""
+def read_text(path: Path) -> str:
+    """Return the text of a file in UTF-8, without a byte order mark.
+
+    Raises:
+        InvalidValueError: it cannot be read, is no regular file, or has more than `MOST_BYTES`.
+    """
     try:
         return read_regular(path, MOST_BYTES).decode("utf-8-sig")
     except (OSError, ValueError) as error:  # a path may hold NUL
@@ -103,8 +119,16 @@ def text_of(path: Path) -> str:
         raise InvalidValueError(f"The file {str(path)!r} cannot be read: {reason}.") from error
 
 
-def data_of(text: str, where: str) -> dict[str, Any]:
-    """Return the data of a TOML file; `where` names it in complaints."""
+def parse_toml(text: str, where: str) -> dict[str, Any]:
+    """Return the data of a TOML file.
+
+    Args:
+        text: of the file.
+        where: names the file in messages.
+
+    Raises:
+        InvalidValueError: it is not valid, or nests keys so deep that parsing would take too long.
+    """
     if _DEEP_KEY.search(text):  # takes a time and memory that grow with the square of the depth
         raise InvalidValueError(
             f"{where} is not valid TOML: a key has more than {_MOST_KEY_PARTS} parts."
@@ -115,23 +139,32 @@ def data_of(text: str, where: str) -> dict[str, Any]:
         raise InvalidValueError(f"{where} is not valid TOML: {error}.") from error
 
 
-def converted(value: object, kind: type[Stored], where: str) -> Stored:
-    """Return a value of a file as a type; raise if it has another one.
+def convert(value: object, kind: type[Stored], where: str) -> Stored:
+    """Return a value of a file as a type: the list ``["a"]`` as ``tuple[str, ...]`` is ``("a",)``.
 
-    `where` names its field in the message.
+    Args:
+        value: as the TOML parser returns it.
+        kind: the type.
+        where: names the field in messages: ``mine.toml, pool``.
+
+    Raises:
+        InvalidValueError: it has another type.
     """
-    choices = _choices(kind)
-    if choices and value not in (None, *choices):
-        raise InvalidValueError(f"{where} is {shown(value)}; it must be {' or '.join(choices)}.")
+    allowed = _allowed_words(kind)
+    if allowed and value not in (None, *allowed):
+        raise InvalidValueError(f"{where} is {excerpt(value)}; it must be {' or '.join(allowed)}.")
     try:
         return msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
-        complaint = _plain(str(error))
-        raise InvalidValueError(f"{where}: {complaint}; it is {shown(value)}.") from None
+        complaint = _in_plain_words(str(error))
+        raise InvalidValueError(f"{where}: {complaint}; it is {excerpt(value)}.") from None
 
 
-def _plain(complaint: str) -> str:
-    """Return a complaint of msgspec in plain words: *Expected a list, got a number*."""
+def _in_plain_words(complaint: str) -> str:
+    """Return a complaint of msgspec in words that authors of files know.
+
+    ``Expected `array`, got `int``` becomes *Expected a list, got a number*.
+    """
     words = clip_text(complaint, 2 * _MOST_SHOWN)
     words = words.replace("`", "").replace(" | ", " or ")
     for name, noun in _NOUNS.items():
@@ -139,20 +172,26 @@ def _plain(complaint: str) -> str:
     return words
 
 
-def fields_of(
+def read_table(
     written: Mapping[str, Any], kind: type[Table], mistakes: Mistakes, others: Iterable[str] = ()
 ) -> Table | None:
-    """Return a table of a file as a struct; None if it lacks a field or one is wrong.
+    """Return a table of a file as a struct; None if a field is missing or wrong.
 
-    All mistakes are added. `others` are fields that a table can have and the struct has not.
+    All mistakes of the table are added, so None means that there is at least one.
+
+    Args:
+        written: the table, by field.
+        kind: the struct.
+        mistakes: of the file, at the table.
+        others: fields that the table may have besides those of the struct.
     """
     found: dict[str, Any] = {}
     is_right = True  # until a field lacks or is wrong; then all others are checked as well
     for field in msgspec.structs.fields(kind):
         if field.name in written:
             where = f"{mistakes.where}, {field.name}"
-            with mistakes.kept():
-                found[field.name] = converted(written[field.name], field.type, where)
+            with mistakes.collecting():
+                found[field.name] = convert(written[field.name], field.type, where)
             if field.name not in found:
                 is_right = False
         elif field.required:
@@ -164,8 +203,11 @@ def fields_of(
     return kind(**found)
 
 
-def _choices(kind: object) -> tuple[str, ...]:
-    """Return the words that a type allows; empty if it is none of words."""
+def _allowed_words(kind: object) -> tuple[str, ...]:
+    """Return the words that a type allows; empty if it is no type of words.
+
+    ``Literal["train", "test"]`` and ``Literal["train", "test"] | None`` give ``("train", "test")``.
+    """
     for part in (kind, *get_args(kind)):
         if get_origin(part) is Literal:
             return get_args(part)

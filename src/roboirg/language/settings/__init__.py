@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.language.instruction import FORMS
 from roboirg.language.settings.setting import Setting
-from roboirg.tasks import Task
+from roboirg.tasks import Task, every_task
 from roboirg.util.discovery import discover
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "EXPLICIT",
     "SETTING_GROUPS",
     "all_settings",
+    "check_named_settings",
     "expand_settings",
     "find_settings",
     "get_setting",
@@ -44,12 +45,15 @@ def all_settings() -> Mapping[str, Setting]:
 
 
 def setting_names() -> tuple[str, ...]:
-    """Return the names of all settings, explicit first."""
+    """Return the names of all settings, explicit first: ``("explicit", "direct", …)``."""
     return tuple(all_settings())
 
 
 def plain_settings(task: Task | None = None) -> tuple[str, ...]:
-    """Return the names that ``all`` means: of every setting, or a task's, but the harder ones."""
+    """Return the names of the settings that the word ``all`` means: all but the harder ones.
+
+    With a task only the settings that it has, else of every task.
+    """
     names = setting_names() if task is None else settings_of(task)
     return tuple(name for name in names if all_settings()[name].plain is None)
 
@@ -61,7 +65,7 @@ SETTING_GROUPS = {"all": plain_settings, "every": setting_names}
 def expand_settings(words: Iterable[str]) -> tuple[str, ...]:
     """Return names of settings, with words for groups, ``all``, replaced by the names they mean.
 
-    Each name stands there once, those from groups first.
+    Each name stands there once, those from groups first. Names are not checked.
     """
     names: list[str] = []
     others: list[str] = []
@@ -85,13 +89,44 @@ def find_settings(words: Iterable[str]) -> tuple[str, ...]:
     return names
 
 
+def check_named_settings(words: Sequence[str], tasks: Sequence[str]) -> None:
+    """Raise if a task lacks a setting that a list names; say which have it, and what the rest is.
+
+    Where a word for several, such as ``all``, is in the list, it means what each task has.
+
+    Args:
+        words: the list, as in `find_settings`.
+        tasks: names.
+
+    Raises:
+        InvalidValueError: a task lacks one.
+    """
+    if any(word.lower() in SETTING_GROUPS for word in words):
+        return
+    for name in words:
+        setting = all_settings()[name]
+        having = [task.name for task in every_task().values() if setting.applies_to(task)]
+        lacking = [task for task in tasks if task not in having]
+        if lacking:
+            others = ",".join(word for word in words if word != name)
+            raise InvalidValueError(
+                f"There is no {name} setting in {', '.join(lacking)}, but in {', '.join(having)}; "
+                f"for the rest give --settings {others or 'all'}."
+            )
+
+
 def settings_of(task: Task) -> tuple[str, ...]:
     """Return the names of the settings that a task has, explicit first."""
     return tuple(name for name, setting in all_settings().items() if setting.applies_to(task))
 
 
 def get_setting(name: str, task: Task) -> Setting:
-    """Return a setting of a task by name."""
+    """Return a setting of a task by name.
+
+    Raises:
+        UnknownNameError: there is no such setting.
+        InvalidValueError: the task lacks it.
+    """
     _check(name)
     if not all_settings()[name].applies_to(task):
         raise InvalidValueError(
@@ -101,7 +136,16 @@ def get_setting(name: str, task: Task) -> Setting:
 
 
 def _check(name: str, *groups: str) -> None:
-    """Raise if there is no setting, nor one of some groups, of that name."""
+    """Check that there is a setting of a name, or a group of settings such as ``all``.
+
+    Args:
+        name: to check.
+        groups: the words for groups that are allowed besides.
+
+    Raises:
+        UnknownNameError: there is neither.
+        InvalidValueError: the name is that of a form, ``resolved``, which is no setting.
+    """
     if name in FORMS:
         implicit = [setting.name for setting in all_settings().values() if setting.implicit]
         raise InvalidValueError(

@@ -12,7 +12,7 @@ SETTING = Setting(
     order=3,
     summary="direct, with reinforcement, a distractor and a cue before the command",
     color="#009E73",
-    offers="contextual",
+    content_plans="contextual",
     reads=frozenset({"stages", "distractor", "distractors", "delivery"}),
     variants=tuple(
         {"stages": stages, "distractor": distractor}

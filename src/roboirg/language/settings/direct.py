@@ -9,7 +9,7 @@ SETTING = Setting(
     order=1,
     summary="an introduction names every value; the command points back at it",
     color="#0072B2",
-    offers="direct",
+    content_plans="direct",
     reads=frozenset({"delivery"}),
     example=2,
 )

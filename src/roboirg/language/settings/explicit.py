@@ -9,6 +9,6 @@ SETTING = Setting(
     order=0,
     summary="one command states every value",
     color="#000000",
-    offers="explicit",
+    content_plans="explicit",
     implicit=False,
 )

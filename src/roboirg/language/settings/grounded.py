@@ -20,14 +20,17 @@ Clues = Mapping[GoalValue, Clue]
 
 
 def refusal(request: InstructionRequest) -> str | None:
-    """Return why nothing in an episode can be described by what is seen; None if something can."""
-    if clues_of(request):
+    """Return why nothing in an episode can be described by what is seen; None if something can.
+
+    The text is the end of a sentence, without a stop.
+    """
+    if draw_clues(request):
         return None
     return "nothing to see in this scene singles out a slot's value"
 
 
-def clues_of(request: InstructionRequest) -> Clues:
-    """Return words for what is to be seen for each value of the goal that has any.
+def draw_clues(request: InstructionRequest) -> Clues:
+    """Return words for what is to be seen for each value of the goal that has any; they are drawn.
 
     For the goal *red* it may be *the cube in the middle*. Where a color is described, counts are
     stated, so they have none.
@@ -36,15 +39,23 @@ def clues_of(request: InstructionRequest) -> Clues:
     for value in request.goal_values:
         clues = _clues_to(request, value)
         if clues:
-            clue_by_value[value] = _drawn(request, f"{value.field} seen", clues)
+            clue_by_value[value] = _draw_clue(request, f"{value.field} seen", clues)
     has_color = any(value.slot == "colors" for value in clue_by_value)
     if has_color:  # the words then state the counts
         return {value: clue for value, clue in clue_by_value.items() if value.slot != "counts"}
     return clue_by_value
 
 
-def _drawn(request: InstructionRequest, purpose: str, clues: list[Clue]) -> Clue:
-    """Draw the kind first, then one of its clues."""
+def _draw_clue(request: InstructionRequest, purpose: str, clues: list[Clue]) -> Clue:
+    """Draw one of some clues, words for what is seen: first their kind, then one of this kind.
+
+    Otherwise most clues would be of the most frequent kind.
+
+    Args:
+        request: the episode.
+        purpose: of the draw; a hash key, so it has to stay.
+        clues: at least one.
+    """
     kinds = list(dict.fromkeys(clue.kind for clue in clues))
     kind = request.sampler.pick(f"{purpose} clue", kinds)
     return request.sampler.pick(purpose, [clue for clue in clues if clue.kind == kind])
@@ -97,7 +108,7 @@ def _is_open(request: InstructionRequest, slot: str) -> bool:
 
 
 def _values_of_others(goal: Goal, slot: str) -> list[str]:
-    """Return the values of all slots of a goal but one, sorted."""
+    """Return the values of all slots of a goal but one, as sorted texts, to compare goals."""
     values: list[str] = []
     for name, content in goal.slots:
         if name != slot:
@@ -119,7 +130,7 @@ def _is_said(request: InstructionRequest, event: EventClue, value: GoalValue) ->
 
 
 def _is_late(scene: Scene) -> bool:
-    """Return whether some cubes arrive later."""
+    """Return whether some cubes of a scene arrive after its start."""
     return any(motion.under is None for motion in scene.motions_of(Away))
 
 
@@ -147,7 +158,7 @@ SETTING = Setting(
     order=5,
     summary="the introduction describes what only the scene or the video shows",
     color="#44AA99",
-    offers="grounded",
+    content_plans="grounded",
     applies_to=_applies_to,
     refusal=refusal,
     reads=frozenset({"delivery"}),

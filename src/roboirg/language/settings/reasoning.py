@@ -13,7 +13,7 @@ SETTING = Setting(
     order=2,
     summary="the context gives an intermediate reference, from which the goal is derived",
     color="#D55E00",
-    offers="reasoning",
+    content_plans="reasoning",
     reads=frozenset({"delivery"}),
     example=3,
 )

@@ -11,8 +11,8 @@ from roboirg.core.instruction_options import OPTION_NAMES
 from roboirg.language.request import InstructionRequest
 from roboirg.tasks import Task
 
-Offers = Callable[[InstructionRequest], Iterable[Any]]
-"""Yields each way to the goal that a scenario can say: an `Offer` of `scenarios.introduced`."""
+ContentPlanner = Callable[[InstructionRequest], Iterable[Any]]
+"""Yields each content plan for an episode: a `ContentPlan` of `scenarios.fillers`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,9 +25,11 @@ class Setting:
         summary: one line for docs and help, without a final stop.
         color: in figures, as ``"#rrggbb"``; ours are from the palette of Okabe and Ito, which
             color-blind readers can tell apart.
-        offers: yields the ways to the goal that scenarios can say; or the name of a setting of
-            ours that has the same ways: ``"direct"``, or ``"explicit"`` for the command alone, or
-            ``"contextual"`` for the scenarios of direct with what stands between.
+        content_plans: yields the content plans of an episode, the ways to say its goal without
+            naming it in the command (which fields of the command are pronouns, and what the
+            introduction names for them); or the name of a setting of ours with the same plans:
+            ``"direct"``, or ``"explicit"`` for the command alone, or ``"contextual"`` for the
+            scenarios of direct with what stands between.
         applies_to: whether a task has the setting.
         refusal: returns why the setting cannot express a request, in words that follow "cannot
             express the episode:" and name no object of the scene; None if it can.
@@ -50,7 +52,7 @@ class Setting:
     order: int
     summary: str
     color: str
-    offers: Offers | str
+    content_plans: ContentPlanner | str
     applies_to: Callable[[Task], bool] = lambda _task: True
     refusal: Callable[[InstructionRequest], str | None] = lambda _request: None
     implicit: bool = True

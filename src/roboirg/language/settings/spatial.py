@@ -14,7 +14,8 @@ from roboirg.language.settings.setting import Setting
 def refusal(request: InstructionRequest) -> str | None:
     """Return why no place can say the goal; None if any thing that it is about has a place.
 
-    A place is words that single out one thing by where it stands, *on the left*.
+    A place is words that single out one thing by where it stands, *on the left*. The text is the
+    end of a sentence, without a stop.
     """
     kind = request.task.things.pointed
     things_with_place = things_at(request.episode.scene, kind, request.frame).values()
@@ -30,7 +31,7 @@ SETTING = Setting(
     order=4,
     summary="a place identifies the object; the command points there",
     color="#CC79A7",
-    offers="spatial",
+    content_plans="spatial",
     applies_to=lambda task: task.spatial,
     refusal=refusal,
     reads=frozenset({"frame", "delivery"}),

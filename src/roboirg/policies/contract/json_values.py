@@ -19,6 +19,8 @@ _MAX_LISTED = 64
 _MAX_TEXT_LENGTH = 1000
 _TOO_LARGE = 2**63
 _MAX_SHOWN = 80
+_TEXTUAL = str, PurePath, int, np.integer
+"""Types of what may stand for a text: paths and whole numbers do, too."""
 
 
 class _Place(NamedTuple):
@@ -106,7 +108,11 @@ def _object(value: Mapping[Any, Any], place: _Place) -> dict[str, Any]:
     """
     entries: dict[str, Any] = {}
     for key, entry in value.items():
-        name = _text(key, place._replace(key=place.key or "a key"))
+        if place.owner is not None and not isinstance(key, _TEXTUAL):
+            shown = clip_text(repr(key), _MAX_SHOWN)
+            where = place.key or "them"
+            raise InvalidValueError(f"{place.owner}: {shown} is a key of {where}, and no text.")
+        name = _text(key, place)
         path = f"{place.key}.{key}" if place.key else str(key)
         entries[name] = _as_json(entry, place.inside(path))
     return entries
@@ -135,7 +141,7 @@ def _text(value: object, place: _Place) -> str:
         return printable(str(value)[:_MAX_TEXT_LENGTH])
     if isinstance(value, str):
         return str.__str__(value)  # of a subclass, too
-    if isinstance(value, PurePath | int | np.integer):
+    if isinstance(value, _TEXTUAL):
         return str(value)
     raise InvalidValueError(
         f"{place.owner}: {place.key!r} is {clip_text(repr(value), _MAX_SHOWN)}; it must be a text, "

@@ -50,7 +50,7 @@ def check_rows(rows: Any, space: ActionSpace) -> NDArray[np.float64]:  # noqa: A
     """
     count = len(rows) if hasattr(rows, "__len__") else 0
     if count > MAX_ROWS:
-        raise InvalidActionError(f"{count} actions at once are too many; at most {MAX_ROWS}.")
+        raise InvalidActionError(f"Actions at once: expected at most {MAX_ROWS:,}, got {count:,}.")
     return check_chunk(rows, space)
 
 

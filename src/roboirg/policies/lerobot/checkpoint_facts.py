@@ -10,6 +10,7 @@ from typing import NamedTuple
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import CAMERAS
 from roboirg.policies.contract.policy_version import CHECKPOINT_FILE
+from roboirg.util.regular_file import read_regular
 
 PICTURE = "observation.images.{}"
 STATE = "observation.state"
@@ -49,7 +50,7 @@ def read_facts(place: str) -> CheckpointFacts:
             from huggingface_hub import try_to_load_from_cache
 
             path = Path(str(try_to_load_from_cache(place, CHECKPOINT_FILE)))
-        config = json.loads(path.read_text(encoding="utf-8"))
+        config = json.loads(read_regular(path))
         features = config["input_features"]
         shapes = {name: feature.get("shape") for name, feature in features.items()}
         limit = config.get("tokenizer_max_length")

@@ -41,6 +41,8 @@ def read_tokenizer(path: str) -> Tokenize:
         raise InvalidValueError(
             f"The tokenizer {path!r} is not a file; give a SentencePiece model or a tokenizer.json."
         ) from error
+    except InvalidValueError as error:
+        raise InvalidValueError(f"The tokenizer cannot be read: {error}") from error
     read = _read_json if path.endswith(JSON) else _read_sentencepiece
     with _attributed_to(path):
         tokenize = read(path, content)

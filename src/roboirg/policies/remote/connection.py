@@ -54,6 +54,8 @@ _MIN_TIMEOUT = 0.001
 _MICROSECONDS = 1_000_000
 """In a second."""
 _MAX_ERROR_LENGTH = 300
+_MOST_SHOWN = 80
+"""Bytes of what is no message in an error."""
 _MAX_TRACEBACK_END = 4096
 
 
@@ -127,7 +129,7 @@ class ServerConnection:
                     return {}
                 message = _next_message(websocket, end)
         except ConnectionClosed as error:
-            raise self._broken(error) from error
+            raise self._broken(error, len(data or b"")) from error
         if message is None:
             raise PolicyTimeoutError(f"{self} did not send {awaited} within {seconds:g} s.")
         return self._read(message)
@@ -144,7 +146,10 @@ class ServerConnection:
         self._held.close()
 
     def error_reply(self, text: str) -> PolicyReplyError:
-        """Return the error for a traceback that a server has sent; its last line is shown."""
+        """Return the error for what a server has sent about one, such as a traceback.
+
+        Its last line is shown.
+        """
         text = without_keys(text)  # before it is cut, perhaps within a key
         # Only the end is split into lines: there may be millions.
         lines = text[-_MAX_TRACEBACK_END:].rstrip().splitlines()
@@ -247,20 +252,32 @@ class ServerConnection:
         """
         if isinstance(data, str):
             raise self.error_reply(data)
+        data = bytes_without_keys(data)
         try:
-            return unpack(bytes_without_keys(data))
+            return unpack(data)
         except CodecError as error:
             raise PolicyReplyError(
-                f"{self} sent something other than a message: {error}."
+                f"{self} sent something other than a message: {error}; it begins "
+                f"{data[:_MOST_SHOWN]!r}."
             ) from error
 
-    def _broken(self, error: ConnectionClosed) -> RoboIRGError:
-        """Return (not raise) the error for a connection that has ended, by what is known of it."""
+    def _broken(self, error: ConnectionClosed, sent: int) -> RoboIRGError:
+        """Return (not raise) the error for a connection that has ended, by what is known of it.
+
+        Args:
+            error: of the library.
+            sent: bytes of the message to the server.
+        """
         if isinstance(error.__cause__, BlockingIOError):
             seconds = self._options.timeout
             return PolicyTimeoutError(f"{self} did not take in a message within {seconds:g} s.")
         if isinstance(error.__cause__, TooManyFragments):
             return PolicyReplyError(f"{self} sent a reply in too many pieces.")
+        # Whoever receives a close code sends it back, so it is that of the side that sent it first.
+        if error.rcvd_then_sent and error.rcvd is not None and error.rcvd.code == _TOO_BIG:
+            return PolicyReplyError(
+                f"{self} does not take messages of {sent:,} bytes; raise its limit."
+            )
         if error.sent is not None and error.sent.code == _TOO_BIG:
             return PolicyReplyError(
                 f"{self} sent a reply of more than {self._options.max_reply_mib:g} MiB; "
@@ -268,7 +285,7 @@ class ServerConnection:
             )
         code = "without a close code"
         if error.rcvd is not None:
-            code = f"close code {error.rcvd.code}"
+            code = f"close code {error.rcvd.code}: {without_keys(error.rcvd.reason)}".rstrip(": ")
         return PolicyConnectionError(f"{self} ended the connection ({code}).")
 
 

@@ -21,6 +21,8 @@ from roboirg.policies.remote.endpoints import RemoteOptions, read_endpoints
 
 _MOST_SHOWN = 80
 """Characters of a server's value in an error message."""
+_ERROR_KEYS = ("traceback", "message", "detail", "reason", "error")
+"""Where servers say what went wrong; the first that a reply has is shown."""
 _MOST_KEYS = 8
 """Keys of a server's reply in an error message."""
 
@@ -109,8 +111,15 @@ class RemotePolicy(ABC):
             return self.request_actions(observation)
 
     def greet(self) -> Mapping[str, Any]:
-        """Return what a server says about itself on a new connection, which it does first."""
-        return self.connection.exchange(None, "its metadata")
+        """Return what a server says about itself on a new connection, which it does first.
+
+        Raises:
+            PolicyReplyError: it says that it has failed.
+        """
+        metadata = self.connection.exchange(None, "its metadata")
+        if "error" in (metadata.get("status"), *metadata):
+            self.refuse_error(metadata)
+        return metadata
 
     @abstractmethod
     def begin_episode(self, demonstration: Demonstration) -> None:
@@ -136,14 +145,32 @@ class RemotePolicy(ABC):
 
         return self.connection.exchange(pack(message))
 
+    def refuse_error(self, reply: Mapping[str, Any]) -> None:
+        """Raise if a reply that lacks what was asked for says why.
+
+        Servers have no common form for that: ``{"status": "error", "message": "no memory"}`` and
+        ``{"error": {"detail": "no memory"}}`` are two.
+
+        Raises:
+            PolicyReplyError: it does.
+        """
+        for key in _ERROR_KEYS:
+            said = reply.get(key)
+            if isinstance(said, Mapping):
+                self.refuse_error(said)
+            elif isinstance(said, str):
+                raise self.connection.error_reply(said)
+
     def request_confirmed(self, message: Mapping[str, Any], key: str) -> None:
         """Send a message whose reply must have True under a key.
 
         Raises:
             PolicyReplyError: it does not.
         """
-        confirmed = self.request(message).get(key)
+        reply = self.request(message)
+        confirmed = reply.get(key)
         if confirmed is not True:
+            self.refuse_error(reply)
             request = next(iter(message))  # its first key says what it asks for
             raise PolicyReplyError(
                 f"{self.connection} did not confirm {request!r}: {key!r} in its reply is "
@@ -163,6 +190,7 @@ class RemotePolicy(ABC):
                 f"(keys {_listed(actions)})."
             )
         if "actions" not in reply:
+            self.refuse_error(reply)
             raise PolicyReplyError(
                 f"{self.connection} sent a reply without 'actions'; it holds {_listed(reply)}."
             )

@@ -10,6 +10,7 @@ from string import Template
 from typing import Any
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.util.regular_file import read_regular
 from roboirg.util.short_hash import short_hash
 
 SHARED = "subgoals"
@@ -77,12 +78,15 @@ def load_prompts(name: str, file: str | None = None) -> Prompts:
         InvalidValueError: the file cannot be read or is not TOML.
     """
     origin = file or f"{name}.toml"
-    source = Path(file) if file else resources.files(__package__) / "prompts" / origin
     try:
-        content = source.read_bytes()
+        if file is not None:
+            content = read_regular(Path(file))
+        else:
+            content = (resources.files(__package__) / "prompts" / origin).read_bytes()
         texts = tomllib.loads(content.decode())
-    except OSError as error:
-        raise InvalidValueError(f"Prompts {origin!r} cannot be read ({error}).") from error
+    except (OSError, InvalidValueError) as error:
+        words = str(error).rstrip(".")
+        raise InvalidValueError(f"Prompts {origin!r} cannot be read ({words}).") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InvalidValueError(f"Prompts {origin!r} are not TOML ({error}).") from error
     return Prompts(texts, short_hash(content), origin)

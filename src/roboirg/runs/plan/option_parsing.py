@@ -93,6 +93,12 @@ def parse_arms(given: object) -> Names:
     return distinct(arms)
 
 
+def parse_forms(given: object) -> Names:
+    """Return the names of forms as typed; ``both`` means both, and so does ``all``."""
+    names = parse_names("form", given)
+    return language.FORMS if names == ("both",) or means_all(given) else names
+
+
 def parse_policies(given: Iterable[str]) -> Names:
     """Return policies as they are typed, each once: ``NAME``, ``NAME=SPEC`` or an address.
 

@@ -25,8 +25,8 @@ from roboirg.language.settings import (
     EXPLICIT,
     SETTING_GROUPS,
     all_settings,
+    check_named_settings,
     find_settings,
-    get_setting,
     settings_of,
 )
 from roboirg.policies.by_name.key_variables import check_variables
@@ -103,10 +103,7 @@ class Plan(PlanFields):
             # If the first and the last exist, so do all between them.
             for episode in (min(self.episodes), max(self.episodes)):
                 splits.get_episode(task, self.split, episode)
-            if self._has_groups:  # a task may lack some settings of a group
-                continue
-            for setting in self.setting_names:
-                get_setting(setting, tasks.get_task(task))
+        check_named_settings(self.settings, self.tasks)
 
     def jobs(self, played: Iterable[Summary] = ()) -> tuple[Job, ...]:
         """Return every job, ordered by policy, task, episode, setting, form, stages and seed.

@@ -45,6 +45,7 @@ from roboirg.runs.plan.option_parsing import (
     name_and_spec,
     parse_arms,
     parse_episodes,
+    parse_forms,
     parse_names,
     parse_numbers,
     parse_policies,
@@ -167,7 +168,7 @@ class PlanFields(BaseModel):
     in_turns: Annotated[Names, names_of("setting")] = _option(
         (), "Settings that are also played with the utterances one after another."
     )
-    forms: Annotated[Names, BeforeValidator(partial(parse_names, "form"))] = _option(
+    forms: Annotated[Names, BeforeValidator(parse_forms)] = _option(
         "implicit", "implicit, resolved or both."
     )
     split: str = _option("test", "train, val, test, random, or the name of a private split.")

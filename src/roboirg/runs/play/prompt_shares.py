@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from roboirg.core.delivery import PromptVerdict, utterance_steps
+from roboirg.core.errors import InvalidValueError
 from roboirg.language.instruction import Instruction
 from roboirg.policies.prompt_length.prompt_audit import (
     InstructionAudit,
@@ -147,10 +148,17 @@ def prompt_shares(jobs: Iterable[Job]) -> tuple[PromptShares, ...]:
 
 
 def _limit_of(job: Job) -> PromptLimit | None:
-    """Return the limit that the policy of a job declares, as far as that is known now."""
+    """Return the limit that the policy of a job declares, as far as that is known now.
+
+    Raises:
+        InvalidValueError: the policy's tokenizer cannot be read; the message names the policy.
+    """
     if job.ref is None or job.ref.needs is None:
         return None
-    return prompt_limit(job.ref.needs)
+    try:
+        return prompt_limit(job.ref.needs)
+    except InvalidValueError as error:
+        raise InvalidValueError(f"The policy {job.policy} cannot be played: {error}") from error
 
 
 def share_text(verdicts: Verdicts) -> str:

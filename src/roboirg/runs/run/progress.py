@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections import Counter
+from datetime import timedelta
 from typing import Self
 
 from rich.console import Console, Group, RenderableType
@@ -17,18 +19,22 @@ from roboirg.core.arms import TOLD
 from roboirg.core.plain_text import counted, printable
 from roboirg.records.record import Record
 
+ESTIMATE_AFTER = 5
+"""Episodes of a run after which the time left is estimated."""
 _MINUTE = 60
+_UNKNOWN = "-:--:--"
 
 
 class Reporter:
     """Gets the progress of a run; this one shows nothing."""
 
-    def start(self, total: int, done: int) -> None:
+    def start(self, total: int, done: int, workers: int | None = None) -> None:
         """Start a run.
 
         Args:
             total: episodes in the plan.
             done: episodes stored before.
+            workers: episodes that are played side by side; None if that is not known.
         """
 
     def advance(self, record: Record, *, is_new: bool = True) -> None:
@@ -47,6 +53,8 @@ class ConsoleReporter(Reporter):
         self._total = 0
         self._done = 0
         self._played = 0
+        self._seconds_played = 0.0
+        self._workers: int | None = None
         self._start = time.monotonic()
         self._bar = Progress(
             TextColumn("[bold]{task.description}"),
@@ -56,14 +64,15 @@ class ConsoleReporter(Reporter):
             TextColumn("{task.fields[left]} left · {task.fields[pace]:.1f}/min"),
             console=console,
         )
-        self._task = self._bar.add_task("episodes", total=None, left="-:--", pace=0.0)
+        self._task = self._bar.add_task("episodes", total=None, left=_UNKNOWN, pace=0.0)
         # The successes have their own line, because the bar fills a narrow terminal.
         self._live = Live(console=console, get_renderable=self._render)
 
-    def start(self, total: int, done: int) -> None:
+    def start(self, total: int, done: int, workers: int | None = None) -> None:
         """Start the bar with the episodes that were stored before, which do not count as pace."""
         self._total = total
         self._done = done
+        self._workers = workers
         self._start = time.monotonic()
         self._bar.update(self._task, total=total, completed=done)
         if done:
@@ -79,11 +88,11 @@ class ConsoleReporter(Reporter):
         if is_new:
             self._done += 1
         self._played += 1
+        self._seconds_played += record.duration_s
         self._outcomes.setdefault(record.setting, Counter())[record.outcome] += 1
         elapsed = max(time.monotonic() - self._start, 1e-9)  # never 0, as it divides
         pace = _MINUTE * self._played / elapsed
-        minutes, seconds = divmod(round(_MINUTE * (self._total - self._done) / pace), _MINUTE)
-        left = f"{minutes}:{seconds:02d}"
+        left = self._time_left(elapsed)
         if self._console.is_terminal:
             self._bar.update(self._task, completed=self._done, left=left, pace=pace)
             return
@@ -92,6 +101,23 @@ class ConsoleReporter(Reporter):
             soft_wrap=True,
             highlight=False,
         )
+
+    def _time_left(self, elapsed: float) -> str:
+        """Return the time that the rest takes, such as ``1:02:03``; unknown at first.
+
+        The rest is played in rounds of one episode a worker, each as long as the episodes of this
+        run on average. If it is not known how many workers there are, there are as many as have
+        played on average.
+
+        Args:
+            elapsed: seconds since the run began.
+        """
+        remaining = self._total - self._done
+        if remaining and self._played < ESTIMATE_AFTER:
+            return _UNKNOWN
+        workers = self._workers or max(1, self._seconds_played / elapsed)
+        rounds = math.ceil(remaining / workers)
+        return str(timedelta(seconds=round(self._seconds_played / self._played * rounds)))
 
     def warn(self, text: str) -> None:
         """Print a line on stderr, above the bar."""

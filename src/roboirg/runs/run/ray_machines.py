@@ -39,6 +39,8 @@ from roboirg.tasks.splits.private_splits import use_salt
 
 KEY_S = 1.0
 """How long a client of a machine's hosts may take to send its key."""
+MOST_WITHOUT_KEY = 64
+"""Clients that may take that time side by side."""
 
 _PID_SUFFIX = ".pid"
 """Of empty files named after the processes of a run on a machine."""
@@ -168,23 +170,39 @@ class MachineAgent:
     def _open_lines(self, key: bytes) -> None:
         """Accept connections to the policy hosts of this machine until their socket is closed.
 
-        A client has to send the key of the run within `KEY_S` seconds; others are disconnected, as
-        they may be of another user.
+        Each is admitted in a thread of its own, so that none waits for another that sends nothing.
+        Of those that have not sent the key yet, there are `MOST_WITHOUT_KEY` at most; more wait in
+        the socket.
         """
+        places = threading.BoundedSemaphore(MOST_WITHOUT_KEY)
         while True:
+            places.acquire()
             try:
                 line, _ = self._door.accept()
             except OSError:
                 return
-            line.settimeout(KEY_S)
-            has_key = False
-            with contextlib.suppress(OSError):
-                has_key = secrets.compare_digest(line.recv(len(key)), key)
-            if has_key:
-                line.settimeout(None)
-                self._pool.serve(line)
-            else:
-                line.close()
+            threading.Thread(target=self._admit, args=(line, key, places), daemon=True).start()
+
+    def _admit(self, line: socket.socket, key: bytes, places: threading.BoundedSemaphore) -> None:
+        """Serve a new connection if it sends the key of the run within `KEY_S` seconds.
+
+        Others are disconnected, as they may be of another user.
+
+        Args:
+            line: the connection.
+            key: that it must send.
+            places: of connections without the key; that of this one is released.
+        """
+        line.settimeout(KEY_S)
+        has_key = False
+        with contextlib.suppress(OSError):
+            has_key = secrets.compare_digest(line.recv(len(key)), key)
+        places.release()
+        if has_key:
+            line.settimeout(None)
+            self._pool.serve(line)
+        else:
+            line.close()
 
 
 class RemoteResult(NamedTuple):

@@ -104,7 +104,7 @@ def run_plan(
         write_plan(plan, folder)
 
         todo = _jobs_to_play(jobs, store, retry_errors=retry_errors)
-        reporter.start(len(jobs), len(jobs) - len(todo))
+        reporter.start(len(jobs), len(jobs) - len(todo), getattr(executor, "workers", None))
         loop = _RunLoop(plan, store, reporter)
         loop.play(todo, play, executor)
         return loop.summary(jobs)

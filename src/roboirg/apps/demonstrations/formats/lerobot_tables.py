@@ -16,6 +16,7 @@ from roboirg.apps.demonstrations.parquet_tables import read_rows
 from roboirg.apps.demonstrations.replayable_trajectory import ReplayableTrajectory
 from roboirg.core.actions import JOINT_ANGLE
 from roboirg.util.parquet_support import check_parquet_support
+from roboirg.util.regular_file import read_regular
 
 INFO = "meta/info.json"
 """Path of the file that describes a dataset and is written last."""
@@ -39,7 +40,7 @@ def read_tables(root: Path) -> Iterator[ReplayableTrajectory]:
     check_parquet_support()
     from pyarrow import parquet
 
-    info = json.loads(path.read_text(encoding="utf-8"))
+    info = json.loads(read_regular(path))
     state = _present(_STATES, info)
     action = _present(_ACTIONS, info)
     files = sorted((root / "data").rglob("*.parquet"))

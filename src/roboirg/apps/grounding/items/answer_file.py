@@ -15,6 +15,7 @@ from roboirg.apps.grounding.items.grounding_item import (
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import clip_text
 from roboirg.util.atomic_write import write_atomically
+from roboirg.util.regular_file import read_regular
 
 _MAX_QUOTE = 60
 
@@ -45,9 +46,10 @@ def read_answers(path: Path, items: Sequence[GroundingItem]) -> list[Answer]:
             answers a question again.
     """
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InvalidValueError(f"Answers {str(path)!r} cannot be read ({error}).") from error
+        content = read_regular(path)
+    except (OSError, InvalidValueError) as error:
+        words = str(error).rstrip(".")
+        raise InvalidValueError(f"Answers {str(path)!r} cannot be read ({words}).") from error
     known = {item.id for item in items}
     answers: dict[tuple[str, QuestionKind], Answer] = {}
     for number, answer in decode_lines(content, Answer, path):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
 from roboirg.util.atomic_write import write_atomically
+from roboirg.util.regular_file import read_regular
 
 ITEMS_FILE = "items.jsonl"
 
@@ -193,10 +194,11 @@ def read_items(folder: Path) -> list[GroundingItem]:
     """
     path = folder / ITEMS_FILE
     try:
-        content = path.read_bytes()
-    except OSError as error:
+        content = read_regular(path)
+    except (OSError, InvalidValueError) as error:
+        words = str(error).rstrip(".")
         raise InvalidValueError(
-            f"{str(folder)!r} holds no grounding dataset ({error.strerror}: {path}); "
+            f"{str(folder)!r} holds no grounding dataset ({words}); "
             "make one with: roboirg export grounding --out DIR."
         ) from error
     return [item for _, item in decode_lines(content, GroundingItem, path)]

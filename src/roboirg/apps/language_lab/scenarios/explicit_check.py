@@ -24,15 +24,15 @@ from roboirg.tasks import goals_of, with_goal
 
 @dataclass(slots=True)
 class ExplicitReport:
-    """What was found about the explicit words of a task.
+    """What was found about the explicit words of a task: commands, or whole sentences.
 
     Attributes:
         stated: the goals that are stated.
-        unstated: the goals of which the file, of whole sentences, has none.
+        unstated: the goals, in words, for which a file of whole sentences has none; as keys.
         renderings: a few sentences.
-        broken: what is wrong, each once.
+        broken: what is wrong, each once; as keys.
         longest: the text with most tokens.
-        unused: goals of sentences that no scene can have.
+        unused: goals of sentences, in words, that no scene can have.
     """
 
     stated: set[Goal] = field(default_factory=set)
@@ -43,7 +43,7 @@ class ExplicitReport:
     unused: list[str] = field(default_factory=list)
 
     def add(self, goal: Goal, text: str) -> None:
-        """Add a goal that is stated, and the text that states it; the first few texts are shown."""
+        """Add a goal that is stated, with the text that states it; the first texts are kept."""
         self.stated.add(goal)
         self.longest = max(self.longest, text, key=tokens_of)
         if text not in self.renderings and len(self.renderings) < SHOWN:
@@ -51,7 +51,12 @@ class ExplicitReport:
 
 
 def has_explicit_words(words: TaskScenarios, task: str) -> bool:
-    """Return whether a file has sentences, commands or stated values of its own for a task."""
+    """Return whether a file has sentences, commands or stated values of its own for a task.
+
+    Args:
+        words: what the file says for the task, with our words where it has none.
+        task: its name.
+    """
     ours = task_scenarios(task)
     if words.literals or ours is None:
         return True
@@ -82,7 +87,7 @@ def check_explicit(words: TaskScenarios, scenes: Sequence[Episode]) -> ExplicitR
 
 
 def _unused_goals(words: TaskScenarios, scenes: Sequence[Episode]) -> list[str]:
-    """Return the goals for which a file has sentences, in words, that no scene can have."""
+    """Return the goals, in words, for which a file has sentences and that no scene can have."""
     possible: set[Goal] = set()
     for scene in scenes:
         possible.update(map(unordered, goals_of(scene)))
@@ -90,9 +95,14 @@ def _unused_goals(words: TaskScenarios, scenes: Sequence[Episode]) -> list[str]:
 
 
 def _check_goal(report: ExplicitReport, words: TaskScenarios, episode: Episode) -> None:
-    """Add to the report what is said of an episode's goal, and what is wrong with it.
+    """Say an episode's goal in explicit words, and add the text and what is wrong to a report.
 
     The words must mean this goal, or others that are equally right in the episode.
+
+    Args:
+        report: to which is added.
+        words: what the file says for the task.
+        episode: with the goal.
     """
     try:
         instruction = _instruction_of(words, episode)

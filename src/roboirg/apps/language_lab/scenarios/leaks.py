@@ -28,8 +28,8 @@ _COUNTING_REFERENCES = ("first", "second", "third", "one", "each", "other")
 def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
     """Return the words of a command that name a goal value which only its context may give.
 
-    Where the color is to be found in the context, *Lift the red cube* leaks ``red``. A landmark of
-    the goal, such as *next to the bin*, leaks its place.
+    If the introduction is to say the color, the command *Lift the red cube* leaks ``{"red"}``. A
+    landmark of the goal, such as *next to the bin*, leaks as a whole if the command says it.
     """
     text = _ONE_THING.sub("", _without_references(instruction).lower())
     words = set(re.findall(r"[a-z0-9]+", text))
@@ -43,9 +43,10 @@ def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
 
 
 def _spellings(value: SlotValue) -> frozenset[str]:
-    """Return all words that could give a goal value away: of ``2`` *two*, *twice*, *both*, ….
+    """Return all words that could give a goal value away.
 
-    For a color these are all colors, and for a moment such as ``before`` all words for time.
+    For 2 *two*, *twice*, *both* …, for a color the names of all colors, for a moment such as
+    ``before`` all words for time, and for several values the words of each.
     """
     if isinstance(value, tuple):
         found: set[str] = set()

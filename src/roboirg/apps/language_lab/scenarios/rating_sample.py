@@ -32,7 +32,8 @@ scene, text."""
 def draw_sample(tasks: Sequence[str], settings: Sequence[str], seed: int) -> list[SampledText]:
     """Return up to `TEXTS` texts of each setting for a blind rating, shuffled.
 
-    Each is of another *frame*, the situation that a text tells of, such as a school trip.
+    Each is of another *frame*, the situation that a text tells of, such as a school trip. Equal
+    arguments give the same sample.
 
     Args:
         tasks: names.
@@ -81,7 +82,9 @@ def _texts(task: str, setting: str, seed: int) -> Iterator[SampledText]:
 def sheet(texts: Sequence[SampledText], order: int) -> str:
     """Return a rater's sheet as CSV: number, text, and an empty column for the rating.
 
-    `order` is the seed of the sheet's order; the numbers are the same on all sheets.
+    Args:
+        texts: of the sample, in the order of the key.
+        order: seed of the order on this sheet; the number of a text is the same on all sheets.
     """
     rng = np.random.default_rng(order)
     numbered = shuffled(rng, list(enumerate(texts, 1)))
@@ -90,5 +93,5 @@ def sheet(texts: Sequence[SampledText], order: int) -> str:
 
 
 def key(texts: Sequence[SampledText]) -> str:
-    """Return a CSV with setting, task and scene of each number on the sheets."""
+    """Return a CSV with setting, task, frame, seed and text of each number on the sheets."""
     return csv_text([{"number": number, **text} for number, text in enumerate(texts, 1)])

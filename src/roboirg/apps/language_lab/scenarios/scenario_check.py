@@ -26,7 +26,7 @@ from roboirg.language.generator import request_of, spoken_instruction
 from roboirg.language.instruction import FORMS, Instruction, Meaning, Mention
 from roboirg.language.meaning import field_values, meant_goals
 from roboirg.language.request import InstructionRequest
-from roboirg.language.scenarios.choice import Chosen, choose, misfit
+from roboirg.language.scenarios.choice import ScenarioChoice, choose, explain_misfit
 from roboirg.language.scenarios.literals import in_words
 from roboirg.language.scenarios.markup import slots_in
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
@@ -48,12 +48,12 @@ _CHOOSING_CLASSES = ("former", "latter", "first", "second", "third", "other")
 
 @dataclass(slots=True)
 class ScenarioReport:
-    """What was found about a scenario.
+    """What was found about a scenario, a text template.
 
     Attributes:
         scenario: the scenario.
         broken: the rules that it breaks, with the number of scenes in which it does.
-        examples: for each broken rule one text.
+        examples: for each broken rule one text; empty for a rule about the sentences as written.
         renderings: texts, from different scenes.
         competing: a text with a competing remark; empty if the setting has none.
         fitting: the keys of the scenes that it fits.
@@ -78,14 +78,14 @@ class ScenarioReport:
         return len(self.fitting)
 
     def add(self, rule: str, text: str) -> None:
-        """Count a broken rule."""
+        """Count that a text breaks a rule, and keep the first such text as its example."""
         self.broken[rule] += 1
         self.examples.setdefault(rule, text)
 
 
 @functools.cache
 def scenes_of(task: str, random: int = RANDOM_SCENES) -> tuple[Episode, ...]:
-    """Return all published episodes of a task, and random ones."""
+    """Return all published episodes of a task, and as many random ones as are asked for."""
     sampled = [get_episode(task, "random", index) for index in range(random)]
     return (*split_episodes([task], SPLITS), *sampled)
 
@@ -93,12 +93,12 @@ def scenes_of(task: str, random: int = RANDOM_SCENES) -> tuple[Episode, ...]:
 def check_scenarios(
     words: TaskScenarios, name: str | None, scenes: Sequence[Episode]
 ) -> list[ScenarioReport]:
-    """Return a report on each scenario of a task, a template of texts, checked in some scenes.
+    """Return a report on each scenario (text template) of a task, checked in some scenes.
 
     Args:
         words: all words of the task in the scenarios' file.
         name: of the frame (the situation) whose scenarios are checked; None for all.
-        scenes: episodes of the task.
+        scenes: episodes of the task; at least one.
     """
     reports: list[ScenarioReport] = []
     for scenario in words.scenarios:
@@ -110,7 +110,7 @@ def check_scenarios(
 def check_scenario(
     scenario: Scenario, words: TaskScenarios, scenes: Sequence[Episode]
 ) -> ScenarioReport:
-    """Return a report on a scenario, a template of texts: all rules that it breaks, with examples.
+    """Return a report on a scenario, a text template: all rules that it breaks, with examples.
 
     Checked are its sentences as they are written, and its texts in every scene that it fits. It
     must fit some scene, and in at least one of them its command alone must leave the goal open.
@@ -118,7 +118,7 @@ def check_scenario(
     Args:
         scenario: to check.
         words: all words of the task in the scenario's file.
-        scenes: episodes of the task.
+        scenes: episodes of the task; at least one.
     """
     report = ScenarioReport(scenario)
     first = scenes[0]
@@ -135,7 +135,7 @@ def check_scenario(
 
     if not report.scenes:
         request = request_of(first, checker.usual)
-        why = misfit(request, scenario.fields.setting, [scenario])
+        why = explain_misfit(request, scenario.fields.setting, [scenario])
         report.add(f"fits none of the scenes; in {first.key} {why}", "")
     elif not report.open:
         report.add("its command alone gives the goal in every scene", "")
@@ -143,21 +143,25 @@ def check_scenario(
 
 
 def length_complaint(text: str) -> str:
-    """Return a complaint if a text has more tokens than usual policies read; else an empty text."""
+    """Return a complaint if a text has more tokens than usual policies read; empty if it has not.
+
+    ``needs 71 tokens; only 64 are heard``.
+    """
     if tokens_of(text) <= USUAL_LIMIT:
         return ""
     return f"needs {tokens_shown(text)} tokens; only {USUAL_LIMIT} are heard"
 
 
 class _SceneChecker:
-    """Checks what a scenario says of scenes.
+    """Says a scenario, a text template, of scenes, and reports what is wrong with the texts.
 
     Args:
-        report: of the scenario, to which all that is found is added.
+        report: of the scenario, to which all is added.
         words: of the task.
 
     Attributes:
-        usual: the options with which the scenario is said; contextual says all sentences of direct.
+        usual: the options with which the scenario is said; a scenario of direct is said in
+            contextual, which has all of its sentences.
     """
 
     def __init__(self, report: ScenarioReport, words: TaskScenarios) -> None:
@@ -171,7 +175,8 @@ class _SceneChecker:
         """Check what the scenario says of an episode, and add what is found to the report.
 
         It is said in every form: implicit, and resolved, which names all values. In the spatial
-        setting, sides are said as the person sees them, and once more as the camera does.
+        setting, sides are said as the robot sees them, and once more as the camera does. Nothing is
+        added if it does not fit the episode.
         """
         try:
             instruction = self._check_texts(episode, self.usual)
@@ -187,7 +192,9 @@ class _SceneChecker:
     def _add_fit(self, episode: Episode, implicit: Instruction) -> None:
         """Add a scene that the scenario fits to the report.
 
-        Checks that the scenario does not say the same of another goal of the scene.
+        Its key is added, and its text if too few are shown yet, of every third scene. It is counted
+        if the command alone leaves the goal open. It is a broken rule if the scenario says the same
+        of another goal of the scene.
 
         Args:
             episode: with the scene.
@@ -217,10 +224,10 @@ class _SceneChecker:
         return self._instruction_of(request, chosen).text
 
     def _check_texts(self, episode: Episode, usual: InstructionOptions) -> list[Instruction]:
-        """Check and return all texts of the scenario for an episode, the implicit one first.
+        """Check all texts of the scenario for an episode, and return them, the implicit one first.
 
         They differ in their form; in the contextual setting each is also said with a competing
-        remark, which mentions another value. Empty if the scenario does not fit the episode.
+        remark, which names another value. Empty if the scenario does not fit the episode.
 
         Args:
             episode: that is spoken of.
@@ -234,12 +241,12 @@ class _SceneChecker:
             variants += [replace(variant, distractor="competing") for variant in variants]
         return [self._check_text(request_of(episode, options), chosen) for options in variants]
 
-    def _check_text(self, request: InstructionRequest, chosen: Chosen) -> Instruction:
+    def _check_text(self, request: InstructionRequest, chosen: ScenarioChoice) -> Instruction:
         """Check one text of the scenario, add what is found to the report, and return the text.
 
         Args:
             request: the episode, and the options of the text.
-            chosen: how the scenario says the episode.
+            chosen: the scenario with the fillers of its slots for the episode.
         """
         report = self._report
         instruction = self._instruction_of(request, chosen)
@@ -252,8 +259,8 @@ class _SceneChecker:
             report.competing = instruction.text
         return instruction
 
-    def _chosen(self, request: InstructionRequest) -> Chosen | None:
-        """Return how the scenario says an episode.
+    def _chosen(self, request: InstructionRequest) -> ScenarioChoice | None:
+        """Return the scenario with the fillers of its slots for an episode.
 
         None if it does not fit, or its setting cannot express the episode.
         """
@@ -262,14 +269,17 @@ class _SceneChecker:
         scenario = self._report.scenario
         return choose(request, scenario.fields.setting, [scenario])
 
-    def _instruction_of(self, request: InstructionRequest, chosen: Chosen) -> Instruction:
-        """Return the instruction of the scenario."""
+    def _instruction_of(self, request: InstructionRequest, chosen: ScenarioChoice) -> Instruction:
+        """Return the instruction that the filled scenario gives."""
         return spoken_instruction(request, say_chosen(request, self._words, chosen))
 
 
 @functools.cache
 def our_scenarios() -> tuple[Scenario, ...]:
-    """Return the scenarios of all tasks; one that several tasks say is there for each of them."""
+    """Return the scenarios (text templates) of all our tasks.
+
+    One that several tasks say is there for each of them.
+    """
     found: list[Scenario] = []
     for words in written_words().values():
         found += words.scenarios
@@ -328,8 +338,8 @@ def _key_with_goal(episode: Episode) -> str:
 def _in_both_pools(scenario: Scenario, words: TaskScenarios) -> Iterator[str]:
     """Yield a complaint for each sentence of a scenario that the other pool of words also has.
 
-    The pools train and test must not share sentences or frames. A scenario of a user serves both,
-    so it has no other pool.
+    The pools train and test must share neither sentences nor frames (names of scenarios). A
+    scenario of a user's file serves both, so it has no other pool.
 
     Args:
         scenario: to check.
@@ -344,13 +354,18 @@ def _in_both_pools(scenario: Scenario, words: TaskScenarios) -> Iterator[str]:
 
 
 def _broken_rules(
-    request: InstructionRequest, chosen: Chosen, instruction: Instruction
+    request: InstructionRequest, chosen: ScenarioChoice, instruction: Instruction
 ) -> Iterator[str]:
     """Yield a complaint for each rule that a text of a scenario breaks.
 
-    Its grammar is checked, its meaning, that its command does not give the goal away, and that
+    Checked are its grammar, its meaning, that its command does not give the goal away, and that
     words such as *it* point at one thing. In the resolved form, whose command names all values,
     only the grammar counts.
+
+    Args:
+        request: the episode, and the options of the text.
+        chosen: the scenario with the fillers of its slots.
+        instruction: the text.
     """
     yield from broken_text(instruction, chosen, request)
     if request.resolved:
@@ -388,7 +403,12 @@ def _unclear_references(instruction: Instruction, scenario: Scenario) -> Iterato
     """Yield a complaint for each word that points back, such as *it*, without a clear antecedent.
 
     An antecedent is an earlier mention of the value, such as *red* before *it*; there must be
-    exactly one. Values in distracting remarks do not count.
+    exactly one. Once a word such as *the former* has chosen from a list, later ones may mean it.
+    Values in distracting remarks do not count.
+
+    Args:
+        instruction: with its mentions in the order of speaking.
+        scenario: from which it was made.
     """
     # "Red or blue? Red is gone." names one of two again, and so says which one is meant.
     is_named_again = "taken" in slots_in(scenario.text("introduction"))
@@ -414,9 +434,11 @@ def _unclear_references(instruction: Instruction, scenario: Scenario) -> Iterato
 def _ambiguous(pointer: Mention, words: str, values: Sequence[str]) -> Iterator[str]:
     """Yield a complaint if words that point back at one value could mean several.
 
+    *'it' can mean red or blue*.
+
     Args:
         pointer: the words that point back.
-        words: the same, for the complaint.
+        words: the same, quoted for the complaint.
         values: that were named before and are of its kind: *red*, *blue*.
     """
     named = list(dict.fromkeys(values))
@@ -434,10 +456,12 @@ def _wrong_antecedents(
 ) -> Iterator[str]:
     """Yield a complaint for each value of a pointer that was not named exactly once before.
 
+    *'it' points at what the introduction does not name*.
+
     Args:
-        pointer: words that point back.
-        words: the same, for the complaint.
-        values: of the mentions before it, of its kind.
+        pointer: words that point back, *it*.
+        words: the same, quoted for the complaint.
+        values: of the mentions before it, of its kind, in order: *red*, *blue*, *red*.
         is_named_again: whether one of two was named again to say that it is gone; then a value may
             be named twice.
     """
@@ -476,7 +500,7 @@ def _possible_antecedents(
 
 
 def _says_value(mention: Mention, instruction: Instruction) -> bool:
-    """Return whether a mention says its value; else it describes it."""
+    """Return whether a mention says its value, *red*; else it describes it, *the left one*."""
     return instruction.span(mention) == mention.value
 
 

@@ -14,7 +14,10 @@ _MOST_GOALS = 10
 
 
 def explicit_lines(report: ExplicitReport, task: str) -> Iterator[str]:
-    """Yield the lines of a report on a file's explicit words: texts, lengths, what is wrong."""
+    """Yield the lines of a report on a file's explicit words for a task.
+
+    They have a few texts, the length of the longest, goals without a sentence, and what is wrong.
+    """
     yield f"explicit ({task})"
     for text in report.renderings:
         yield f"  {text}"
@@ -34,7 +37,10 @@ def explicit_lines(report: ExplicitReport, task: str) -> Iterator[str]:
 
 
 def report_lines(report: ScenarioReport, task: str) -> Iterator[str]:
-    """Yield the lines of a report on a scenario in a task: texts, length, broken rules."""
+    """Yield the lines of a report on a scenario, a text template, in a task.
+
+    They have a few texts, the length of the longest, the number of scenes, and the broken rules.
+    """
     fields = report.scenario.fields
     yield f"{fields.frame} ({task}, {fields.setting}, {fields.pool or 'both pools'})"
     for text in report.renderings:
@@ -56,7 +62,7 @@ def report_lines(report: ScenarioReport, task: str) -> Iterator[str]:
 def _rule_lines(report: ScenarioReport, rule: str) -> Iterator[str]:
     """Yield the lines on a broken rule: how often it is broken, and a text that breaks it.
 
-    A rule that the written sentences break has neither.
+    A rule that the sentences break as they are written, whatever the scene, has neither.
     """
     example = report.examples[rule]
     if not example:

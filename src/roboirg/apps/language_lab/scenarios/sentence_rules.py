@@ -93,7 +93,7 @@ def broken_sentences(scenario: Scenario, pointed: str) -> Iterator[str]:
     """Yield what is wrong with a scenario's sentences: *lead: has the words 'red'; …*.
 
     Args:
-        scenario: whose sentences are checked as they are written, whatever the episode.
+        scenario: a text template, whose sentences are checked as they are written.
         pointed: kind of object at which the task's words point: ``cube``, ``hidden_cube`` or
             ``container``.
     """
@@ -115,7 +115,10 @@ def broken_sentences(scenario: Scenario, pointed: str) -> Iterator[str]:
 
 
 def _names_container(text: Text) -> bool:
-    """Return whether words stand for a container, *the one over it*, and not for a cube, *it*."""
+    """Return whether words stand for a container, *the one over it*, and not for the cube, *it*.
+
+    They do if they say *over*, or point back at a place or another description of the container.
+    """
     slots = {pointer.of.partition(".")[0] for pointer in pointers_in(text)}
     return "over " in literal(text) or not slots.isdisjoint(_DESCRIBED)
 
@@ -123,7 +126,8 @@ def _names_container(text: Text) -> bool:
 def _sentence_complaints(name: str, text: Text, never: Mapping[str, str]) -> Iterator[str]:
     """Yield a complaint for each rule that a sentence of a scenario breaks.
 
-    Rules are about its words, the values that it names, and what it points back at.
+    *has the words 'minus'; people subtract in words; say 'fewer'*. Rules are about its words, the
+    values that it names, and what it points back at.
 
     Args:
         name: of its field, such as ``say.color``.
@@ -151,9 +155,10 @@ def _sentence_complaints(name: str, text: Text, never: Mapping[str, str]) -> Ite
 
 
 def _rival_named_last(text: Text) -> Iterator[str]:
-    """Yield a complaint if a remark names a wrong value last, as *that one* would then mean it.
+    """Yield a complaint if a remark names a value that is not meant last.
 
-    If *before* is meant, *not after but before* is right, and *before and not after* is wrong.
+    *That one* would then mean it. If *before* is meant, *not after but before* is right, and
+    *before and not after* is wrong.
     """
     names: list[str] = []  # in the order of speaking
     for part in text:
@@ -170,11 +175,11 @@ def _rival_named_last(text: Text) -> Iterator[str]:
 def _value_complaints(field: str, text: Text) -> Iterator[str]:
     """Yield a complaint for each value that a sentence names where it may only point back.
 
-    In a ``lead``, the beginning of a command, neither *red* may be said nor the slot ``{color}``;
-    in ``say``, the command itself, counts may.
+    In a ``lead``, the words before a command, neither *red* may be said nor the slot ``{color}``;
+    in ``say``, the command itself, the counts of cubes may.
 
     Args:
-        field: of the scenario, to which the sentence belongs.
+        field: of the scenario, to which the sentence belongs: ``say`` for ``say.color``.
         text: the sentence.
     """
     if field in _WITHOUT_VALUES or field in _COMMAND_FIELDS:
@@ -190,12 +195,17 @@ def _value_complaints(field: str, text: Text) -> Iterator[str]:
 
 
 def _values_in_words(field: str, text: Text) -> set[str]:
-    """Return words of a sentence that could be a goal value, such as *two* or *left*.
+    """Return the words of a sentence that could be a value of a goal: ``{"two", "left"}``.
 
-    Words that point back, such as *the second one*, are not searched.
+    They are searched in its plain words, not in those that point back, such as *the second one*.
+    *Twice as often as that* names no value either, so *twice* and *two* do not count next to such.
+
+    Args:
+        field: of the scenario, to which the sentence belongs: ``say`` for ``say.color``.
+        text: the sentence.
     """
-    outside = tuple(part for part in text if not isinstance(part, Pointer))
-    values = set(_VALUE.findall(literal(outside).lower()))
+    plain_parts = tuple(part for part in text if not isinstance(part, Pointer))
+    values = set(_VALUE.findall(literal(plain_parts).lower()))
     if field in _COMMAND_FIELDS and any(pointers_in(text)):
         values -= {"twice", "two"}  # "twice as often as that" is a relation of the table
     return values
@@ -204,8 +214,8 @@ def _values_in_words(field: str, text: Text) -> set[str]:
 def blanked(scenario: Scenario) -> Iterator[str]:
     """Yield a scenario's name and sentences, in small letters, with ``_`` for slots.
 
-    So texts of two scenarios can be compared: *My sister likes {color}.* becomes *my sister likes
-    _.* Sentences of the command are left out, and so are fragments of two words or fewer.
+    So two scenarios can be compared: *My sister likes {color}.* becomes *my sister likes _.*
+    Sentences of the command are left out, and so are fragments of two words or fewer.
     """
     yield f"frame {scenario.fields.frame}"
     for name, texts in scenario.texts.items():
@@ -219,7 +229,12 @@ def blanked(scenario: Scenario) -> Iterator[str]:
 
 
 def sentences_of(scenarios: Iterable[Scenario], pool: PoolName) -> set[str]:
-    """Return the names and the sentences of a pool's scenarios, with ``_`` for slots."""
+    """Return the names and the sentences of a pool's scenarios, as `blanked` writes them.
+
+    Args:
+        scenarios: of any pool.
+        pool: ``train`` or ``test``.
+    """
     found: set[str] = set()
     for scenario in scenarios:
         if scenario.fields.pool == pool:
@@ -228,10 +243,11 @@ def sentences_of(scenarios: Iterable[Scenario], pool: PoolName) -> set[str]:
 
 
 def literal(text: Text) -> str:
-    """Return the words of a sentence of a scenario, without its markup for what points back.
+    """Return the words of a sentence of a scenario, without its marks for pointers and agreement.
 
     ``Lift <it color: it> {repeats:times}.`` becomes ``Lift it {repeats:times}.``. Of words that
-    agree with a number, such as ``[repeats: lap|laps]``, both forms are there.
+    agree with a number, ``[repeats: lap|laps]``, both forms are there. A slot without a form has
+    None: ``{color:None}``; patterns of rules rely on this.
     """
     words = []
     for part in text:

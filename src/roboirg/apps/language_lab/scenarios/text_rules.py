@@ -13,7 +13,7 @@ from roboirg.core.motions import Swap
 from roboirg.language.instruction import Instruction
 from roboirg.language.number_words import CARDINALS, ORDINALS
 from roboirg.language.request import InstructionRequest
-from roboirg.language.scenarios.choice import Chosen
+from roboirg.language.scenarios.choice import ScenarioChoice
 
 Patterns = Mapping[str, str]
 """Patterns of wrong words, and why they are wrong."""
@@ -81,21 +81,22 @@ OF_LISTS: Mapping[int, Patterns] = {
 
 
 def broken_text(
-    instruction: Instruction, chosen: Chosen, request: InstructionRequest
+    instruction: Instruction, chosen: ScenarioChoice, request: InstructionRequest
 ) -> Iterator[str]:
     """Yield a complaint for each grammar rule that a text breaks: *says 'a apple'; 'an' is right*.
 
-    Further rules depend on how many values the text lists, and on whether things change places in
-    the scene: then *there* needs a time.
+    Rules about its words come first, then those about words that name a value or point back. Of the
+    latter some depend on how many values the text lists, *the latter* of three is wrong, and on
+    whether things change places in the scene: then *there* needs a time.
 
     Args:
         instruction: whose text is checked.
-        chosen: how a scenario says the episode, with the values that it lists.
+        chosen: the scenario (template) of the text with its fillers, among them those of its list.
         request: with the episode.
     """
     yield from _complaints(GRAMMAR, "\n".join(instruction.turns))
     patterns = dict(MENTIONED)
-    length = len(chosen.introduced.values.get("list", ()))
+    length = len(chosen.fillers.values.get("list", ()))
     patterns |= OF_LISTS.get(length, {})
     if request.episode.scene.motions_of(Swap):
         patterns |= MOVED
@@ -103,7 +104,12 @@ def broken_text(
 
 
 def _complaints(patterns: Patterns, text: str) -> Iterator[str]:
-    """Yield a complaint for each pattern of wrong words that a text has, with the reason."""
+    """Yield a complaint for each pattern that is found in a text: *says 'a apple'; 'an' is right*.
+
+    Args:
+        patterns: of wrong words, with the reason why they are wrong.
+        text: to search.
+    """
     for pattern, reason in patterns.items():
         found = re.search(pattern, text)
         if found:
@@ -111,10 +117,10 @@ def _complaints(patterns: Patterns, text: str) -> Iterator[str]:
 
 
 def _with_marked_mentions(instruction: Instruction) -> str:
-    """Return the text with its referring words marked, as the patterns of rules need it.
+    """Return the text of an instruction with its mentions marked, as the patterns of rules need it.
 
-    *Lift it.* becomes ``Lift <it red:it>.``: class of the expression, value, and the words; None
-    is the class of words that name a value. A line is an utterance.
+    *Lift it.* becomes ``Lift <it red:it>.``: class of the expression, value, and the words. Words
+    that name a value have the class None: ``<None red:red>``. A line is an utterance.
     """
     turns = list(instruction.turns)
     # From the end, so that the positions of earlier mentions stay right.

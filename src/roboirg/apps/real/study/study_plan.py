@@ -33,6 +33,7 @@ from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.random_draws import shuffled
+from roboirg.util.regular_file import read_regular
 from roboirg.util.short_hash import short_hash
 
 PLAN_FILE = "plan.json"
@@ -241,7 +242,7 @@ def read_study(folder: Path) -> StudyPlan:
     """
     path = folder / PLAN_FILE
     try:
-        return msgspec.json.decode(path.read_bytes(), type=StudyPlan)
+        return msgspec.json.decode(read_regular(path), type=StudyPlan)
     except OSError as error:
         raise InvalidValueError(
             f"There is no plan in {folder} ({error.strerror}); make one with roboirg real plan."

@@ -155,11 +155,13 @@ class VlaEvalPolicy(RemotePolicy):
         answer_kind = answer.get("type")
         number = answer.get("seq")
         content = answer.get("payload")
-        if answer_kind == "error":
-            words = content.get("error") if isinstance(content, dict) else content
-            raise self.connection.error_reply(str(words))
         if answer_kind == awaited and number == self._number and isinstance(content, dict):
             return content
+        if isinstance(content, dict):
+            self.refuse_error(content)
+        if answer_kind == "error":
+            raise self.connection.error_reply(str(content))
+        self.refuse_error(answer)
         raise PolicyReplyError(
             f"{self.connection} sent a message of type {_clipped(answer_kind)!r} with number "
             f"{_clipped(number)}, where {awaited!r} with number {self._number} was expected."

@@ -32,6 +32,10 @@ BUSY = frozenset({408, 409, 429, 502, 503, 504})
 MIB = 2**20
 MAX_RESPONSE_MIB = 64
 MAX_ERROR_LENGTH = 300
+_MOST_SHOWN = 80
+"""Characters of a reply that is no answer in an error message."""
+_MOST_READ = 4096
+"""Bytes of such a reply that are read for the message; keys in them are removed."""
 MALFORMED = (
     ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError,
 )  # fmt: skip
@@ -74,10 +78,17 @@ class HttpModel:
             query = query._replace(schema=None)
         service = self.options.service
         # No error is chained: the service's message may hold the key, and tracebacks are recorded.
+        came = ""
         try:
             response = self._post(service.write(query, self.options, self._key))
             if response.status == HTTPStatus.OK:
-                reply = service.read(json.loads(response.content))
+                beginning = _quote(response.content[:_MOST_READ].decode(errors="replace"))
+                kind = _quote(response.headers.get("content-type"))
+                came = f", {kind} that begins {beginning[:_MOST_SHOWN]!r}"
+                content = json.loads(response.content)
+                if content.get("error"):
+                    raise ValueError("it reports an error")
+                reply = service.read(content)
                 return reply._replace(text=without_keys(reply.text))
         except (TimeoutError, httpx.TimeoutException):
             raise PolicyTimeoutError(
@@ -90,11 +101,11 @@ class HttpModel:
             ) from None
         except MALFORMED as error:
             raise UnknownCostError(
-                f"{self._name} replied with something else ({type(error).__name__}: "
+                f"{self._name} replied with something else{came} ({type(error).__name__}: "
                 f"{_quote(error)})."
             ) from None
-        content = response.content.decode(errors="replace")
-        words = f"HTTP status {response.status}: {_quote(content)}"
+        text = response.content.decode(errors="replace")
+        words = f"HTTP status {response.status}: {_quote(text)}"
         if response.status in BUSY:
             raise ModelBusyError(
                 f"{self._name} is not available: {words}", retry_after_s(response.headers)

@@ -1,0 +1,135 @@
+"""How often intervals hold the true value, by simulation: the table of docs/statistics.md.
+
+``python tests/stats/interval_coverage.py`` prints it: for each number of tasks, episodes and policy
+seeds the lowest coverage over rates from 1 to 99 % and over correlations of the trials of an
+episode.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from statistics import NormalDist
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.stats.intervals import Interval, Rows, TaskRates, mean_interval
+
+KINDS = ("rate", "gap", "retention")
+RATES = (
+    (0.01, 0.01), (0.02, 0.04), (0.05, 0.2), (0.3, 0.6), (0.5, 0.5), (0.8, 0.95), (0.98, 0.99),
+    (0.02, 0.9),
+)  # fmt: skip
+"""True rates of the two sides; those of several tasks lie around these."""
+CORRELATIONS = (0.0, 0.5, 0.9)
+"""Of the normal variables behind all trials of an episode, of both sides."""
+SPREAD = 1.0
+"""How far the log-odds of the easiest and the hardest of several tasks are from the middle."""
+
+
+class Design(NamedTuple):
+    """What is played: for each task the number of episodes, and the number of policy seeds."""
+
+    name: str
+    episodes: Sequence[int]
+    seeds: int
+
+
+DESIGNS = (
+    Design("1 task of 20", [20], 1),
+    Design("1 task of 50", [50], 1),
+    Design("1 task of 150", [150], 1),
+    Design("1 task of 50", [50], 3),
+    Design("4 tasks of 20", [20] * 4, 1),
+    Design("4 tasks of 50", [50] * 4, 3),
+    Design("4 tasks of 5, 20, 50 and 100", [5, 20, 50, 100], 1),
+    Design("11 tasks of 20", [20] * 11, 1),
+    Design("11 tasks: one of 3, ten of 50", [3] + [50] * 10, 3),
+)
+
+
+def task_rates(rate: float, tasks: int) -> NDArray[np.float64]:
+    """Return the true rates of some tasks around one, evenly spaced in log-odds."""
+    spread = SPREAD if tasks > 1 else 0.0
+    odds = rate / (1 - rate) * np.exp(np.linspace(-spread, spread, tasks))
+    return np.asarray(odds / (1 + odds))
+
+
+def drawn_rows(
+    rng: np.random.Generator, episodes: int, seeds: int, rates: Sequence[float], correlation: float
+) -> Rows:
+    """Return successes and trials of both sides by episode, as of `TaskRates`."""
+    shared = rng.standard_normal((episodes, 1, 1))
+    alone = rng.standard_normal((episodes, 2, seeds))
+    ease = np.sqrt(correlation) * shared + np.sqrt(1 - correlation) * alone
+    limits = [NormalDist().inv_cdf(rate) for rate in rates]
+    wins = (ease < np.reshape(limits, (2, 1))).sum(axis=2)
+    rows = np.full((episodes, 4), seeds)
+    rows[:, 0::2] = wins
+    return rows
+
+
+def covered(
+    design: Design, rates: tuple[float, float], correlation: float, rng: np.random.Generator
+) -> Iterator[str]:
+    """Simulate a run once; yield the kinds of intervals that hold the truth.
+
+    That of the retention holds it if that of a difference holds 0: of the first rate times the true
+    second one, less the second rate times the true first one.
+    """
+    count = len(design.episodes)
+    first = task_rates(rates[0], count)
+    second = task_rates(rates[1], count)
+    tasks = []
+    for episodes, first_rate, second_rate in zip(design.episodes, first, second, strict=True):
+        pair = (first_rate, second_rate)
+        tasks.append(TaskRates.of(drawn_rows(rng, episodes, design.seeds, pair, correlation)))
+    rate = first.mean()
+    other = second.mean()
+    factors = {"rate": (1, 0), "gap": (1, -1), "retention": (other, -rate)}
+    truths = {"rate": rate, "gap": rate - other, "retention": 0.0}
+    for kind in KINDS:
+        strata = [task.combined(*np.divide(factors[kind], count)) for task in tasks]
+        if holds(mean_interval(strata), truths[kind]):
+            yield kind
+
+
+def holds(interval: Interval | None, truth: float) -> bool:
+    """Return whether an interval holds the true value, but for rounding."""
+    return interval is not None and interval.low - 1e-6 <= truth <= interval.high + 1e-6
+
+
+def coverage(
+    design: Design, rates: tuple[float, float], correlation: float, simulations: int
+) -> dict[str, float]:
+    """Return the share of simulated intervals of each kind that hold the truth."""
+    rng = np.random.default_rng(7)
+    counts = dict.fromkeys(KINDS, 0)
+    for _ in range(simulations):
+        for kind in covered(design, rates, correlation, rng):
+            counts[kind] += 1
+    return {kind: count / simulations for kind, count in counts.items()}
+
+
+def lowest_coverage(design: Design, simulations: int) -> list[float]:
+    """Return the lowest coverage of each kind of interval over all rates and correlations."""
+    shares = []
+    for rates, correlation in itertools.product(RATES, CORRELATIONS):
+        shares.append(list(coverage(design, rates, correlation, simulations).values()))
+    return np.min(shares, axis=0).tolist()
+
+
+def main() -> None:
+    """Print a line of the table for each design, in percent."""
+    for design in DESIGNS:
+        simulations = 1000 if len(design.episodes) == 1 else 500
+        shares = lowest_coverage(design, simulations)
+        texts = [f"{100 * share:.1f}" for share in shares]
+        line = f"| {design.name} | {design.seeds} | {' | '.join(texts)} |"
+        print(line, flush=True)  # noqa: T201 - it is a script
+
+
+if __name__ == "__main__":
+    main()
