@@ -343,7 +343,11 @@ class _LookRecorder(EpisodeLoop):
     """
 
     def __init__(self, env: RoboIRGEnv, policy: WaypointExpert, drawn: range) -> None:
-        """Begin with nothing noted; `drawn` has the numbers of the looks to draw."""
+        """Begin with nothing noted; looks and decisions grow while the episode is played.
+
+        Control steps are counted apart for the video and for the policy's turn. `drawn` has the
+        numbers of the looks of which a picture is drawn.
+        """
         super().__init__(env, policy)
         self._expert = policy
         self._drawn = drawn

@@ -45,13 +45,14 @@ def write_atomically(path: Path, content: str | bytes) -> None:
 
 @contextlib.contextmanager
 def locked(path: Path, taken: str) -> Iterator[None]:
-    """Hold the lock of a file for one process alone; file and folder are made if missing, and stay.
+    """Hold the lock of a file for one process alone, while the block runs; does not wait for it.
 
-    The kernel releases it when the process ends, however it ends. A symbolic link is refused.
+    File and folder are made if missing, and stay. The kernel releases the lock when the process
+    ends, however it ends. A symbolic link is refused.
 
     Args:
         path: the file.
-        taken: the error if another process holds the lock.
+        taken: the message of the error if another process holds the lock.
 
     Raises:
         InvalidValueError: another process holds it, or it cannot be made.

@@ -444,7 +444,9 @@ class _Recorder(EpisodeLoop):
     def _subgoal_arrays(self, of_video: Sequence[str]) -> dict[str, NDArray[Any]]:
         """Return the texts of all rows: what the robot was doing, and what was due by the task.
 
-        Both come with the pixel of the thing that is meant (``grounded_…``) and without.
+        Both come with the pixel of the thing that is meant, ``grounded_subgoals`` *pick up the cube
+        at <120, 80>*, and without, ``subgoals`` *pick up the cube*; what was due is called
+        ``online_…``.
 
         Args:
             of_video: what was due in the rows of the video, which come first.

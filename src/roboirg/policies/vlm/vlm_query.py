@@ -54,7 +54,13 @@ class VLMQuery:
     def ask(self, query: ModelQuery, parse: Callable[[str], Value]) -> Value | None:
         """Return the parsed answer of the model; None if `parse` rejects `TRIES` answers.
 
-        After a rejected one the model is asked again, with the answer and why it was rejected.
+        After a rejected one the model is asked again, with the answer and why it was rejected, as
+        further turns of the conversation.
+
+        Args:
+            query: to send first.
+            parse: returns what an answer means; raises UnparsableReplyError with words for the
+                model.
 
         Raises:
             PolicyConnectionError: the service cannot be reached or is overloaded.

@@ -57,7 +57,11 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
     features_map: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Declare the features: the action, the robot's state, and a picture for each camera."""
+        """Declare the features: the action, the robot's state, and a picture for each camera.
+
+        Each has the environment's name, ``pixels/front``, with type and shape, and LeRobot's name
+        for it, ``observation.images.front``.
+        """
         size = find_action_space(self.actions).size
         self.features |= {
             "action": PolicyFeature(type=FeatureType.ACTION, shape=(size,)),

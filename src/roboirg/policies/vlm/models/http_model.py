@@ -71,8 +71,9 @@ class HttpModel:
     def answer(self, query: ModelQuery) -> ModelReply:
         """Send a query and return the reply; errors become those that `Model` names.
 
-        No key is in the reply or in an error. No error is chained to the service's own, as
-        tracebacks are recorded.
+        Status 200 with JSON of the provider's form is a reply. JSON of another form may have been
+        paid for (UnknownCostError); of other statuses, some mean *later* (ModelBusyError), the rest
+        are refusals.
         """
         if not self.options.structured:
             query = query._replace(schema=None)
