@@ -101,11 +101,12 @@ class RecordedJob(PreparedJob):
 
     @cached_property
     def words(self) -> TrialWords:
-        """The words of the trial, with those of the record in place of those made from its job.
+        """What is said in the trial: utterances and command of the record, not the installed words.
 
-        The goal and its explicit command are made here, in the arm that decides the goal:
-        `OTHER_GOAL`, or `TOLD` for all others. What the words mean (`meaning`) stays open: the
-        record does not hold it.
+        For records whose words are of another version, so that making them again would give others.
+        The goal is made here, in the arm (kind of comparison) that decides it: `OTHER_GOAL`, or
+        `TOLD` for all others. What the words mean (`meaning`) stays open: the record does not hold
+        it.
         """
         arm = OTHER_GOAL if self.job.arm == OTHER_GOAL else TOLD
         explicit = word_trial(self.scene_episode, InstructionOptions(), arm)
