@@ -241,6 +241,9 @@ class RecordingJob:
         name = f"{self.task}-{self.split}-{self.number:05d}-{self.variation:03d}"
         if self.options is not None:
             name += f"-{short_hash(self.policy)}-{self.options.setting}-{self.options.form}"
+            usual = InstructionOptions(self.options.setting, self.options.form)
+            if self.options != usual:
+                name += f"-{short_hash(repr(self.options))}"
         return folder / f"{'-'.join([name, *self._spec_words()])}{SUFFIX}"
 
     def _spec_words(self) -> list[str]:

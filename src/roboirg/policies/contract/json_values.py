@@ -110,8 +110,10 @@ def _object(value: Mapping[Any, Any], place: _Place) -> dict[str, Any]:
     for key, entry in value.items():
         if place.owner is not None and not isinstance(key, _TEXTUAL):
             shown = clip_text(repr(key), _MAX_SHOWN)
-            where = place.key or "them"
-            raise InvalidValueError(f"{place.owner}: {shown} is a key of {where}, and no text.")
+            where = place.key or "it"
+            raise InvalidValueError(
+                f"{place.owner}: {where} has the key {shown}; keys must be text."
+            )
         name = _text(key, place)
         path = f"{place.key}.{key}" if place.key else str(key)
         entries[name] = _as_json(entry, place.inside(path))
