@@ -32,6 +32,8 @@ BUSY = frozenset({408, 409, 429, 502, 503, 504})
 MIB = 2**20
 MAX_RESPONSE_MIB = 64
 MAX_ERROR_LENGTH = 300
+MAX_BEGINNING = 80
+"""Characters of what came instead of an answer."""
 MALFORMED = (
     ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError,
 )  # fmt: skip
@@ -71,9 +73,6 @@ class HttpModel:
         # No error is chained: the service's message may hold the key, and tracebacks are recorded.
         try:
             response = self._post(service.write(query, self.options, self._key))
-            if response.status == HTTPStatus.OK:
-                reply = service.read(json.loads(response.content))
-                return reply._replace(text=without_keys(reply.text))
         except (TimeoutError, httpx.TimeoutException):
             raise PolicyTimeoutError(
                 f"{self._name} did not answer within {self.options.timeout_s:g} s; raise "
@@ -88,6 +87,8 @@ class HttpModel:
                 f"{self._name} replied with something else ({type(error).__name__}: "
                 f"{_quote(error)})."
             ) from None
+        if response.status == HTTPStatus.OK:
+            return self._read(response)
         content = response.content.decode(errors="replace")
         words = f"HTTP status {response.status}: {_quote(content)}"
         if response.status in BUSY:
@@ -95,6 +96,23 @@ class HttpModel:
                 f"{self._name} is not available: {words}", retry_after_s(response.headers)
             )
         raise PolicyReplyError(f"{self._name} refused or failed: {words}")
+
+    def _read(self, response: _Response) -> ModelReply:
+        """Return the reply that a response holds.
+
+        Raises:
+            UnknownCostError: it holds something else; the message has its kind and its beginning.
+        """
+        try:
+            reply = self.options.service.read(json.loads(response.content))
+        except MALFORMED as error:
+            kind = response.headers.get("content-type", "no content type")
+            beginning = _quote(response.content.decode(errors="replace"))[:MAX_BEGINNING]
+            raise UnknownCostError(
+                f"{self._name} replied with something else than an answer "
+                f"({type(error).__name__}): {_quote(kind)}, {beginning!r}."
+            ) from None
+        return reply._replace(text=without_keys(reply.text))
 
     def _post(self, request: HttpRequest) -> _Response:
         """Post a request and return the response; raise what `_fetch` has raised.
