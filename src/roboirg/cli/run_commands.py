@@ -95,13 +95,16 @@ def run(
     if show_plan:
         typer.echo(plan_text(made), nl=False)
         return
-    if out is None:
+    if out is None and not dry_run:
         raise InvalidValueError("No folder given; name one with --out, such as runs/first.")
-    # Absolute: a policy in this process may change the working directory.
-    folder = run_folder(out).absolute()
     chosen = _executor(made, executor, workers)
     if made.video != "off":
         check_video_support()
+    if out is None:
+        _print_counts(made, None)
+        return
+    # Absolute: a policy in this process may change the working directory.
+    folder = run_folder(out).absolute()
     check_run(made, folder)
     if dry_run:
         _print_counts(made, folder)
@@ -234,12 +237,12 @@ def _executor(plan: Plan, name: str, workers: int | None) -> Executor:
     return choose_executor(workers, plan.attempts.episode_timeout_s)
 
 
-def _print_counts(plan: Plan, folder: Path) -> None:
+def _print_counts(plan: Plan, folder: Path | None) -> None:
     """Print what ``--dry-run`` shows: how many episodes there are and are stored, and calls.
 
     Args:
         plan: what would be played.
-        folder: of the run, which may not exist yet.
+        folder: of the run, which may not exist yet; None if it was not named.
     """
     from rich.console import Console
 
@@ -252,7 +255,7 @@ def _print_counts(plan: Plan, folder: Path) -> None:
     for arm, count in plan.left_out(jobs).items():
         console.print(f"{arm}: {counted(count, 'episode')} left out.", highlight=False)
     _print_prompt_shares(plan, jobs, settings, console)
-    played = read_index(folder)
+    played = {} if folder is None else read_index(folder)
     todo = [job for job in jobs if identity_key(job) not in played]
     stored = len(jobs) - len(todo)
     console.print(f"{counted(len(jobs), 'episode')}, {stored:,} already stored.", highlight=False)
