@@ -37,18 +37,6 @@ def tokens_of(text: str) -> int:
     return len(encode(text)) + ADDED_TOKENS
 
 
-def least_tokens_of(text: str) -> int:
-    """Return the fewest tokens that a text can need; like `tokens_of` if a tokenizer is installed.
-
-    Else each word that the language does not use counts one.
-    """
-    if _tokenizer() is not None:
-        return tokens_of(text)
-    pieces = _tokens_by_word()
-    words: list[str] = _WORD.findall(text)
-    return ADDED_TOKENS + sum(pieces.get(word, 1) for word in words)
-
-
 def tokens_shown(text: str) -> str:
     """Return the number of tokens of a text, to be printed: ``51``, or a bound, ``at most 51``.
 

@@ -33,7 +33,7 @@ from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.scenario_file import written_words
 from roboirg.language.scenarios.spoken import say_chosen
 from roboirg.language.settings import all_settings
-from roboirg.language.token_counts import USUAL_LIMIT, least_tokens_of, tokens_of, tokens_shown
+from roboirg.language.token_counts import USUAL_LIMIT, tokens_of, tokens_shown
 from roboirg.shortcuts.command_chance import goals_of_command, is_right
 from roboirg.tasks import get_task, goals_of, with_goal
 from roboirg.tasks.splits.splits import get_episode, split_episodes
@@ -143,13 +143,14 @@ def check_scenario(
 
 
 def length_complaint(text: str) -> str:
-    """Return a complaint if a text surely has more tokens than usual policies read; else nothing.
+    """Return a complaint if a text has more tokens than usual policies read; empty if it has not.
 
-    ``needs 71 tokens; only 64 are heard``.
+    ``needs 71 tokens; only 64 are heard``. A bound, which is not a number alone, is none.
     """
-    if least_tokens_of(text) <= USUAL_LIMIT:
+    shown = tokens_shown(text)
+    if tokens_of(text) <= USUAL_LIMIT or not shown.isdecimal():
         return ""
-    return f"needs {tokens_shown(text)} tokens; only {USUAL_LIMIT} are heard"
+    return f"needs {shown} tokens; only {USUAL_LIMIT} are heard"
 
 
 class _SceneChecker:
