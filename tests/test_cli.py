@@ -395,6 +395,14 @@ def test_a_dry_run_counts_model_calls_only_for_episodes_that_are_not_stored(robo
     assert re.search(r"p\W+direct\W+2\W", result.out)
 
 
+def test_a_dry_run_needs_no_output_folder_and_the_run_itself_does(roboirg):
+    counted = roboirg(*RUN_RANDOM, "--dry-run")
+    assert (counted.code, "0 already stored" in counted.out) == (0, True)
+
+    refused = roboirg(*RUN_RANDOM)
+    assert (refused.code, "No folder given" in refused.err) == (2, True)
+
+
 @pytest.mark.parametrize(
     ("words", "caption"),
     [

@@ -5,7 +5,7 @@ from string import Template
 from types import SimpleNamespace
 
 import pytest
-from forty_replies import FORTY
+from forty_replies import BLUE_TWICE, FORTY, PICK, RED_ONCE, UNREADABLE, StyledReply
 from planning_fakes import Garbage, fake_vlm, model_options
 
 from roboirg.policies.planners.model_planners import StatelessOptions, StatelessPlanner
@@ -83,6 +83,39 @@ def _words(sent):
     if isinstance(sent, list):
         return [words for held in sent for words in _words(held)]
     return []
+
+
+DRAFT = f"Perhaps {RED_ONCE}? But the remark says"
+CUT = [
+    StyledReply("Qwen, cut off after a draft", "goal", UNREADABLE, DRAFT, ended="length"),
+    StyledReply("Gemini, cut off after a draft", "goal", UNREADABLE, [{"text": DRAFT}],
+                ended="max_tokens"),
+    StyledReply("Llama, cut off in a subgoal", "subgoal", UNREADABLE, PICK, ended="length"),
+    StyledReply("GPT, ended by its limit", "goal", BLUE_TWICE, f"{BLUE_TWICE}\n\n\n",
+                ended="length"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("styled", CUT, ids=lambda styled: styled.style)
+def test_a_reply_that_its_service_cut_off_is_asked_for_again_unless_an_object_ends_it(styled):
+    """A draft in thoughts without a tag, which the limit of tokens breaks off, is no answer."""
+    queries = []
+
+    def answer(query):
+        queries.append(query)
+        return reply_of(styled)
+
+    vlm = VLMQuery(
+        ModelOptions(model="m"), Template("$why"), lambda _: SimpleNamespace(answer=answer)
+    )
+    found = vlm.ask(SOME_QUERY, READERS[styled.question])
+
+    if styled.reading is None:
+        assert found is None
+        assert vlm.usage()["unparsed"] == 1
+        assert "cut off at the limit of tokens" in queries[1].turns[2].parts[0]
+    else:
+        assert same_json(found) == same_json(styled.reading)
 
 
 def test_a_model_asked_again_sees_its_rejected_reply_without_its_thoughts():

@@ -6,10 +6,12 @@ import math
 import os
 import resource
 import tempfile
+from dataclasses import replace as replace_field
 from pathlib import Path
 from unittest.mock import patch
 
 import pytest
+from flat_jobs import with_version
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_records import fill
@@ -18,6 +20,7 @@ from run_fakes import FakePlay, fake_record, fake_run, small_plan
 
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.core.versions import Versions
 from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.server_lock import lock_server
@@ -82,6 +85,24 @@ def test_a_file_of_records_cut_anywhere_loses_only_the_line_that_was_cut(data):
         assert torn == whole[len(kept) : cut]
         if torn:
             assert (folder / TORN_FILE).read_bytes() == torn + b"\n"
+
+
+def test_an_error_before_a_policy_declares_its_version_gets_that_of_its_verdicts(tmp_path):
+    """Else its row has no mark of the error, and a row of unknown version stands next to it."""
+    won, raised, other = eight_records()[:3]
+    ref = replace_field(other.ref, version=UNKNOWN_VERSION, makeup=(("policy", "another"),))
+    error = {"outcome": "error", "error": "policy"}
+    fill(
+        tmp_path,
+        with_version(won, "7"),
+        replace(with_version(raised, UNKNOWN_VERSION), **error),
+        replace(other, ref=ref, **error),
+    )
+
+    versions = [result.policy_version for result in read_results(tmp_path)]
+
+    assert won.policy == raised.policy == other.policy
+    assert versions == ["7", "7", UNKNOWN_VERSION]
 
 
 def test_unfinished_lines_of_several_crashes_are_all_kept_in_a_file_of_their_own(tmp_path):

@@ -267,8 +267,7 @@ def _print_counts(plan: Plan, folder: Path | None) -> None:
 
     Args:
         plan: what would be played.
-        folder: of the run, which may not exist yet; None if none is named, so that nothing is
-            stored.
+        folder: of the run, which may not exist yet; None if it was not named.
     """
     from rich.console import Console
 

@@ -21,9 +21,11 @@ _THOUGHTS_END = re.compile(
 _ANSWER_ENDS = re.compile(
     r"""(?i)(?:<(?:think|thinking|thought|thoughts|reasoning)>|\[THINK\])(?!"\s*[,\]}])"""
     r"|◁think▷|<\|channel\|>(?:analysis|commentary)\b"
-    r"|<\|(?:im_end|endoftext|end|return|eot_id)\|>|</s>"
+    r"|<\|(?:im_end|endoftext|end|return|eot_id|cut_off)\|>|</s>"
 )
 """Where thoughts begin, or a token at the end of a reply."""
+CUT_OFF = "<|cut_off|>"
+"""Ends the text of a reply that its service broke off at the limit of tokens."""
 
 _JSON_BEGINS = re.compile(
     r"""(?mx)
@@ -96,6 +98,21 @@ def with_thoughts(answer: str, thoughts: Sequence[Any]) -> str:
     if not thoughts:
         return answer
     return f"<think>{json.dumps(thoughts, ensure_ascii=False)}</think>\n{answer}"
+
+
+def check_whole(text: str) -> None:
+    """Raise if a reply ends with `CUT_OFF`, because what looks like its answer may be a draft.
+
+    If the end of a JSON object, or of a code fence, is the last that it says, it is whole.
+
+    Raises:
+        UnparsableReplyError: it was cut off.
+    """
+    is_whole = answer_of(text).endswith(("}", "```"))
+    if text.endswith(CUT_OFF) and not is_whole:
+        raise UnparsableReplyError(
+            "The reply was cut off at the limit of tokens; give the answer alone."
+        )
 
 
 def answer_of(text: str) -> str:

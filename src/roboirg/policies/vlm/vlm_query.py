@@ -16,7 +16,7 @@ from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, ModelReply, make_model
 from roboirg.policies.vlm.models.model import tokens_of
 from roboirg.policies.vlm.models.reply_store import ReplyStore, current_store, digest
-from roboirg.util.reply_reading import UnparsableReplyError, answer_of
+from roboirg.util.reply_reading import UnparsableReplyError, answer_of, check_whole
 
 Value = TypeVar("Value")
 
@@ -69,8 +69,10 @@ class VLMQuery:
             BudgetError: the run has spent what it may.
         """
         for _ in range(TRIES):
-            answer = answer_of(self._request(query).text)
+            reply = self._request(query).text
+            answer = answer_of(reply)
             try:
+                check_whole(reply)
                 return parse(answer)
             except UnparsableReplyError as error:
                 rejected = ChatTurn("model", (answer or SILENCE,))

@@ -40,6 +40,7 @@ from roboirg.records.record import Job
 from roboirg.tasks import find_tasks
 from roboirg.tasks.splits.splits import split_size
 from roboirg.util.child_process import ChildExit, ChildProcess
+from roboirg.util.reply_reading import CUT_OFF
 
 RECORD = "record"
 """Under this key the metadata of a score hold our record."""
@@ -182,12 +183,15 @@ async def _ask(
     messages = [_chat_message(message) for message in request.messages]
     output = await model.generate(messages, config=config)
     state.messages = messages
+    text = output.completion
     if output.choices:
         state.messages = [*messages, output.message]
+        if output.stop_reason == "max_tokens":
+            text += CUT_OFF
     usage = output.usage
     if usage is None:
-        return ModelReply(output.completion)
-    return ModelReply(output.completion, usage.input_tokens, usage.output_tokens)
+        return ModelReply(text)
+    return ModelReply(text, usage.input_tokens, usage.output_tokens)
 
 
 def _chat_message(message: dict[str, Any]) -> ChatMessage:

@@ -18,7 +18,7 @@ from roboirg.policies.vlm.models.model import (
     reported_count,
 )
 from roboirg.util.media import Picture, encode_png, sample_evenly
-from roboirg.util.reply_reading import with_thoughts
+from roboirg.util.reply_reading import CUT_OFF, with_thoughts
 
 _ANSWERS = frozenset({"text", "output_text"})
 """Types of parts that are answers; all others are thoughts, or nothing that can be read."""
@@ -51,7 +51,8 @@ def read(reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server
 
     Servers differ: a text comes whole or in parts, and thoughts as parts or in a field apart.
     """
-    message = reply["choices"][0]["message"]
+    choice = reply["choices"][0]
+    message = choice["message"]
     parts = message.get("content") or ""
     if isinstance(parts, str):
         parts = [{"type": "text", "text": parts}]
@@ -60,9 +61,12 @@ def read(reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server
     said_apart = message.get("reasoning_content") or message.get("reasoning")
     if said_apart:
         thoughts.append(said_apart)
+    text = with_thoughts(answer, thoughts)
+    if choice.get("finish_reason") == "length":
+        text += CUT_OFF
     usage = reply.get("usage")
     return ModelReply(
-        with_thoughts(answer, thoughts),
+        text,
         reported_count(usage, "prompt_tokens"),
         reported_count(usage, "completion_tokens"),
     )

@@ -19,7 +19,7 @@ from roboirg.policies.vlm.models.model import (
     reported_count,
 )
 from roboirg.util.media import Picture, encode_png
-from roboirg.util.reply_reading import with_thoughts
+from roboirg.util.reply_reading import CUT_OFF, with_thoughts
 
 
 def write(query: ModelQuery, options: ModelOptions, key: str) -> HttpRequest:
@@ -66,6 +66,8 @@ def read(reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server
     output_tokens = reported_count(usage, "candidatesTokenCount", absent=0)
     output_tokens += reported_count(usage, "thoughtsTokenCount", absent=0)
     text = with_thoughts(answer, thoughts)
+    if first.get("finishReason") == "MAX_TOKENS":
+        text += CUT_OFF
     return ModelReply(text, reported_count(usage, "promptTokenCount"), output_tokens)
 
 
