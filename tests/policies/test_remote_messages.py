@@ -171,6 +171,15 @@ def test_a_policy_server_may_have_a_path_in_its_url():
         policy.close()
 
 
+def test_a_server_cannot_give_another_address_for_its_own():
+    with WireServer() as server, client_of(server, "openpi") as policy:
+        server.metadata = {"server": "another:1", "execute": 3, "version": "2"}
+        policy.reset(INSTRUCTION, {})
+
+        expected = {"server": server.place, "execute": "all", "version": "2"}
+        assert policy.metadata == expected
+
+
 @pytest.mark.parametrize("place", ["host", "host:0", "host:x", "host:1,", "host:1#a", "ho st:1"])
 def test_an_address_that_is_no_host_and_port_is_refused(place):
     with pytest.raises(InvalidValueError, match="is not a server; write openpi://host:port"):
