@@ -115,8 +115,10 @@ class MachineAgent:
     """
 
     def __init__(self, folder: Path, settings: HostSettings | None) -> None:
-        for pid_file in folder.glob(f"*{_PID_SUFFIX}"):
-            self.end(int(pid_file.stem))  # Ray does not kill what is frozen
+        # In a folder of another user the numbers could be those of any process.
+        if folder.is_dir() and folder.lstat().st_uid == os.getuid():
+            for pid_file in folder.glob(f"[0-9]*{_PID_SUFFIX}"):
+                self.end(int(pid_file.stem))  # Ray does not kill what is frozen
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(mode=0o700)
         _register(folder)
@@ -166,25 +168,29 @@ class MachineAgent:
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def _open_lines(self, key: bytes) -> None:
-        """Accept connections to the policy hosts of this machine until their socket is closed.
-
-        A client has to send the key of the run within `KEY_S` seconds; others are disconnected, as
-        they may be of another user.
-        """
+        """Accept connections to the policy hosts of this machine until their socket is closed."""
         while True:
             try:
                 line, _ = self._door.accept()
             except OSError:
                 return
-            line.settimeout(KEY_S)
-            has_key = False
-            with contextlib.suppress(OSError):
-                has_key = secrets.compare_digest(line.recv(len(key)), key)
-            if has_key:
-                line.settimeout(None)
-                self._pool.serve(line)
-            else:
-                line.close()
+            # Side by side, so that one that sends nothing keeps no other waiting.
+            threading.Thread(target=self._admit, args=(line, key), daemon=True).start()
+
+    def _admit(self, line: socket.socket, key: bytes) -> None:
+        """Serve a client that sends the key of the run within `KEY_S` seconds.
+
+        Others are disconnected, as they may be of another user.
+        """
+        line.settimeout(KEY_S)
+        has_key = False
+        with contextlib.suppress(OSError):
+            has_key = secrets.compare_digest(line.recv(len(key)), key)
+        if has_key:
+            line.settimeout(None)
+            self._pool.serve(line)
+        else:
+            line.close()
 
 
 class RemoteResult(NamedTuple):
