@@ -161,6 +161,13 @@ def test_url_options_rename_the_message_keys_of_an_openpi_checkpoint():
         assert list(unpack(server.messages[0])) == ["base", "q", "say"]
 
 
+@pytest.mark.parametrize("query", ["front=a&wrist=a", "state=prompt", "prompt=observation/image"])
+def test_two_entries_of_a_request_with_one_key_are_refused(query):
+    """One would replace the other, and the policy would see less than its records say."""
+    with pytest.raises(InvalidValueError, match="front, wrist, state and prompt must differ"):
+        make_policy(f"openpi://localhost:1?{query}", 0)
+
+
 def test_a_policy_server_may_have_a_path_in_its_url():
     with WireServer() as server:
         place = f"{server.place}/v1/realtime/robot/openpi"
