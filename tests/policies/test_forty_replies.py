@@ -180,6 +180,7 @@ def test_a_letter_is_read_where_it_is_given_as_the_answer(reply, letter):
         "Answer: A. Hmm, C",
         "The answer: C would be green, so B",
         "answer: ~~C~~",
+        "answer: C\u0336",
         "C. is wrong",
         "**C** is wrong",
         "C - no, wait.",
@@ -239,7 +240,8 @@ def test_a_json_object_may_have_line_breaks_in_texts_and_words_in_braces_around_
 @pytest.mark.parametrize(
     "text",
     ["</s>" * 20_000 + "x", '{"a":' * 50_000, "[{" * 50_000, "answer" + " " * 200_000,
-     "\n" * 200_000, "answer A " * 20_000, "{" + "a" * 200_000],
+     "\n" * 200_000, "answer A " * 20_000, "{" + "a" * 200_000, "right choice " * 20_000,
+     "answer: A" + "," * 200_000],
 )  # fmt: skip
 def test_long_repetitive_replies_are_read_quickly(text):
     """A quadratic reading would take minutes."""

@@ -100,6 +100,9 @@ def test_a_server_with_another_action_space_or_protocol_version_is_refused():
         server.hello = {**server.hello, "protocol_version": 2}
         with pytest.raises(PolicyReplyError, match="speaks version 2 of vla-eval's protocol"):
             client.reset(INSTRUCTION, video(0))
+        server.hello = {**server.hello, "protocol_version": np.ones(2)}
+        with pytest.raises(PolicyReplyError, match=r"speaks version \[1\.0, 1\.0\] of vla-eval's"):
+            client.reset(INSTRUCTION, video(0))
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ from roboirg.policies.remote.server_lock import lock_server
 from roboirg.records.line_file import LOCK_FILE
 from roboirg.records.record import Record
 from roboirg.records.record_codec import StoreError, encode, identity_key
+from roboirg.records.run_files import PLAN_FILE
 from roboirg.records.store import (
     RECORDS_FILE,
     TORN_FILE,
@@ -37,6 +38,7 @@ from roboirg.records.store import (
     read_records,
     read_results,
 )
+from roboirg.runs.plan.stored_plans import write_plan
 from roboirg.runs.run.executor import InProcess
 from roboirg.runs.run.runner import check_run, run_plan
 from roboirg.util.atomic_write import locked, write_atomically
@@ -233,6 +235,41 @@ def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path, name):
         with pytest.raises(RoboIRGError, match=f"{link} is a symbolic link, and a run writes"):
             begin(tmp_path / "run")
     assert victim.read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "records.torn", "models.sqlite"])
+def test_a_run_changes_no_file_that_has_another_name_elsewhere(tmp_path, name):
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / name).hardlink_to(victim)
+
+    with pytest.raises(RoboIRGError, match=f"{name} has another name elsewhere"):
+        RecordStore(tmp_path / "run")
+    assert victim.read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["records.torn", "logs/a.txt"])
+def test_a_run_does_not_start_where_a_pipe_would_block_it(tmp_path, name):
+    """The unfinished line would be written into it."""
+    path = tmp_path / "run" / name
+    path.parent.mkdir(parents=True)
+    (tmp_path / "run" / RECORDS_FILE).write_text('{"a')
+    os.mkfifo(path)
+
+    with pytest.raises(RoboIRGError, match=f"{name} is neither a file nor a folder"):
+        RecordStore(tmp_path / "run")
+
+
+def test_a_plan_may_be_a_hard_link_as_it_is_replaced(tmp_path):
+    victim = tmp_path / "victim"
+    victim.write_text("{}")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / PLAN_FILE).hardlink_to(victim)
+
+    with RecordStore(tmp_path / "run"):
+        write_plan(small_plan(), tmp_path / "run")
+    assert victim.read_text() == "{}"
 
 
 def test_a_folder_of_videos_on_another_disk_is_refused_at_the_start(tmp_path):

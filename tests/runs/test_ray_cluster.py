@@ -27,6 +27,7 @@ from roboirg.policies.by_name.finding import read_policy
 from roboirg.records.store import read_records
 from roboirg.runs.hosting.host_pool import HostSettings
 from roboirg.runs.hosting.hosted_policy import HostedPolicy
+from roboirg.runs.run import ray_machines
 from roboirg.runs.run.executor import InProcess, LocalProcesses
 from roboirg.runs.run.ray_cluster import RayCluster
 from roboirg.runs.run.ray_machines import MachineAgent, MachineVersions
@@ -138,6 +139,43 @@ def test_a_cluster_that_cannot_be_joined_is_reported_in_one_sentence(tmp_path):
 def test_a_cluster_with_no_worker_is_refused():
     with pytest.raises(InvalidValueError, match="workers is 0"):
         RayCluster(0)
+
+
+def test_a_silent_client_keeps_no_other_from_the_policy_processes_of_a_machine(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(ray_machines, "KEY_S", 3600.0)
+    hosts = MachineAgent(tmp_path / "agent", HostSettings())
+    address = hosts.check(MachineVersions(())).hosts
+
+    try:
+        with socket.socket(socket.AF_UNIX) as silent:
+            silent.connect(address.path)
+            with address.connect() as line:
+                HostedPolicy(line, read_policy("hosting_fakes:Dice"), 0).close()
+    finally:
+        hosts.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "owner", "ended"),
+    [("{}.pid", 0, True), ("{}.pid", 1, False), ("-{}.pid", 0, False)],
+)
+def test_an_agent_ends_only_processes_that_its_own_user_has_noted(
+    tmp_path, monkeypatch, name, owner, ended
+):
+    """``-1.pid`` would stand for all processes of the user."""
+    folder = tmp_path / "agent"
+    folder.mkdir()
+    (folder / name.format(123456)).touch()
+    killed = []
+    monkeypatch.setattr(ray_machines.os, "kill", lambda pid, _signal: killed.append(pid))
+    user = folder.lstat().st_uid + owner
+    monkeypatch.setattr(ray_machines.os, "getuid", lambda: user)
+
+    MachineAgent(folder, None)
+
+    assert killed == ([123456] if ended else [])
 
 
 def test_only_a_client_with_the_key_reaches_the_policy_processes_of_a_machine(tmp_path):

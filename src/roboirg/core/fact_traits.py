@@ -307,8 +307,10 @@ def fact_traits(kind: FactKind) -> FactTraits:
     if traits is not None:
         return traits
     words = kind.replace("_", " ")
+    # `past` is a pattern, in which braces of a stranger's record would name fields.
+    pattern = words.replace("{", "{{").replace("}", "}}")
     return FactTraits(
-        role=FactRole.STATE, subjects=(), holds_while="", past=f"{words} {{subject}}", state=words
+        role=FactRole.STATE, subjects=(), holds_while="", past=f"{pattern} {{subject}}", state=words
     )
 
 

@@ -218,7 +218,9 @@ class AppendFile:
             StoreError: another process holds the lock; its number is in the file.
         """
         if not take_lock(self._lock, self._folder / LOCK_FILE):
-            owner = os.pread(self._lock, 32, 0).decode("ascii", "replace").strip() or "unknown"
+            owner = os.pread(self._lock, 32, 0).decode("ascii", "replace").strip()
+            if not owner.isdecimal():
+                owner = "unknown"
             raise StoreError(
                 f"{self._folder} is being written by another run (process {owner}); "
                 f"wait for it, stop it, or choose another --out."

@@ -41,20 +41,23 @@ _DECISIVE = re.compile(
     (?:
         (?P<line>^[^\w\n]*(?:(?:choice|option)\b[^\w\n]*)?)
         | \b(?:answer|(?:best|correct|final|my|right)\s+(?:choice|option|one))\b
-          (?:[^\w.?!]+(?:be|choice|correct|is|letter|must|option|right|should|the|would)\b)*
+          # At most twelve of these words: a text of nothing else is read in linear time.
+          (?:[^\w.?!]+(?:be|choice|correct|is|letter|must|option|right|should|the|would)\b){0,12}
           [^\w.?!]*
         | \\boxed\{(?:\\\w+\{)?[^\w}]*
     )
-    (?P<letter>[A-D])(?![\w'’-])
+    (?P<letter>[A-D])(?![\w'’\u0300-\u036f\u20d0-\u20ff-])
     (?(line)
         [^\w\n]*$
         # *A cube* names no choice, while *A because …* does; *A or B* names two.
         | (?!(?<=a)[ \t]+(?!(?:and|as|because|is|since)\b)(?-i:[a-z]))
-          (?!\W*(?:,|/|&|\b(?:or|and)\b)\W*[A-D]\b)
+          (?!(?=\W*[A-D]\b)[^\w,/&]*[,/&])
+          (?!\W*\b(?:or|and)\b\W*[A-D]\b)
     )
     """
 )
-"""A letter alone on its line, after *answer* and the like, or in a box."""
+"""A letter alone on its line, after *answer* and the like, or in a box; none with a combining mark,
+which may strike it out."""
 _SUGGESTED = re.compile(
     r"""(?imx)
     (?: ^[^\w\n]*(?:(?:choice|option)\b[^\w\n]*)? | \*\*[(\[]? )

@@ -125,7 +125,9 @@ def _array(value: Any, place: _Place) -> Any:  # noqa: ANN401
 
     Of more than `_MAX_LISTED` numbers only a text: ``"array of shape (256, 256, 3), uint8"``.
     """
-    if math.prod(value.shape) > _MAX_LISTED:
+    # An axis of length 0 does not make the lists of the others fewer.
+    lists = math.prod(max(length, 1) for length in value.shape)
+    if lists > _MAX_LISTED:
         return f"array of shape {tuple(value.shape)}, {value.dtype}"
     listed = value.tolist()
     if isinstance(listed, np.generic):

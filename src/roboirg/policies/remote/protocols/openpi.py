@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from roboirg.core.actions import Actions
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.policies.contract.base import close_policy
 from roboirg.policies.contract.option_checking import NOT_COMPARED
@@ -62,6 +63,12 @@ class OpenpiPolicy(RemotePolicy):
         if self.options.wrist:
             self._keys["wrist"] = self.options.wrist
         self.cameras = tuple(self._keys)
+        names = [self.options.state, self.options.prompt, *self._keys.values()]
+        if len(set(names)) < len(names):
+            raise InvalidValueError(
+                f"Policy {url!r} has the key of one entry of its requests for another, too; front, "
+                "wrist, state and prompt must differ."
+            )
 
     def begin_episode(self, demonstration: Demonstration) -> None:
         """Do nothing: the protocol has neither a reset nor a memory."""

@@ -16,6 +16,7 @@ from roboirg.core.actions import Actions
 from roboirg.core.errors import InvalidValueError, PolicyReplyError, RoboIRGError
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.core.version import __version__
+from roboirg.policies.contract.json_values import as_json
 from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
 from roboirg.policies.remote.protocols import Protocol
 from roboirg.policies.remote.remote_policy import RemotePolicy
@@ -70,9 +71,10 @@ class VlaEvalPolicy(RemotePolicy):
         self._number = 0
         ours = {"harness_version": f"roboirg {__version__}", "protocol_version": PROTOCOL_VERSION}
         hello = self._send("hello", ours, awaited="hello")
-        if hello.get("protocol_version") != PROTOCOL_VERSION:
+        protocol_version = as_json(hello.get("protocol_version"))
+        if protocol_version != PROTOCOL_VERSION:
             raise PolicyReplyError(
-                f"{self.connection} speaks version {_clipped(hello.get('protocol_version'))} of "
+                f"{self.connection} speaks version {_clipped(protocol_version)} of "
                 f"vla-eval's protocol; this client speaks version {PROTOCOL_VERSION}."
             )
         # Such as "openvla, vla-eval 0.8".
@@ -152,8 +154,8 @@ class VlaEvalPolicy(RemotePolicy):
             self.connection.exchange(data, "", is_numbered=True)
             return {}
         answer = self.connection.exchange(data, is_numbered=True)
-        answer_kind = answer.get("type")
-        number = answer.get("seq")
+        answer_kind = as_json(answer.get("type"))  # arrays cannot be compared
+        number = as_json(answer.get("seq"))
         content = answer.get("payload")
         if answer_kind == awaited and number == self._number and isinstance(content, dict):
             return content

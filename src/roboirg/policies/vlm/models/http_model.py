@@ -63,10 +63,8 @@ class HttpModel:
         self._key = options.key()
         proxy = proxy_of(options.url)
         self._name = f"Model {options.model!r} at {options.address()}{proxy.words}"
-        # The library itself takes a proxy for this machine, too, and does not name it.
-        transport = httpx.HTTPTransport(proxy=proxy.url)
-        self._client = httpx.Client(transport=transport, timeout=options.timeout_s)
-        weakref.finalize(self, self._client.close)  # the connection ends with this object
+        self._proxy_url = proxy.url
+        self._client = self._new_client()
 
     def answer(self, query: ModelQuery) -> ModelReply:
         """Send a query and return the reply; errors become those that `Model` names.
@@ -113,17 +111,31 @@ class HttpModel:
             )
         raise PolicyReplyError(f"{self._name} refused or failed: {words}")
 
+    def _new_client(self) -> httpx.Client:
+        """Return a client without connections, which end with this object at the latest."""
+        # The library itself takes a proxy for this machine, too, and does not name it.
+        transport = httpx.HTTPTransport(proxy=self._proxy_url)
+        client = httpx.Client(transport=transport, timeout=self.options.timeout_s)
+        weakref.finalize(self, client.close)
+        return client
+
     def _post(self, request: HttpRequest) -> _Response:
         """Post a request and return the response; raise what `_fetch` has raised.
 
         The client's limits are those of single reads, which begin again with every byte; so a
-        thread reads, and the time until it is done is limited here.
+        thread reads, and the time until it is done is limited here. A connection whose time is over
+        is closed, so that the thread ends, even if the service sends for ever.
         """
         fetched: Future[_Response] = Future()
         thread = threading.Thread(target=self._fetch, args=(request, fetched), daemon=True)
         with waiting(f"the reply of {self._name}"):
             thread.start()
-            return fetched.result(timeout=self.options.timeout_s)
+            try:
+                return fetched.result(timeout=self.options.timeout_s)
+            except TimeoutError:
+                self._client.close()
+                self._client = self._new_client()
+                raise
 
     def _fetch(self, request: HttpRequest, fetched: Future[_Response]) -> None:
         """Post a request; put the response, or any error, where another thread waits.

@@ -19,7 +19,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from roboirg.core.errors import BudgetError
+from roboirg.core.errors import BudgetError, EndOfRunError
+from roboirg.core.field_types import MOST_SECONDS
 from roboirg.core.handed_keys import without_keys
 from roboirg.core.plain_text import counted
 from roboirg.core.waiting import waiting
@@ -46,17 +47,26 @@ CREATE TABLE IF NOT EXISTS services (name TEXT PRIMARY KEY, next_at REAL) WITHOU
 
 _REPLIES = """
 SELECT sent, text, input_tokens, output_tokens
-FROM replies WHERE episode = ? AND call = ? AND sent NOT LIKE 'unread %'
+FROM replies
+WHERE episode = ? AND call = ? AND sent NOT LIKE 'unread %' AND typeof(text) = 'text'
 """
-# Older stores may hold costs that cannot be, which are unknown.
+# Older stores may hold costs that cannot be, which are unknown. SQLite compares a text with a
+# number, too.
 _SPENT = """
-SELECT total(cost_usd), count(*) - count(CASE WHEN cost_usd >= 0 THEN 1 END) FROM replies
+SELECT total(cost_usd), count(*) - count(CASE WHEN typeof(cost_usd) = 'real' AND cost_usd >= 0
+THEN 1 END) FROM replies
 """
+_CODE = "SELECT count(*) FROM sqlite_master WHERE type IN ('view', 'trigger')"
+"""Counts what can compute something, maybe without end, in a stranger's file."""
 
 _POSTPONE = """
 INSERT INTO services VALUES (?, ?)
 ON CONFLICT (name) DO UPDATE SET next_at = max(next_at, excluded.next_at)
 """
+
+
+class ReplyFileError(EndOfRunError):
+    """The file with a run's replies cannot be read or written, so no episode could be played."""
 
 
 class ReplySettings(NamedTuple):
@@ -104,7 +114,25 @@ class ReplyStore:
         # What is committed is on disk, and survives a kill at any moment.
         database.execute("PRAGMA synchronous = FULL")
         database.executescript(_TABLES)
+        (count,) = database.execute(_CODE).fetchone()
+        if count:
+            raise sqlite3.DatabaseError("it holds views or triggers")
         return database
+
+    def _execute(self, statement: str, *values: object) -> list[tuple[Any, ...]]:
+        """Carry out a statement, and return the rows that it finds.
+
+        Raises:
+            ReplyFileError: the file is damaged, foreign or locked, or the disk is full.
+        """
+        try:
+            return self._database.execute(statement, values).fetchall()
+        except sqlite3.Error as error:
+            path = self.settings.folder / REPLIES_FILE
+            raise ReplyFileError(
+                f"The replies of models in {path} cannot be read or written ({error}); if the file "
+                "is damaged, move it away, and the models are asked anew."
+            ) from error
 
     def close(self) -> None:
         """Close the file if it has been opened."""
@@ -119,7 +147,7 @@ class ReplyStore:
         """
         if self.settings.anew:
             return {}
-        rows = self._database.execute(_REPLIES, (self.episode, self.calls))
+        rows = self._execute(_REPLIES, self.episode, self.calls)
         replies: dict[str, ModelReply] = {}
         for sent, text, input_tokens, output_tokens in rows:
             replies[sent] = ModelReply(
@@ -132,10 +160,8 @@ class ReplyStore:
 
         SQLite stores NULL for NaN, which is unknown.
         """
-        self._database.execute(
-            "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?, ?, ?, ?)",
-            (self.episode, self.calls, sent, *reply, cost_usd),
-        )
+        insert = "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?, ?, ?, ?)"
+        self._execute(insert, self.episode, self.calls, sent, *reply, cost_usd)
 
     def keep_unread(self) -> None:
         """Store that a reply to the next call could not be read: what it cost is unknown."""
@@ -155,7 +181,7 @@ class ReplyStore:
                 f"--max-cost needs the prices of model {model.model!r}; give input_price and "
                 "output_price, in US dollars per million tokens."
             )
-        spent, unknown = self._database.execute(_SPENT).fetchone()
+        ((spent, unknown),) = self._execute(_SPENT)
         if unknown:
             raise BudgetError(
                 f"--max-cost cannot be kept: what {counted(unknown, 'reply', 'replies')} cost is "
@@ -180,22 +206,24 @@ class ReplyStore:
             per_minute: requests that it takes; None for as many as there are.
         """
         gap = 0.0 if per_minute is None else 60.0 / per_minute
+        self._execute("BEGIN IMMEDIATE")
         with self._database:  # which commits
-            self._database.execute("BEGIN IMMEDIATE")
-            (next_at,) = self._database.execute(
-                "SELECT total(next_at) FROM services WHERE name = ?", (service,)
-            ).fetchone()
             now = time.time()
+            # No turn is so far away: a clock was wrong, or the file is a stranger's.
+            self._execute("DELETE FROM services WHERE next_at > ?", now + MOST_SECONDS)
+            ((next_at,),) = self._execute(
+                "SELECT total(next_at) FROM services WHERE name = ?", service
+            )
             # The first to come may ask now, each other one `gap` seconds after the one before.
             turn = max(now, next_at)
-            self._database.execute(_POSTPONE, (service, turn + gap))
+            self._execute(_POSTPONE, service, turn + gap)
         if turn > now:
             with waiting(f"its turn at {service}", is_queue=True):
                 time.sleep(turn - now)
 
     def pause(self, service: str, seconds: float) -> None:
         """Let no process of the run ask a service anything for some seconds."""
-        self._database.execute(_POSTPONE, (service, time.time() + seconds))
+        self._execute(_POSTPONE, service, time.time() + seconds)
 
 
 def digest(query: ModelQuery, options: ModelOptions) -> str:
