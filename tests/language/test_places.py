@@ -42,6 +42,17 @@ MOST_WORDS = 12
 NOTHING_TO_SEE = "nothing to see in this scene singles out a slot's value"
 
 
+def test_an_episode_has_the_places_of_the_frame_whatever_was_said_of_it_before():
+    """The robot's left is on the right of the picture."""
+    episode = get_episode("PickXtimes", "test", 0)
+    for _ in range(2):
+        of_robot = instruct(episode, "spatial", frame="robot").metadata["landmarks"]
+        of_camera = instruct(episode, "spatial", frame="camera").metadata["landmarks"]
+
+        assert of_robot == ["on the left"]
+        assert of_camera == ["on the right of the picture"]
+
+
 def scene_with_containers(places, *fixtures):
     """Return a scene with containers, and fixtures by kind and place."""
     found = [SceneObject(kind, kind, Point(*at, 0.0)) for kind, at in fixtures]

@@ -509,6 +509,20 @@ say.color = ["<it color: it>"]
 """
 
 
+def test_a_competing_remark_names_no_color_of_the_list_that_was_introduced():
+    """Of three colors two are listed, and five remarks all name the third."""
+    listing = PAINT_SCENARIO.replace("the {color} cube", "a {list.0} and a {list.1} cube")
+    listing = listing.replace('"So "', '"I need <rank color: {rank}>, so "')
+    identity = identity_of(f'{HEAD}{listing}list = "color"\nneeds.list = [2]\n')
+    remarks = {"distractor": "competing", "distractors": 5}
+    episode = get_episode("PickXtimes", "test", 3)
+
+    said = instruct(episode, "contextual", wordings=identity, **remarks)
+
+    assert said.turns[0] == "We painted a blue and a green cube."
+    assert said.text.count("The red one comes next week.") == 5
+
+
 @pytest.mark.parametrize(
     ("command", "begun"),
     [
