@@ -11,6 +11,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct, instruct_with
 from roboirg.language.generator import find_refusal
+from roboirg.language.instruction_row import row
 from roboirg.language.settings import settings_of
 from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.shortcuts.command_chance import blind_goals, right_share
@@ -47,6 +48,18 @@ def test_the_metadata_about_a_rival_value_agree_with_the_text(task):
         assert any(
             goal != episode.goal and notes["rival"] in values_of(goal, slot) for goal in goals
         )
+
+
+def test_the_row_of_an_instruction_has_its_rival_and_says_none_without_one():
+    episode, said = next(instructions_with_a_rival("PickXtimes"))
+    columns = ("rival", "rival_slot", "rival_position", "rival_reference")
+
+    of_rival = row(episode, said)
+    of_explicit = row(episode, instruct(episode))
+
+    assert [of_rival[name] for name in columns] == [str(said.metadata[name]) for name in columns]
+    assert "none" not in [of_rival[name] for name in columns]
+    assert [of_explicit[name] for name in columns] == ["none"] * 4
 
 
 def values_of(goal, slot):
