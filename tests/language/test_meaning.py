@@ -84,6 +84,17 @@ def test_an_implicit_command_needs_its_introduction_unless_the_scene_has_one_cho
             assert all(len(values_left(name, episode)) == 1 for name in open_fields), said.text
 
 
+@pytest.mark.parametrize("speaks_of_one", [True, False])
+def test_singular_words_leave_the_goals_of_one_and_plural_words_the_others(speaks_of_one):
+    """*Once for that take*, or *for each take*."""
+    words = Meaning({}, agrees={"repeats": speaks_of_one})
+
+    left = meaning.command_goals(words, EPISODE)
+
+    expected = [goal for goal in goals_of(EPISODE) if (goal["repeats"] == 1) == speaks_of_one]
+    assert list(left) == expected
+
+
 def values_by_field(goal):
     return {value.field: value.value for value in values_of_goal(goal)}
 
