@@ -191,8 +191,8 @@ def test_a_table_wider_than_the_terminal_is_drawn_in_parts_without_losing_a_rate
 
 def test_a_task_of_which_nothing_was_played_has_no_column_in_the_terminal():
     console = Console(file=io.StringIO(), width=400)
-    explicit = make_results("+-", policy="a", task="PickXtimes")
-    direct = make_results("+-", "direct", policy="a", task="PickXtimes")
+    explicit = make_results("10", policy="a", task="PickXtimes")
+    direct = make_results("10", "direct", policy="a", task="PickXtimes")
 
     console.print(renderable(table_of("main", explicit, direct), console))
 

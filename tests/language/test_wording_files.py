@@ -509,12 +509,6 @@ say.color = ["<it color: it>"]
 """
 
 
-def test_the_resolved_form_has_the_color_with_a_noun_in_place_of_it():
-    identity = identity_of(HEAD + PAINT_SCENARIO)
-    said = instruct(get_episode("PickXtimes", "test", 3), "direct", "resolved", wordings=identity)
-    assert said.command.startswith("So grab the blue cube and ")
-
-
 def test_a_competing_remark_names_no_color_of_the_list_that_was_introduced():
     """Of three colors two are listed, and five remarks all name the third."""
     listing = PAINT_SCENARIO.replace("the {color} cube", "a {list.0} and a {list.1} cube")

@@ -6,11 +6,13 @@ Cosmic Ray 8.7 made the faults of mutants.csv from the code of November 2026; of
 places as it has here were drawn with seed 69, and one fault of each place. 47 whose lines were
 rewritten since were drawn again, with seed 72 and outside annotations. Later, those of rewritten
 lines were made by hand in the statements that do the same now, and where there are none, with the
-same operators at places of the room drawn with seed 73. A fault is tried with the test that found
-it last, with its file, then with the tests of its room; with --all, those that none found are
-tried, too. FOLDER gets a copy of the working tree and results.csv, with which a second call goes
-on; at the end stands a table, and each fault that is found no longer, or whose lines the code no
-longer has. Calls for different rooms may run side by side, each in a folder of its own.
+same operators at places of the room drawn with seed 73. The last 40 were drawn with seed 91, eight
+from each of judging, stats, language, analysis and contract, and each is found by a test next to
+its module. A fault is tried with the test that found it last, with its file, then with the tests of
+its room; with --all, those that none found are tried, too. FOLDER gets a copy of the working tree
+and results.csv, with which a second call goes on; at the end stands a table, and each fault that is
+found no longer, or whose lines the code no longer has. Calls for different rooms may run side by
+side, each in a folder of its own.
 """
 
 from __future__ import annotations
