@@ -197,9 +197,8 @@ def table(mutants: list[Mutant], results: dict[str, str]) -> str:
     lines = ["room       faults  equivalent  found before  found now"]
     tried = [mutant for mutant in mutants if mutant.number in results]
     for room in TESTS:
-        lines.append(
-            _line_of_table(room, [mutant for mutant in tried if mutant.room == room], results)
-        )
+        of_room = [mutant for mutant in tried if mutant.room == room]
+        lines.append(_line_of_table(room, of_room, results))
     lines.append(_line_of_table("all", tried, results))
     for mutant in tried:
         result = results[mutant.number]
