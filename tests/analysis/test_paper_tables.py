@@ -189,6 +189,18 @@ def test_a_table_wider_than_the_terminal_is_drawn_in_parts_without_losing_a_rate
     assert "…" not in folded + written
 
 
+def test_a_task_of_which_nothing_was_played_has_no_column_in_the_terminal():
+    console = Console(file=io.StringIO(), width=400)
+    explicit = make_results("10", policy="a", task="PickXtimes")
+    direct = make_results("10", "direct", policy="a", task="PickXtimes")
+
+    console.print(renderable(table_of("main", explicit, direct), console))
+
+    drawn = console.file.getvalue()
+    assert "PickXtimes" in drawn
+    assert "StopCube" not in drawn
+
+
 def test_csv_has_a_line_for_each_rate_with_the_counts_behind_it():
     error = make_results("--!", "direct", policy="a", task="BinFill")
     table = table_of("main", results_of_all_tasks(), error)

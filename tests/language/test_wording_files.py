@@ -661,6 +661,20 @@ def test_an_empty_table_of_commands_is_refused_and_not_filled_with_ours():
     )
 
 
+def test_a_competing_remark_names_no_color_of_the_list_that_was_introduced():
+    """Of three colors two are listed, and five remarks all name the third."""
+    listing = PAINT.replace("the {color} cube", "a {list.0} and a {list.1} cube")
+    listing = listing.replace('"So "', '"I need <rank color: {rank}>, so "')
+    identity = identity_of(f'{listing}list = "color"\nneeds.list = [2]\n')
+    remarks = {"distractor": "competing", "distractors": 5}
+    episode = get_episode("PickXtimes", "test", 3)
+
+    said = instruct(episode, "contextual", wordings=identity, **remarks)
+
+    assert said.turns[0] == "We painted a blue and a green cube."
+    assert said.text.count("The red one comes next week.") == 5
+
+
 @pytest.mark.parametrize(
     "wrong",
     [

@@ -425,14 +425,14 @@ def test_no_answered_call_is_made_again_after_a_kill(tmp_path, kills):
 
 
 def test_three_processes_that_ask_at_the_same_moment_take_turns(tmp_path, monkeypatch):
-    """At 60 requests a minute they start one second apart; a longer pause counts for all."""
+    """At 20 requests a minute they start three seconds apart; a longer pause counts for all."""
     waits: list[float] = []
     clock = SimpleNamespace(time=lambda: 5.0, sleep=waits.append)
     monkeypatch.setattr(reply_store, "time", clock)
     # Each as in a process of its own.
     stores = [reply_store.ReplyStore(ReplySettings(tmp_path), "episode") for _ in range(3)]
     for store in stores:
-        store.wait_for_turn("service", 60.0)
+        store.wait_for_turn("service", 20.0)
     # What asked for a pause is given the longest one, even if nothing limits its rate.
     for seconds in (9.0, 4.0):
         stores[0].pause("other", seconds)
@@ -441,4 +441,4 @@ def test_three_processes_that_ask_at_the_same_moment_take_turns(tmp_path, monkey
     for store in stores:
         store.close()
 
-    assert waits == [1.0, 2.0, 9.0]
+    assert waits == [3.0, 6.0, 9.0]

@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import hosting_fakes
@@ -30,11 +31,23 @@ from roboirg.policies.by_name.finding import read_policy
 from roboirg.records.record import Job
 from roboirg.records.store import read_records
 from roboirg.runs.episode_errors import EpisodeError, EpisodeLostError
-from roboirg.runs.hosting import host_pool
+from roboirg.runs.hosting import host_pool, policy_line
 from roboirg.runs.hosting.host_pool import HostPool, HostSettings
 from roboirg.runs.hosting.hosted_policy import HostedPolicy
-from roboirg.runs.hosting.messages import Call, HostRequest, Loss, ask, receive_call, send
+from roboirg.runs.hosting.messages import (
+    Begun,
+    Call,
+    HostRequest,
+    Loss,
+    Outcome,
+    Question,
+    ask,
+    receive_call,
+    receive_request,
+    send,
+)
 from roboirg.runs.hosting.policy_child import PolicyChild
+from roboirg.runs.hosting.policy_line import PolicyLine
 from roboirg.runs.hosting.policy_opening import open_policy
 from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_sections import Hosting
@@ -552,6 +565,30 @@ class It(hostile_policies.Hostile):
     assert world.metadata == {"sum": 96}
 
     world.close()
+
+
+def test_the_time_that_the_world_takes_to_draw_is_not_that_of_the_policy(monkeypatch):
+    """A call of at most a second asks for a picture, which takes a thousand seconds."""
+    seconds = [0.0]
+    monkeypatch.setattr(policy_line, "time", SimpleNamespace(monotonic=lambda: seconds[0]))
+    world, supervisor = socket.socketpair()
+    with world, supervisor:
+        line = PolicyLine(world, read_policy("random"), limit_s=1.0)
+        _, process = receive_request(supervisor)
+        assert process is not None
+        supervisor.shutdown(socket.SHUT_RDWR)  # an error is not looked into
+        with process, contextlib.closing(line):
+            for message in (Begun(), Question(("front_rgb",)), Outcome(message="done")):
+                send(process, message)
+
+            def draw(question: Question) -> Call:
+                seconds[0] += 1000.0
+                return Call("answer", value=question.fields)
+
+            outcome = line.call(Call("act"), draw)
+
+            assert outcome.message == "done"
+            assert [receive_call(process).method for _ in range(2)] == ["act", "answer"]
 
 
 def test_a_frozen_process_is_noticed_although_it_had_sent_many_answers_in_advance(

@@ -44,8 +44,8 @@ class _Place(NamedTuple):
 def as_json(value: Any, owner: str | None = None) -> Any:  # noqa: ANN401
     """Return a value as JSON values that every reader of records can read.
 
-    Numbers and arrays of NumPy, PyTorch and JAX become numbers and lists, paths and keys texts;
-    large arrays are described.
+    Numbers and arrays of NumPy, PyTorch and JAX become numbers and lists. Paths, keys and whole
+    numbers of more than 63 bits become texts; large arrays are described.
 
     Args:
         value: anything.
@@ -53,8 +53,8 @@ def as_json(value: Any, owner: str | None = None) -> Any:  # noqa: ANN401
             text, cut and without characters that control a terminal.
 
     Raises:
-        InvalidValueError: the owner's value is something else, a number that is not finite, a
-            whole one of more than 63 bits, or nested too deep.
+        InvalidValueError: the owner's value is something else, a number that is not finite, or
+            nested too deep.
     """
     return _as_json(value, _Place(owner))
 
