@@ -16,7 +16,6 @@ from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.run_cells import cells_of
 from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.analysis.tables.run_tables import make_run_tables
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.word_sampler import LANGUAGE_VERSION
@@ -28,6 +27,11 @@ SETTINGS = ("reasoning", "spatial")
 
 
 def random_policy_floors(excess):
+    """Return floors on random scenes, as of ``{"direct": 0.7}``.
+
+    A value is how much more often than chance a learner that sees only the words is right: in a
+    setting with 0.7 the words alone nearly give the goal away.
+    """
     found = {}
     for name, value in excess.items():
         key = FloorKey(RANDOM, name)
@@ -45,7 +49,7 @@ def floors_with_two_settings_near_chance(monkeypatch):
 
 
 def results_of_20_episodes_half_won():
-    """As many episodes as an interval needs, the outcomes by turns."""
+    """Return as many episodes as an interval needs: explicit wins all, two settings every other."""
     wins = "01" * 10
     explicit = make_results("1" * 20)
     return [*explicit, *make_results(wins, "reasoning"), *make_results(wins, "spatial")]
@@ -78,14 +82,24 @@ def notes_of(results):
 
 
 def test_the_headline_number_is_the_mean_gap_of_the_settings_each_a_mean_over_its_tasks():
-    """Gaps to explicit: reasoning -1/4 and -1/2 in two tasks, spatial -1 in one."""
+    """Gaps to explicit: reasoning -1/4 and -1/2 in two tasks, spatial -1 in one.
+
+    Some resamples of so few episodes lack a setting, so that there is no interval.
+    """
     found = headline_of(results_of_two_tasks())
+
     assert found.gap == pytest.approx(((-1 / 4 - 1 / 2) / 2 + -1) / 2)
     assert (found.episodes, found.is_complete) == (6, True)
-    assert found.interval is None, "some resamples of so few episodes lack a setting"
+    assert found.interval is None
 
-    lost = [*make_results("00"), *make_results("10", "reasoning"), *make_results("00", "spatial")]
-    assert headline_of(lost).gap == 0.25  # though nothing was won without implicit reference
+
+def test_the_headline_is_positive_for_a_policy_that_wins_only_without_explicit_instructions():
+    """Reasoning gains 1 of 2 and spatial nothing; would find a share of what explicit wins."""
+    explicit = make_results("00", "explicit")
+    reasoning = make_results("10", "reasoning")
+    spatial = make_results("00", "spatial")
+
+    assert headline_of([*explicit, *reasoning, *spatial]).gap == 0.25
 
 
 def test_the_headline_has_no_interval_if_resamples_could_only_repeat_the_same_gap():
@@ -93,76 +107,92 @@ def test_the_headline_has_no_interval_if_resamples_could_only_repeat_the_same_ga
 
     The others all have a gap of -1, and an interval of width 0 would look like certainty.
     """
-    lost = [
-        *make_results("1" * 20),
-        *make_results("0" * 20, "reasoning"),
-        *make_results("0" * 5, "spatial"),
-    ]
-    assert (headline_of(lost).gap, headline_of(lost).interval) == (-1, None)
+    explicit = make_results("1" * 20)
+    reasoning = make_results("0" * 20, "reasoning")
+    spatial = make_results("0" * 5, "spatial")
+
+    found = headline_of([*explicit, *reasoning, *spatial])
+
+    assert (found.gap, found.interval) == (-1, None)
 
 
 def test_a_second_setting_on_the_same_episodes_does_not_narrow_the_interval():
     """Half of explicit's wins are lost in each setting. Would find episodes drawn independently."""
-    both, alone = (
-        headline_of(results_of_20_episodes_half_won(), settings)
-        for settings in (SETTINGS, SETTINGS[1:])
-    )
-    assert (both.gap, both.interval) == (alone.gap, alone.interval)
-    assert both.gap == -0.5
+    results = results_of_20_episodes_half_won()
+
+    both = headline_of(results, ("reasoning", "spatial"))
+    alone = headline_of(results, ("spatial",))
+
+    assert both.gap == alone.gap == -0.5
+    assert both.interval == alone.interval
 
 
-def test_there_is_no_headline_without_explicit_or_without_one_of_its_settings():
-    results = results_of_two_tasks()
-    for setting in ("spatial", "explicit"):
-        assert (
-            headline_of([result for result in results if result.options.setting != setting]) is None
-        )
-    assert headline_of(results, ()) is None
+@pytest.mark.parametrize("lacking", ["spatial", "explicit"])
+def test_there_is_no_headline_without_explicit_or_without_one_of_its_settings(lacking):
+    results = [result for result in results_of_two_tasks() if result.setting != lacking]
+
+    assert headline_of(results) is None
 
 
-def test_every_table_has_the_headline_below_it_or_the_reason_why_there_is_none(
-    floors_with_two_settings_near_chance,
-):
-    (note,) = notes_of(results_of_20_episodes_half_won())
+def test_there_is_no_headline_over_no_settings():
+    assert headline_of(results_of_two_tasks(), ()) is None
+
+
+def test_every_table_has_the_headline_below_it(floors_with_two_settings_near_chance):
+    frame = frame_of(results_of_20_episodes_half_won())
+
+    (note,) = headline_notes(cells_of(frame), frame.names)
+    (run_table,) = make_run_tables(frame)
+    paper_table = make_table("main", RunData(frame))
+
     assert note.startswith("Headline of listener: −50.0 points to explicit (95 % interval ")
     assert note.endswith("reasoning, spatial; 20 episodes.")
-    assert notes_of(results_of_20_episodes_half_won()) == [note], "to explicit of the same language"
-
-    frame = frame_of(results_of_20_episodes_half_won())
-    (run_table,) = make_run_tables(frame)
-    assert note in make_table("main", RunData(frame)).notes
     assert note in run_table.notes
-    for setting in ("spatial", "explicit"):
-        error = make_result("error", 20, options=InstructionOptions(setting))
-        assert notes_of([*results_of_20_episodes_half_won(), error])[0].endswith(
-            "20 episodes, incomplete."
-        )
-    for results, reason in (
-        (results_of_two_tasks(), "6 episodes cannot give it an interval; play more."),
-        (
-            results_of_two_tasks(language_version="0.9"),
-            "no floors were measured for its language",
-        ),
-        (
-            results_of_two_tasks(wordings="robomme@1a2b3c4d"),
-            "the floors are those of our own words of",
-        ),
-    ):
-        (note,) = notes_of(results)
-        assert note.startswith(f"listener has no headline number: {reason}")
+    assert note in paper_table.notes
+
+
+@pytest.mark.parametrize("setting", ["spatial", "explicit"])
+def test_a_headline_over_an_episode_without_a_verdict_is_called_incomplete(
+    floors_with_two_settings_near_chance, setting
+):
+    error = make_result("error", 20, setting=setting)
+
+    (note,) = notes_of([*results_of_20_episodes_half_won(), error])
+
+    assert note.endswith("20 episodes, incomplete.")
+
+
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        ({}, "6 episodes cannot give it an interval; play more."),
+        ({"language_version": "0.9"}, "no floors were measured for its language"),
+        ({"wordings": "robomme@1a2b3c4d"}, "the floors are those of our own words of"),
+    ],
+)
+def test_a_run_without_a_headline_gets_the_reason(
+    floors_with_two_settings_near_chance, fields, reason
+):
+    """Too few episodes, or words of which nobody measured what they give away."""
+    (note,) = notes_of(results_of_two_tasks(**fields))
+
+    assert note.startswith(f"listener has no headline number: {reason}")
 
 
 def test_the_headline_counts_settings_in_which_shortcuts_win_at_most_5_points_over_chance():
-    """Measured here: direct 5.01 points above, reasoning 5, spatial below.
-
-    Parts (another pool of episodes, a single task) do not let direct in.
-    """
+    """Measured here: direct 5.01 points above, reasoning 5, spatial below."""
     found = random_policy_floors({"direct": 0.0501, "reasoning": 0.05, "spatial": -0.3})
-    parts = [FloorKey(TEST, "direct"), FloorKey(RANDOM, "direct", "StopCube")]
-
-    found |= dict.fromkeys(parts, found[RANDOM, "spatial", "", ""])
 
     assert settings_at_chance(found) == ("reasoning", "spatial")
+
+
+def test_a_setting_at_chance_on_the_test_split_or_in_one_task_alone_is_not_in_the_headline():
+    near_chance = random_policy_floors({"direct": -0.3})[RANDOM, "direct", "", ""]
+    found = random_policy_floors({"direct": 0.0501, "spatial": -0.3})
+    found[FloorKey(TEST, "direct")] = near_chance
+    found[FloorKey(RANDOM, "direct", "StopCube")] = near_chance
+
+    assert settings_at_chance(found) == ("spatial",)
 
 
 def test_rates_of_shortcuts_are_stored_for_every_implicit_setting_and_task():
@@ -170,12 +200,13 @@ def test_rates_of_shortcuts_are_stored_for_every_implicit_setting_and_task():
 
     Such a rate, a *floor*, is what a policy reaches without understanding.
     """
-    implicit = {name for name, setting in all_settings().items() if setting.implicit}
-    wanted = {FloorKey(RANDOM, name) for name in implicit}
-    for task in all_tasks().values():
-        wanted |= {FloorKey(RANDOM, name, task.name) for name in implicit & {*settings_of(task)}}
-
     language = instruct(get_episode("PickXtimes", "test", 0)).metadata["language_version"]
-    measured = measured_floors(str(language)) or {}
+    measured = measured_floors(str(language))
+    assert measured is not None
 
-    assert wanted <= measured.keys()
+    for name, setting in all_settings().items():
+        if setting.implicit:
+            assert FloorKey(RANDOM, name) in measured
+            for task in all_tasks().values():
+                if name in settings_of(task):
+                    assert FloorKey(RANDOM, name, task.name) in measured

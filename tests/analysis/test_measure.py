@@ -39,10 +39,13 @@ def frame_of_two_policies(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFr
 def test_rates_counts_and_corrected_tests_are_those_of_pandas_and_statsmodels(
     frame_of_two_policies, data
 ):
+    """A rate is the mean over tasks of each task's mean; errors have no part in it.
+
+    A group, one policy in one setting, has 12 trials: 2 tasks, 3 episodes and 2 seeds.
+    """
     outcomes = st.sampled_from(["success", "failure", "error"])
-    drawn = data.draw(
-        st.lists(outcomes, min_size=len(frame_of_two_policies), max_size=len(frame_of_two_policies))
-    )
+    size = len(frame_of_two_policies)
+    drawn = data.draw(st.lists(outcomes, min_size=size, max_size=size))
     frame = frame_of_two_policies.assign(outcome=drawn)
     judged = frame[frame["outcome"] != "error"]
     judged = judged.assign(won=judged["outcome"] == "success")
@@ -57,7 +60,7 @@ def test_rates_counts_and_corrected_tests_are_those_of_pandas_and_statsmodels(
         own = judged[(judged["policy"] == policy) & (judged["setting"] == setting)]
         assert row.counts.trials == len(own)
         assert row.counts.successes == own["won"].sum()
-        assert row.counts.errors == 3 * 2 * 2 - len(own)
+        assert row.counts.errors == 12 - len(own)
         if own.empty:
             assert row.rate is None
         else:
@@ -75,35 +78,50 @@ def check_holm(rows):
         assert [row.p_holm for row in rows] == pytest.approx(list(corrected))
 
 
-def test_a_rate_pooled_over_settings_counts_all_of_their_rows_in_any_order(frame_of_two_policies):
-    """By policy alone an episode has a row for each setting. Would find one kept of them."""
-    rates = (
-        frame_of_two_policies.groupby(["policy", "task"])["success"].mean().groupby("policy").mean()
-    )
-    for frame in (frame_of_two_policies, frame_of_two_policies[::-1]):
-        for row in roboirg.measure(frame, ["policy"], pool=["instruction_options"]):
-            assert float(row.rate or 0) == pytest.approx(rates[row.key[0]])
-            assert row.counts.trials == (frame_of_two_policies["policy"] == row.key[0]).sum()
-
-
-def test_implicit_and_resolved_instructions_are_pooled_only_if_the_call_asks_for_it(
-    frame_of_two_policies,
+@pytest.mark.parametrize("step", [1, -1], ids=["in order", "reversed"])
+def test_a_rate_pooled_over_settings_counts_all_of_their_rows_in_any_order(
+    frame_of_two_policies, step
 ):
-    """All implicit ones are won, all resolved ones lost: 50 % would be the rate of neither."""
+    """By policy alone an episode has a row for each of 3 settings. Would find one kept of them.
+
+    2 tasks, 3 episodes, 2 seeds and 3 settings are 36 trials, all won.
+    """
+    frame = frame_of_two_policies[::step]
+
+    found = roboirg.measure(frame, ["policy"], pool=["instruction_options"])
+
+    assert [(row.rate, row.counts.trials) for row in found] == [(1, 36), (1, 36)]
+
+
+@pytest.fixture
+def frame_of_two_forms(frame_of_two_policies) -> pd.DataFrame:
+    """All implicit instructions are won, all resolved ones lost; 12 trials of a group in each."""
     resolved = frame_of_two_policies.assign(
         form="resolved", outcome="failure", instruction_options="resolved"
     )
-    frame = pd.concat([frame_of_two_policies, resolved])
+    return pd.concat([frame_of_two_policies, resolved])
+
+
+def test_a_rate_over_both_forms_of_an_instruction_is_refused(frame_of_two_forms):
+    """*Resolved* spells references out, *implicit* does not: 50 % would be the rate of neither."""
     with pytest.raises(
         InvalidValueError, match=r"values of form \(implicit, resolved\): add 'form'"
     ):
-        roboirg.measure(frame, ["policy", "setting"])
+        roboirg.measure(frame_of_two_forms, ["policy", "setting"])
 
-    by_form = roboirg.measure(frame, ["policy", "setting", "form"])
-    assert {(row.key[-1], row.rate) for row in by_form} == {("implicit", 1), ("resolved", 0)}
 
-    both = roboirg.measure(frame, ["policy", "setting"], pool=["form", "instruction_options"])
-    assert {(row.rate, row.counts.trials) for row in both} == {(Fraction(1, 2), 24)}
+def test_each_form_of_an_instruction_has_a_rate_of_its_own(frame_of_two_forms):
+    found = roboirg.measure(frame_of_two_forms, ["policy", "setting", "form"])
+
+    assert {(row.key[-1], row.rate) for row in found} == {("implicit", 1), ("resolved", 0)}
+
+
+def test_both_forms_of_an_instruction_are_pooled_if_the_call_asks_for_it(frame_of_two_forms):
+    pool = ["form", "instruction_options"]
+
+    found = roboirg.measure(frame_of_two_forms, ["policy", "setting"], pool=pool)
+
+    assert {(row.rate, row.counts.trials) for row in found} == {(Fraction(1, 2), 24)}
 
 
 @pytest.mark.parametrize(
@@ -160,12 +178,15 @@ def test_an_average_weighs_its_tasks_equally_and_a_suite_has_one_of_its_own():
         *make_results("0", task="VideoUnmask"),
         *make_results("1", task="SomethingElse"),
     ]
-    found = summarize(cells_of(frame_of(results)))
-    rates = {key.scope: summary.rate for key, summary in found.items()}
-    tasks = {"PickXtimes": 1, "BinFill": 0, "VideoUnmask": 0, "SomethingElse": 1}
 
+    found = summarize(cells_of(frame_of(results)))
+
+    rates = {key.scope: summary.rate for key, summary in found.items()}
     assert rates == {
-        **tasks,
+        "PickXtimes": 1,
+        "BinFill": 0,
+        "VideoUnmask": 0,
+        "SomethingElse": 1,
         "counting": Fraction(1, 2),
         "permanence": 0,
         ALL_TASKS: Fraction(1, 2),
@@ -176,26 +197,32 @@ def test_an_average_weighs_its_tasks_equally_and_a_suite_has_one_of_its_own():
 def test_p_values_are_corrected_for_both_forms_and_the_forms_are_compared():
     """Of 20 explicit wins all, direct none, and its *resolved* form, which names all, 15.
 
-    Would find p-values that ignore that two tests were made.
+    Would find p-values that ignore that two tests were made. There is a summary for the task, its
+    suite and all tasks, which are equal here.
     """
-    results = [
-        *make_results("1" * 20),
-        *make_results("0" * 20, "direct"),
-        *make_results("1" * 15 + "0" * 5, "direct", form="resolved"),
-    ]
-    summaries = summarize(cells_of(frame_of(results)))
-    explicit = [summary for key, summary in summaries.items() if key.options == REFERENCE_OPTIONS]
+    explicit = make_results("1" * 20)
+    direct = make_results("0" * 20, "direct")
+    resolved = make_results("1" * 15 + "0" * 5, "direct", form="resolved")
 
-    direct = [
-        summary for key, summary in summaries.items() if key.options == InstructionOptions("direct")
-    ]
+    found = summarize(cells_of(frame_of([*explicit, *direct, *resolved])))
 
-    assert [(summary.gap, summary.p_holm, summary.second_gap) for summary in explicit] == [
-        (None, None, None)
-    ] * 3
-    assert explicit[0].interval == wilson_interval(20, 20)
-    # An exact test of 20 episodes, all to one side, has p = 2 / 2^20; of two tests: times 2.
-    assert [summary.p_holm for summary in direct] == pytest.approx([2 * 2 / 2**20] * 3)
-    assert [summary.gap.value for summary in direct] == [-1] * 3
-    assert direct[0].second_gap.value == -0.75
-    assert direct[0].second_gap.overlap == (0, 0, 15, 5)
+    of_direct = [
+        summary for key, summary in found.items() if key.options == InstructionOptions("direct")
+    ]
+    assert len(of_direct) == 3
+    for summary in of_direct:
+        assert summary.gap.value == -1
+        # An exact test of 20 episodes, all to one side, has p = 2 / 2^20; of two tests: times 2.
+        assert summary.p_holm == pytest.approx(2 * 2 / 2**20)
+        assert summary.second_gap.value == -0.75
+        assert summary.second_gap.overlap == (0, 0, 15, 5)
+
+
+def test_explicit_instructions_have_a_rate_and_no_gap():
+    found = summarize(cells_of(frame_of(make_results("1" * 20))))
+
+    explicit = [summary for key, summary in found.items() if key.options == REFERENCE_OPTIONS]
+    assert len(explicit) == 3
+    for summary in explicit:
+        assert (summary.gap, summary.p_holm, summary.second_gap) == (None, None, None)
+        assert summary.interval == wilson_interval(20, 20)
