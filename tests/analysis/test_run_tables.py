@@ -29,6 +29,7 @@ from roboirg.stats.rates import points
 
 
 def printed(frame: Frame, width: int = 100) -> str:
+    """Return what a finished run prints in a terminal: its tables and the list of failures."""
     console = Console(file=io.StringIO(), width=width)
     print_tables(make_run_tables(frame), console)
     print_failures(frame, console)
@@ -125,30 +126,35 @@ FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL = frame_of(
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
-        *((name, "markdown") for name in ("forms", "failures", "failure-names", "heard")),
+        ("forms", "markdown"),
+        ("failures", "markdown"),
+        ("failure-names", "markdown"),
+        ("heard", "markdown"),
         ("heard", "csv"),
     ],
 )
 def test_other_tables_are_as_stored(snapshot, name, kind):
-    """Numbers of one row, column, form or outcome in place of another."""
-    assert (
-        get_format(kind).draw(
-            diagnostic_tables()[name].make(RunData(FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL))
-        )
-        == snapshot
-    )
+    """Would find numbers of one row, column, form or outcome in place of another."""
+    data = RunData(FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL)
+
+    table = diagnostic_tables()[name].make(data)
+
+    assert get_format(kind).draw(table) == snapshot
 
 
 def results_that_ended(kinds: str, setting: str) -> list[Summary]:
-    """Return a success, a failure of a kind, or one without attribution for each letter."""
+    """Return a result for each letter of how an episode ended.
+
+    s success, ! error; failures: g grounding, x execution, u undecided, - without attribution.
+    """
     wrong: dict[str, Attribution] = dict(zip("gxu", ONE_FAILURE_OF_EACH_KIND, strict=True))
-    return [
-        make_result(
-            "success" if letter == "s" else "error" if letter == "!" else "failure", episode,
-            setting=setting, attribution=wrong.get(letter),
-        )
-        for episode, letter in enumerate(kinds)
-    ]  # fmt: skip
+    outcomes = {"s": "success", "!": "error"}
+    found = []
+    for episode, letter in enumerate(kinds):
+        outcome = outcomes.get(letter, "failure")
+        result = make_result(outcome, episode, setting=setting, attribution=wrong.get(letter))
+        found.append(result)
+    return found
 
 
 @pytest.mark.parametrize(
@@ -166,17 +172,18 @@ def test_success_and_three_kinds_of_failure_add_up_to_100_and_their_changes_to_0
 ):
     """A letter is how an episode ended: s success, g grounding, x execution, u or - undecided.
 
-    Changes are over the same episodes: in the fourth case, errors (!) leave eight of ten.
+    Rates of direct, and their changes from explicit, are of success, grounding, execution and
+    undecided; shares are those of grounding among the failures of direct and of explicit. Changes
+    are over the same episodes: in the fourth case, errors (!) leave eight of ten.
     """
-    data = RunData(
-        frame_of(results_that_ended(explicit, "explicit"), results_that_ended(direct, "direct"))
-    )
-    entries = make_failure_table(data).rows[1].entries
-    assert [f"{entry.percent:.0f}" for entry in entries[2:6]] == rates.split()
+    results = [*results_that_ended(explicit, "explicit"), *results_that_ended(direct, "direct")]
 
-    found = [entry.text.split(".")[0] for entry in entries[6:10]]
+    _, row = make_failure_table(RunData(frame_of(results))).rows
+
+    assert [f"{entry.percent:.0f}" for entry in row.entries[2:6]] == rates.split()
+    found = [entry.text.split(".")[0] for entry in row.entries[6:10]]
     assert found == changes.split()
-    assert [entry.text for entry in entries[10:]] == shares.split()
+    assert [entry.text for entry in row.entries[10:]] == shares.split()
 
 
 def test_a_failure_whose_name_this_version_does_not_know_counts_as_not_attributed():
@@ -195,46 +202,83 @@ def test_the_breakdown_by_difficulty_is_as_stored(snapshot):
 
 
 def test_the_first_ten_failures_are_listed_and_the_others_counted():
-    """And the legend explains only what the table has: here, privileged policies."""
-    text = printed(frame_of(play("0" * 13, privileged=True, cause="late")))
-    assert "success rate in %; privileged policies and scripted hands use the simulator's" in text
+    lines = printed(frame_of(play("0" * 13, cause="late"))).splitlines()
 
-    lines = text.splitlines()
     assert [line.split()[1] for line in lines[-11:-1]] == [f"test/{index}" for index in range(10)]
     assert lines[-1] == "  and 3 more"
+
+
+def test_a_run_without_failures_has_no_list_of_them():
     assert "without success" not in printed(frame_of(play("1")))
 
+
+def test_the_legend_explains_only_what_the_table_has():
+    """Here privileged policies, and neither gaps nor errors."""
+    text = printed(frame_of(play("0", privileged=True, cause="late")))
+
+    assert "success rate in %; privileged policies and scripted hands use the simulator's" in text
+
+
+def test_a_failure_without_instruction_is_listed_with_its_control_arm():
     (silent,) = play("0", arm="silent", cause="late", wordings="mine@1a")
+
     assert failure_text(silent) == "PickXtimes test/0 explicit (silent): late"
 
 
-def test_a_rate_is_green_from_75_percent_and_red_below_50():
+@pytest.mark.parametrize(
+    ("outcomes", "style"), [("1110", "green"), ("110", "yellow"), ("100", "red")]
+)
+def test_a_rate_is_green_from_75_percent_and_red_below_50(outcomes, style):
     """3 of 4, 2 of 3 and 1 of 3 are won."""
-    tables = [make_run_tables(frame_of(play(outcomes)))[0] for outcomes in ("1110", "110", "100")]
-    assert [table.rows[0].entries[0].style for table in tables] == ["green", "yellow", "red"]
+    (table,) = make_run_tables(frame_of(play(outcomes)))
+
+    assert table.rows[0].entries[0].style == style
 
 
-def test_each_policy_split_step_limit_and_robot_has_a_table_in_the_order_of_the_plan():
+@pytest.mark.parametrize("names", [["listener", "random"], ["random", "listener"]])
+def test_policies_have_tables_in_the_order_of_the_plan(names):
+    """The last table has the legend, whichever it is."""
+    results = [*play("1"), *play("1", policy="random", privileged=True)]
+    planned = [make_result(policy=name).identity for name in names]
+
+    tables = make_run_tables(frame_of(results, planned=planned))
+
+    assert [table.title.split(" ")[0] for table in tables] == names
+    assert "privileged policies" in tables[-1].notes[-1]
+
+
+def test_each_policy_split_step_limit_and_robot_has_a_table():
     results = [
-        *play("1"), *play("1", split="val"), *play("1", max_steps=200),
-        *play("1", policy="random", privileged=True), *play("1", robot="Panda"),
-    ]  # fmt: skip
-    for names in (["listener", "random"], ["random", "listener"]):
-        planned = [make_result(policy=name).identity for name in names]
-        tables = make_run_tables(frame_of(results, planned=planned))
-        assert "privileged policies" in tables[-1].notes[-1], "whichever table is the last"
-        found = [table.title for table in tables]
-        assert sorted(found, key=lambda title: names.index(title.split(",")[0])) == found
-        assert sorted(found) == [
-            "listener, split test, max steps 1300",
-            "listener, split test, max steps 1300, on Panda",
-            "listener, split test, max steps 200",
-            "listener, split val, max steps 1300",
-            "random, split test, max steps 1300 (privileged)",
-        ]
+        *play("1"),
+        *play("1", split="val"),
+        *play("1", max_steps=200),
+        *play("1", policy="random", privileged=True),
+        *play("1", robot="Panda"),
+    ]
+
+    tables = make_run_tables(frame_of(results))
+
+    assert sorted(table.title for table in tables) == [
+        "listener, split test, max steps 1300",
+        "listener, split test, max steps 1300, on Panda",
+        "listener, split test, max steps 200",
+        "listener, split val, max steps 1300",
+        "random, split test, max steps 1300 (privileged)",
+    ]
 
 
-def test_a_gap_is_printed_in_points_with_its_sign():
+@pytest.mark.parametrize(
+    ("gap", "decimals", "text"),
+    [
+        (-0.5, 0, "−50"),
+        (0.25, 0, "+25"),
+        (0.0, 0, "±0"),
+        (-0.001, 0, "±0"),
+        (-0.5, 1, "−50.0"),
+        (0.0004, 1, "±0.0"),
+        (0.0006, 1, "+0.1"),
+    ],
+)
+def test_a_gap_is_printed_in_points_with_its_sign(gap, decimals, text):
     """-0.5 is −50 points. What rounds to zero is ±0, with no sign of its own."""
-    assert [points(gap) for gap in (-0.5, 0.25, 0.0, -0.001)] == ["−50", "+25", "±0", "±0"]
-    assert [points(gap, 1) for gap in (-0.5, 0.0004, 0.0006)] == ["−50.0", "±0.0", "+0.1"]
+    assert points(gap, decimals) == text
