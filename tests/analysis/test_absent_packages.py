@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from msgspec.structs import replace
 from page_text import call
@@ -19,7 +17,7 @@ NAMES_OF_AN_ABSENT_PACKAGE = {
 
 
 @pytest.fixture
-def run_of_absent_package(tmp_path: Path) -> Path:
+def run_of_absent_package(tmp_path):
     """A run as it would look if another package had brought its task, setting and policy.
 
     Of its six planned episodes, three explicit and three in the setting *theirs*, five are played.

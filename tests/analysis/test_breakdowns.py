@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import tracemalloc
-from pathlib import Path
 
 import pytest
 from flat_jobs import frame_of, make_results
@@ -25,7 +24,7 @@ from roboirg.analysis.results.reading import (
 )
 from roboirg.analysis.tables.diagnostic_tables import make_breakdown_table
 from roboirg.core.errors import InvalidValueError
-from roboirg.records.record import Job, Record, Summary
+from roboirg.records.record import Record, Summary
 from roboirg.records.store import RECORDS_FILE, iterate_records
 from roboirg.runs.plan.plan import Plan
 
@@ -39,7 +38,7 @@ PLAN = Plan(
 BY_LETTERS = Breakdown("letters", "letter", "Made up.")
 
 
-def record_of_job(job: Job) -> Record:
+def record_of_job(job):
     """The forgetful policy fails in every implicit instruction that says *it*, and in no other."""
     record = make_record(job, "success")
     says_it = any(mention.expression == "it" for mention in record.mentions)
@@ -49,14 +48,12 @@ def record_of_job(job: Job) -> Record:
 
 
 @pytest.fixture(scope="module")
-def records_of_two_policies() -> Records:
+def records_of_two_policies():
     return tuple(record_of_job(job) for job in PLAN.jobs())
 
 
 @pytest.fixture(scope="module")
-def folder_of_two_policies(
-    records_of_two_policies: Records, tmp_path_factory: pytest.TempPathFactory
-) -> Path:
+def folder_of_two_policies(records_of_two_policies, tmp_path_factory):
     return store(tmp_path_factory.mktemp("runs") / "both", records_of_two_policies, PLAN).folder
 
 
@@ -89,7 +86,7 @@ def test_an_episode_is_labeled_with_the_expressions_of_its_command_alone(records
 
     for record in records_of_two_policies:
         if record.setting == "contextual":
-            labels.update(read(record))  # type: ignore[arg-type]
+            labels.update(read(record))
             said.update(mention.expression for mention in record.mentions)
 
     assert labels < said

@@ -13,20 +13,19 @@ from flat_jobs import job_of
 from roboirg.analysis.measures.chance import CHANCE, floor_level
 from roboirg.policies import make_policy
 from roboirg.policies.builtin.listeners import ForgetfulPolicy
-from roboirg.records.record import Job
 from roboirg.runs.job_instruction import instruct_job
 from roboirg.shortcuts import SURFACE_RULES
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 
 
-def job_in(task: str, setting: str, episode: int = 2, **fields: object) -> Job:
+def job_in(task, setting, episode=2, **fields):
     """Return a job of the test split; who plays it does not matter here."""
     usual = {"policy": "any", "split": "test", **fields}
     return job_of(task=task, setting=setting, episode=episode, **usual)
 
 
-def language_version_of(told: Job) -> str:
+def language_version_of(told):
     return str(instruct_job(told).metadata["language_version"])
 
 
@@ -60,7 +59,7 @@ def test_the_computed_chance_is_the_rate_of_a_policy_that_forgets_and_guesses(ta
 
     rights = []
     for seed in range(400):
-        goal = ForgetfulPolicy(seed=seed).decide(env, "")  # type: ignore[arg-type]
+        goal = ForgetfulPolicy(seed=seed).decide(env, "")
         rights.append(stages_of(goal) == stages_of(episode.goal))
     level = float(floor_level(CHANCE, [played]))
 

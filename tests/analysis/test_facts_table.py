@@ -21,9 +21,7 @@ from roboirg.runs.plan.stored_plans import write_plan
 Facts = dict[str, dict[str, str]]
 
 
-def record_of(
-    episode: int, outcome: str = "success", *, setting: str = "explicit", **fields: object
-) -> Record:
+def record_of(episode, outcome="success", *, setting="explicit", **fields):
     """Return the record of an episode of PickXtimes, played by the policy *mine*."""
     job = job_of(policy="mine", task="PickXtimes", split="test", episode=episode, setting=setting)
     cause = None if outcome == "success" else "why"
@@ -183,7 +181,7 @@ class Network:
 
 
 @pytest.fixture
-def networks_are_modules_of_torch(monkeypatch: pytest.MonkeyPatch) -> None:
+def networks_are_modules_of_torch(monkeypatch):
     """Stand in for PyTorch, of which nothing but the class of networks is asked."""
     torch = SimpleNamespace(nn=SimpleNamespace(Module=Network))
     monkeypatch.setitem(sys.modules, "torch", torch)

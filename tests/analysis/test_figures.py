@@ -50,7 +50,7 @@ def run_data(found: list[Summary] | None = None, **options: object) -> RunData:
     """Return what figures are drawn from: these results, or those of the two policies."""
     if found is None:
         found = results_of_two_policies()
-    return RunData(make_frame([("run", found)], **options))  # type: ignore[arg-type]
+    return RunData(make_frame([("run", found)], **options))
 
 
 def drawn_texts(figure: Figure) -> list[Text]:
@@ -249,7 +249,7 @@ def test_published_rows_stand_below_a_line_and_own_rates_that_differ_have_a_sign
 
     (line,) = (line for line in panel.lines if [*line.get_xdata()] == [0, 1])
     own, heading = panel.get_yticks()[:2]
-    assert own < line.get_ydata()[0] < heading  # type: ignore[index]
+    assert own < line.get_ydata()[0] < heading
 
     texts = [text_without_line_breaks(text) for text in drawn_texts(figure)]
     assert "≠ Implicit settings are not comparable with the published rates" in texts[0]

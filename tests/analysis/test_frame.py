@@ -25,12 +25,12 @@ OUTCOMES = ("success", "failure", "error")
 
 
 @pytest.fixture(scope="module")
-def run_with_wins_losses_and_errors(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run_with_wins_losses_and_errors(tmp_path_factory):
     """Of each task and setting the first episode is won, the next lost; one is an error."""
     folder = tmp_path_factory.mktemp("runs") / "run"
     plan = make_plan("oracle", tasks="PickXtimes,StopCube", settings="all", episodes="4")
     found = [
-        make_record(job, OUTCOMES[job.episode], "why" if job.episode else None, video=None)  # type: ignore[arg-type]
+        make_record(job, OUTCOMES[job.episode], "why" if job.episode else None, video=None)
         for job in plan.jobs()
         if job.episode < 3
     ]

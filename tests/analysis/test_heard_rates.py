@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 from flat_jobs import frame_of, make_result, make_results
@@ -15,7 +14,7 @@ from roboirg.analysis.tables.diagnostic_tables import make_heard_table
 from roboirg.analysis.tables.run_tables import make_run_tables
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
-from roboirg.records.record import Job, Record, Summary
+from roboirg.records.record import Job, Summary
 from roboirg.runs.job_instruction import PreparedJob
 from roboirg.runs.play.episode_record import audit_record
 
@@ -77,7 +76,7 @@ def test_a_note_below_the_table_of_a_policy_says_how_many_of_its_prompts_were_cu
     assert note not in other.notes
 
 
-def long_record(policy: str, tokens: int | None) -> Record:
+def long_record(policy, tokens):
     """Return a record with a long context, by a policy whose prompt has room for some tokens.
 
     None leaves it unsaid how much the policy reads.
@@ -92,7 +91,7 @@ def long_record(policy: str, tokens: int | None) -> Record:
 
 
 @pytest.fixture
-def run_with_three_prompt_limits(tmp_path: Path) -> Path:
+def run_with_three_prompt_limits(tmp_path):
     """Of a policy that cuts the instruction, one that reads it whole, and one that does not say."""
     records = [
         long_record("cutting", 64),
@@ -109,7 +108,7 @@ def test_the_page_strikes_out_the_words_that_the_model_did_not_read(
     """The record of the cut prompt has, of each turn, how many characters were reached."""
     record = long_record("cutting", 64)
     cut = ""
-    for turn, end in zip(record.instruction, record.prompt.reached, strict=True):  # type: ignore[union-attr]
+    for turn, end in zip(record.instruction, record.prompt.reached, strict=True):
         cut += turn.text[end:].replace(" ", "")
     call("report", run_with_three_prompt_limits)
 

@@ -60,7 +60,7 @@ TABLE_WITH_A_LONG_TEXT = Table(
 
 
 @pytest.fixture(scope="module")
-def latex_of_all_tables() -> str:
+def latex_of_all_tables():
     """All tables, with results like the published ones and with perfect ones, and crowded ones."""
     like = like_published
     data = RunData(frame_of([*like("main"), *like("real"), *like("context")]))

@@ -23,7 +23,7 @@ from roboirg.stats.intervals import wilson_interval
 
 
 @pytest.fixture(scope="module")
-def frame_of_two_policies(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+def frame_of_two_policies(tmp_path_factory):
     """Two policies and tasks, three episodes with two seeds in three settings."""
     folder = tmp_path_factory.mktemp("run")
     plan = make_plan(
@@ -94,7 +94,7 @@ def test_a_rate_pooled_over_settings_counts_all_of_their_rows_in_any_order(
 
 
 @pytest.fixture
-def frame_of_two_forms(frame_of_two_policies) -> pd.DataFrame:
+def frame_of_two_forms(frame_of_two_policies):
     """All implicit instructions are won, all resolved ones lost; 12 trials of a group in each."""
     resolved = frame_of_two_policies.assign(
         form="resolved", outcome="failure", instruction_options="resolved"

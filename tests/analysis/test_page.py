@@ -7,12 +7,10 @@ import itertools
 import os
 import re
 import threading
-from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from time import monotonic
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +19,6 @@ from page_text import PLAN, broken, played, store, words
 
 from roboirg.analysis.page.page_server import run_server
 from roboirg.analysis.page.report import write_report
-from roboirg.analysis.results.sources import Source
 from roboirg.records.episode_log import EpisodeLog, log_path
 from roboirg.records.record import Record
 from roboirg.runs.play.video_writer import VideoWriter
@@ -52,14 +49,14 @@ def records_of_page() -> tuple[Record, ...]:
 
 
 @pytest.fixture(scope="module")
-def run_with_a_film(tmp_path_factory: pytest.TempPathFactory) -> Source:
+def run_with_a_film(tmp_path_factory):
     """A run with records and one real film: 100 steps, every 8th of them, and the end."""
     folder = tmp_path_factory.mktemp("run")
     film = VideoWriter(folder / FILM)
     film.caption = "Do it."
     world = SimpleNamespace(picture=lambda _camera: np.full((256, 256, 3), 99, np.uint8))
     for step in range(0, 101, 8):
-        film.add_frame(world, is_demonstration=step < 20)  # type: ignore[arg-type]
+        film.add_frame(world, is_demonstration=step < 20)
     assert film.finish()
     with EpisodeLog(log_path(folder, records_of_page()[0].slug)) as log:
         os.write(log.descriptor, LOG)
@@ -67,22 +64,22 @@ def run_with_a_film(tmp_path_factory: pytest.TempPathFactory) -> Source:
 
 
 @pytest.fixture(scope="module")
-def page_file(run_with_a_film: Source) -> Path:
+def page_file(run_with_a_film):
     return write_report(run_with_a_film)
 
 
 @pytest.fixture
-def page(open_page: Any, page_file: Path) -> Iterator[Any]:
+def page(open_page, page_file):
     with open_page(page_file.as_uri()) as page:
         yield page
 
 
-def count_shown(page: Any) -> int:
+def count_shown(page):
     """Return how many episodes the page says that it lists, as in "1,203 of 5,000"."""
     return int(page.locator("#shown").inner_text().split(" of ")[0].replace(",", ""))
 
 
-def count_of_records(**fields: object) -> int:
+def count_of_records(**fields):
     """Return how many records have all these values, as in ``policy="forgetful"``."""
     found = list(records_of_page())
     for name, value in fields.items():
@@ -90,7 +87,7 @@ def count_of_records(**fields: object) -> int:
     return len(found)
 
 
-def opened_first_row(page: Any, **filters: str) -> Any:
+def opened_first_row(page, **filters):
     """Set filters, as with ``task="PickXtimes"``, open the first episode left, and return it."""
     for name, value in filters.items():
         page.select_option(f"#filters [name={name}]", value)
@@ -99,12 +96,12 @@ def opened_first_row(page: Any, **filters: str) -> Any:
     return row
 
 
-def open_breakdowns(page: Any) -> None:
+def open_breakdowns(page):
     for summary in page.locator("#kinds summary").all():
         summary.press("Enter")
 
 
-def focused_element(page: Any, what: str = "innerText") -> str:
+def focused_element(page, what="innerText"):
     """Return something of the element that has the keyboard's focus, by default its text."""
     return str(page.evaluate(f"document.activeElement.{what}"))
 
@@ -191,7 +188,7 @@ def test_arrow_keys_move_between_cells_of_the_table_and_enter_lists_a_cells_epis
     assert focused_element(page, "id") == "episodes"
 
 
-def cell_of_the_forgetful_policy(page: Any) -> Any:
+def cell_of_the_forgetful_policy(page):
     """Return the second policy's cell of all tasks in the setting direct."""
     return page.locator(".map").nth(1).locator("tr.all .cell").nth(1)
 
@@ -320,7 +317,7 @@ def test_enter_opens_and_closes_an_episode_and_an_arrow_key_moves_to_the_next(pa
     assert focused_element(page, "closest('li').id") == second.get_attribute("id")
 
 
-def wait_until(element: Any, predicate: str) -> None:
+def wait_until(element, predicate):
     # Playwright's own wait evaluates text in the page, which the page's security policy forbids.
     give_up = monotonic() + WAIT_S
     while not element.evaluate(predicate):

@@ -10,8 +10,6 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from made_records import make_record
@@ -30,7 +28,7 @@ PLAN = make_plan(("listener",), tasks="PickXtimes", settings="explicit", episode
 
 
 @pytest.fixture
-def run_with_a_film_and_a_link(tmp_path: Path) -> Path:
+def run_with_a_film_and_a_link(tmp_path):
     """The folder of a run. A link in it leads to the file `secret` next to the folder."""
     folder = tmp_path / "run"
     (folder / "videos").mkdir(parents=True)
@@ -42,7 +40,7 @@ def run_with_a_film_and_a_link(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def server(run_with_a_film_and_a_link: Path) -> Iterator[AppServer]:
+def server(run_with_a_film_and_a_link):
     with run_server(run_with_a_film_and_a_link) as serving:
         thread = threading.Thread(target=serving.serve_forever)
         thread.start()

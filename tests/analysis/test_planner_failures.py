@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from roboirg.analysis.measures.planner_failures import IDLE_STEPS, planner_failure
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.subgoal_text import UNKNOWN_WORDS
-from roboirg.records.record import Attribution, Job, Record, SubgoalRecord
+from roboirg.records.record import Attribution, Job, SubgoalRecord
 
 TOOK_THE_WRONG_THING = Attribution(
     kind="grounding", failure="wrong_object", sentence="It took another one."
@@ -21,7 +21,7 @@ MEANING_OF_THE_ACT_IS_UNCLEAR = Attribution(
 
 
 @pytest.fixture(scope="module")
-def failed_record_of_a_planner() -> Record:
+def failed_record_of_a_planner():
     """A record that still lacks subgoals and the cause of the failure."""
     options = InstructionOptions("explicit")
     job = Job(policy="random", task="PickXtimes", split="test", episode=0, options=options)

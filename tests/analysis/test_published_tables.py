@@ -46,7 +46,7 @@ def place(line: dict[str, str]) -> tuple[str, str]:
 
 
 @pytest.fixture(scope="module", params=RATE_TABLES)
-def table_of_results_like_the_papers(request) -> Table:
+def table_of_results_like_the_papers(request):
     results = like_published(request.param)
     return make_table(request.param, RunData(frame_of(results)), published=True)
 

@@ -46,7 +46,7 @@ class Page:
         notes: the warnings at the top.
     """
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text):
         scripts = re.findall(r'<script type="[^"]*" id="([^"]*)">(.*?)</script>', text, re.DOTALL)
         self.scripts = dict(scripts)
         self.data: dict[str, Any] = json.loads(self.scripts["data"])
@@ -54,7 +54,7 @@ class Page:
         self.text = unescape(re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL))
         self.notes = " ".join(re.findall(r'<li class="\w+"><b>\w+:</b> .*</li>', self.text))
 
-    def string(self, place: int) -> str:
+    def string(self, place):
         """Return the text for which a number stands."""
         return str(self.data["strings"][place])
 
@@ -68,7 +68,7 @@ def records_with_an_error_last() -> list[Record]:
     return [*found, broken(last)]
 
 
-def written_film(folder: Path, name: str = "x") -> str:
+def written_film(folder, name="x"):
     """Write a video into a run, and return its path there."""
     (folder / "videos").mkdir(parents=True, exist_ok=True)
     for suffix in ("mp4", "jpg"):
@@ -343,7 +343,7 @@ def test_two_policies_are_paired_on_a_scene_only_with_equal_words_seed_and_split
 
 
 @pytest.fixture
-def filmed_run(tmp_path: Path) -> Source:
+def filmed_run(tmp_path):
     """A run of two records. The film of one has 4 bytes, its picture 4; that of the other is lost.
 
     The title picture of a video is shown before it plays.

@@ -28,12 +28,12 @@ def write_run(folder: Path, policies: tuple[str, ...], device: str | None = None
 
 
 @pytest.fixture(scope="module")
-def run_of_two_policies(tmp_path_factory) -> Path:
+def run_of_two_policies(tmp_path_factory):
     return write_run(tmp_path_factory.mktemp("runs") / "folder-run", ("listener", "forgetful"))
 
 
 @pytest.fixture(scope="module")
-def pack_of_the_run(run_of_two_policies: Path) -> Path:
+def pack_of_the_run(run_of_two_policies):
     pack_run(run_of_two_policies, path := run_of_two_policies.parent / "shipped.roboirg.zip")
     return path
 

@@ -33,7 +33,7 @@ def printed(frame: Frame, width: int = 100) -> str:
     console = Console(file=io.StringIO(), width=width)
     print_tables(make_run_tables(frame), console)
     print_failures(frame, console)
-    return console.file.getvalue()  # type: ignore[attr-defined,no-any-return]
+    return console.file.getvalue()
 
 
 STORED_OUTPUT = """\

@@ -12,7 +12,6 @@ import roboirg
 from roboirg.analysis.run_results import Results
 from roboirg.api import python_run
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
-from roboirg.records.record import Job, Record
 from roboirg.records.store import RECORDS_FILE, read_records
 from roboirg.runs.plan.stored_plans import read_plan
 
@@ -23,11 +22,11 @@ class Still:
     cameras = ()
     version = "1"
 
-    def __init__(self, reach: float = 1.0) -> None:
+    def __init__(self, reach=1.0):
         self.reach = reach
         self.instructions: list[str] = []
 
-    def reset(self, instruction, demonstration) -> None:
+    def reset(self, instruction, demonstration):
         self.instructions.append(instruction)
 
     def act(self, observation):
@@ -35,10 +34,10 @@ class Still:
 
 
 @pytest.fixture
-def episodes_decided_by_setting(monkeypatch: pytest.MonkeyPatch) -> None:
+def episodes_decided_by_setting(monkeypatch):
     """Episodes are decided by their setting."""
 
-    def play(job: Job) -> Record:
+    def play(job):
         if job.policy != "forgetful" or job.setting == "explicit":
             return make_record(job, "success")
         return make_record(job, "failure", "wrong")
@@ -139,7 +138,7 @@ def test_a_policy_given_as_class_or_object_plays_in_this_process_with_a_warning(
 
 
 class StillWithAttach(Still):
-    def attach(self, env) -> None:
+    def attach(self, env):
         pass
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import msgspec
 import pytest
 from msgspec.structs import replace
@@ -22,7 +20,7 @@ from roboirg.records.store import (
 )
 
 
-def folder_with_lines(folder: Path, *lines: bytes) -> Path:
+def folder_with_lines(folder, *lines):
     (folder / RECORDS_FILE).write_bytes(b"".join(lines))
     return folder
 

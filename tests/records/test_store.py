@@ -40,7 +40,7 @@ from roboirg.util.atomic_write import locked, write_atomically
 
 
 @pytest.mark.parametrize("field", Versions._fields[1:])
-def test_a_run_is_refused_if_any_of_its_versions_differs_unless_it_is_unknown(field: str) -> None:
+def test_a_run_is_refused_if_any_of_its_versions_differs_unless_it_is_unknown(field):
     """As those of the language, the environment and the server."""
     first = Versions(**{field: "a"})
     words = f"^x whose {field.replace('_', ' ')} is a, but now it is b; choose another --out.$"

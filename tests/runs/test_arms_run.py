@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 from page_text import call
@@ -12,7 +11,6 @@ from run_fakes import fake_run
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.records.record_codec import identity_key
 from roboirg.records.store import RECORDS_FILE, read_records
-from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_file import read_plan_file
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.plan.stored_plans import write_plan
@@ -22,12 +20,12 @@ from roboirg.runs.run.runner import run_plan
 ALL_ARMS = "told,other-goal,silent,silent-empty,scrambled,paraphrase:3,again"
 
 
-def plan_with_arms(arms: str = ALL_ARMS, **changes: object) -> Plan:
+def plan_with_arms(arms=ALL_ARMS, **changes):
     fields = {"tasks": "PickXtimes,VideoRepick", "settings": "direct", "episodes": "3", **changes}
     return make_plan(["oracle"], arms=arms, **fields)  # type: ignore[arg-type]
 
 
-def folder_of_fake_run(plan: Plan, folder: Path) -> Path:
+def folder_of_fake_run(plan, folder):
     folder.mkdir(exist_ok=True)
     write_plan(plan, folder)
     fake_run(folder, plan)

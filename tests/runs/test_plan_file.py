@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -22,7 +21,7 @@ NAMED_PLANS_TESTED_ELSEWHERE = ("challenge", "paper", "paper-context", "paper-sm
 """Named plans with a test of their own, or of the package that brings them."""
 
 
-def path_of_plan_file(folder: Path, text: str) -> str:
+def path_of_plan_file(folder, text):
     path = folder / "plan.yaml"
     path.write_text(text)
     return str(path)

@@ -38,7 +38,7 @@ OTHER = "another salt that nobody guesses"
 
 
 @pytest.fixture(autouse=True)
-def _no_salt(monkeypatch: pytest.MonkeyPatch) -> None:
+def _no_salt(monkeypatch):
     monkeypatch.setenv(SALT_VARIABLE, "")  # so that what a test sets is undone
 
 
@@ -127,7 +127,7 @@ def test_a_private_split_is_not_played_by_policies_that_share_the_worlds_process
         make_plan(["oracle"], split=split, episodes="1", policy_process="shared")
 
 
-def all_bytes_written_in(folder: Path) -> bytes:
+def all_bytes_written_in(folder):
     """Return all that is written below a folder, with what is packed in archives."""
     found = []
     for path in sorted(folder.rglob("*")):

@@ -17,7 +17,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.planners.systems import all_systems
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
-from roboirg.records.record import IDENTITY, Job
+from roboirg.records.record import IDENTITY
 from roboirg.records.record_codec import encode, read_record
 from roboirg.runs.job_instruction import PreparedJob, instruct_job
 from roboirg.runs.plan.plan_file import read_plan_file
@@ -38,7 +38,7 @@ LIMIT_OF_64_TOKENS = PromptLimit(64, 0, most_tokens, "some.model")
 LONG_INSTRUCTION = {"setting": "contextual", "distractors": 16}
 
 
-def job_with(**fields: object) -> Job:
+def job_with(**fields):
     usual = {"policy": "random", "task": "PickXtimes", "split": "test", "episode": 0}
     return job_of(**{**usual, "setting": "direct", **fields})
 

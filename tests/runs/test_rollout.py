@@ -51,7 +51,7 @@ class FakeWorld:
     episode = None
     session = SimpleNamespace(world=SimpleNamespace(facts=frozenset()))
 
-    def __init__(self, length: int = 5, status: str = "success", cause: str | None = None) -> None:
+    def __init__(self, length=5, status="success", cause=None):
         self.length = length
         self.status = status
         self.cause = cause
@@ -70,7 +70,7 @@ class FakeWorld:
         del every
         self.hook = hook
 
-    def picture(self, camera: str) -> np.ndarray:
+    def picture(self, camera):
         return np.full((256, 256, 3), 40 * self.steps + len(camera), np.uint8)
 
     def reset(self, seed: int | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -108,21 +108,21 @@ class FakeWorld:
     def end_state(self) -> tuple[np.ndarray, str]:
         return np.zeros(3), "paper"
 
-    def close(self) -> None:
+    def close(self):
         self.closed = True
 
 
 class FakePolicy:
     cameras = ()
 
-    def __init__(self, answer: Any = None) -> None:
+    def __init__(self, answer=None):
         self.answer = np.zeros((3, 8)) if answer is None else answer
         self.heard: list[Any] = []
 
-    def reset(self, instruction: str, demonstration: Any) -> None:
+    def reset(self, instruction, demonstration):
         self.heard += [instruction, len(demonstration["joint_positions"])]
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         del observation
         if isinstance(self.answer, BaseException):
             raise self.answer
@@ -130,12 +130,12 @@ class FakePolicy:
 
 
 class PolicyWithAttach(FakePolicy):
-    def attach(self, env: Any) -> None:
+    def attach(self, env):
         self.heard.append(type(env).__name__)
 
 
 @pytest.fixture
-def give_world_and_policy(monkeypatch: pytest.MonkeyPatch) -> SetUp:
+def give_world_and_policy(monkeypatch):
     """Return what sets the world and the policy of the next episode."""
 
     def give(world: FakeWorld, policy: Any) -> None:
@@ -146,7 +146,7 @@ def give_world_and_policy(monkeypatch: pytest.MonkeyPatch) -> SetUp:
 
 
 @pytest.fixture
-def record_of_episode(give_world_and_policy: SetUp) -> Stage:
+def record_of_episode(give_world_and_policy):
     def play(world: FakeWorld, policy: Any, job: Job = JOB) -> Record:
         give_world_and_policy(world, policy)
         return EpisodeRunner(Path()).play_once(job)[0]
@@ -319,10 +319,10 @@ def test_a_video_is_kept_of_all_episodes_or_of_failures_alone_as_asked(
 class FullDiskContainer:
     """A container that can be written to no longer, as on a full disk."""
 
-    def mux(self, packets: object) -> None:
+    def mux(self, packets):
         raise OSError(28, "No space left on device")
 
-    def close(self) -> None:
+    def close(self):
         raise OSError(28, "No space left on device")
 
 
@@ -446,7 +446,7 @@ class SpeakingWorld(FakeWorld):
 class NotesWhatItHears(FakePolicy):
     """Writes down what it hears; its metadata are what it has heard."""
 
-    def hear(self, text: str, step: int) -> None:
+    def hear(self, text, step):
         self.heard += [text, step]
 
     @property
@@ -487,7 +487,7 @@ def test_the_caption_of_a_video_grows_with_each_utterance(give_world_and_policy,
     captions: list[str] = []
 
     class Captions(VideoWriter):
-        def add_frame(self, source: Any, is_demonstration: bool = False) -> None:
+        def add_frame(self, source, is_demonstration=False):
             del source, is_demonstration
             captions.append(self.caption)
             assert self.longest_caption == world.instruction.text

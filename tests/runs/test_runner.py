@@ -33,7 +33,6 @@ from roboirg.core.errors import InvalidValueError, RenderDeviceError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.policies.by_name.finding import read_policy
-from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import StoreError
 from roboirg.records.run_files import earlier_plans
 from roboirg.records.store import (
@@ -72,7 +71,7 @@ def finish_run(folder: Path) -> RunSummary:
 
 
 @pytest.fixture(scope="module")
-def records_of_an_uninterrupted_run(tmp_path_factory: pytest.TempPathFactory) -> Comparable:
+def records_of_an_uninterrupted_run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("uninterrupted")
     fake_run(folder, small_plan(8))
     return all_comparable(folder)
@@ -253,7 +252,7 @@ def test_the_number_of_workers_chooses_the_executor(monkeypatch):
 def test_a_record_that_a_worker_of_another_version_made_is_not_stored(tmp_path, field, value, what):
     plan = small_plan(1).checked()
 
-    def elsewhere(job: Job) -> Record:
+    def elsewhere(job):
         return replace(FakePlay()(job), **{field: value})
 
     with pytest.raises(StoreError, match=f"whose {what} version is {value}, .* was not stored"):
@@ -290,7 +289,7 @@ def test_an_episode_that_lost_its_process_is_repeated_at_once_and_one_with_an_er
     """The first episode fails: it is played again as the second one (1), or as the last (-1)."""
     played: list[str] = []
 
-    def play(job: Job) -> Record:
+    def play(job):
         played.append(job.slug)
         record = FakePlay()(job)
         if len(played) > 1:

@@ -11,16 +11,14 @@ from wire_servers import ChallengeServer
 from roboirg.policies import make_policy
 from roboirg.policies.contract.policy_calls import server_version
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
-from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import StoreError
 from roboirg.records.store import read_records
-from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.run.executor import InProcess
 from roboirg.runs.run.runner import run_plan
 
 
-def plan_of_episodes(episodes: int, **options: object) -> Plan:
+def plan_of_episodes(episodes, **options):
     few = {"tasks": "PickXtimes", "settings": "explicit", "episodes": episodes}
     return make_plan("random", **few, **options)
 
@@ -28,10 +26,10 @@ def plan_of_episodes(episodes: int, **options: object) -> Plan:
 class PlaysWithServerVersions:
     """Plays jobs with a server that tells these versions, one for each episode."""
 
-    def __init__(self, *versions: str | None) -> None:
+    def __init__(self, *versions):
         self.versions = list(versions)
 
-    def __call__(self, job: Job) -> Record:
+    def __call__(self, job):
         version = self.versions.pop(0)
         if version == "refused":
             return make_record(job, cause="connection: refused", error="connection")
@@ -86,7 +84,7 @@ class PlannerWithVersion:
     version = "7"
     metadata = {"version": "7"}  # noqa: RUF012
 
-    def reset(self, instruction: str, demonstration: object) -> None:
+    def reset(self, instruction, demonstration):
         pass
 
 

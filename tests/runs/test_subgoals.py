@@ -97,7 +97,7 @@ class PointsTwice:
     cameras = ("front",)
     point = (0, 0)
 
-    def reset(self, instruction: str, demonstration: object) -> None:
+    def reset(self, instruction, demonstration):
         self.calls = 0
         self.subgoal = None
 
