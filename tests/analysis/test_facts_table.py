@@ -170,13 +170,13 @@ def test_the_facts_of_a_policy_are_what_it_declares_and_what_its_process_reports
 class Network:
     """A network with parameters of some (dtype, device, number of values) each."""
 
-    def __init__(self, *parameters: tuple[str, str, int]) -> None:
+    def __init__(self, *parameters):
         self._parameters = [
             SimpleNamespace(dtype=f"torch.{dtype}", device=device, numel=lambda size=size: size)
             for dtype, device, size in parameters
         ]
 
-    def parameters(self) -> list[SimpleNamespace]:
+    def parameters(self):
         return self._parameters
 
 

@@ -63,17 +63,17 @@ class FakeWorld:
         self.trouble: Exception | None = None
 
     @property
-    def unwrapped(self) -> FakeWorld:
+    def unwrapped(self):
         return self
 
-    def set_frame_hook(self, hook: Callable[[Any, bool], None], every: int = 1) -> None:
+    def set_frame_hook(self, hook, every=1):
         del every
         self.hook = hook
 
     def picture(self, camera):
         return np.full((256, 256, 3), 40 * self.steps + len(camera), np.uint8)
 
-    def reset(self, seed: int | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
+    def reset(self, seed=None):
         del seed
         if self.hook:
             self.hook(self, True)
@@ -83,7 +83,7 @@ class FakeWorld:
         now = {"status": "ongoing", "heard": []}
         return {}, {**info, **now, "demonstration_source": "planned"}
 
-    def step_chunk(self, actions: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+    def step_chunk(self, actions):
         assert actions.shape[1:] == (8,)
         if self.trouble:
             raise self.trouble
@@ -105,7 +105,7 @@ class FakeWorld:
 
     attempts = ()
 
-    def end_state(self) -> tuple[np.ndarray, str]:
+    def end_state(self):
         return np.zeros(3), "paper"
 
     def close(self):
@@ -399,7 +399,7 @@ class RepeatsItsSubgoal(FakePolicy):
     turns = itertools.count()
 
     @property
-    def endings(self) -> list[SubgoalEnd]:
+    def endings(self):
         failed = (SubgoalEnd("go", how, f"{how}!") for how in ("time-out", "missed", "blocked"))
         ends = [*failed, SubgoalEnd("go", "done"), SubgoalEnd("sing", "refused", "no", "cube")]
         return ends[: next(self.turns)]
@@ -423,21 +423,21 @@ def test_a_repeated_subgoal_is_noted_again_only_if_its_last_try_had_ended(record
 class SpeakingWorld(FakeWorld):
     """Tells its utterances at given steps; what comes after the last step is never told."""
 
-    def __init__(self, steps: tuple[int, ...], length: int) -> None:
+    def __init__(self, steps, length):
         super().__init__(length)
         job = JOB.with_options(setting="contextual")
         self.instruction = instruct_job(job)
         self.told = list(zip(self.instruction.turns, steps, strict=False))
 
-    def reset(self, seed: int | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
+    def reset(self, seed=None):
         observation, info = super().reset(seed)
         return observation, {**info, "heard": self._fresh(0)}
 
-    def step_chunk(self, actions: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+    def step_chunk(self, actions):
         *others, info = super().step_chunk(actions)
         return *others, {**info, "heard": self._fresh(self.steps)}  # type: ignore[return-value]
 
-    def _fresh(self, step: int) -> list[dict[str, Any]]:
+    def _fresh(self, step):
         fresh = [{"text": text, "step": at} for text, at in self.told if at <= step]
         del self.told[: len(fresh)]
         return fresh
@@ -450,7 +450,7 @@ class NotesWhatItHears(FakePolicy):
         self.heard += [text, step]
 
     @property
-    def metadata(self) -> dict[str, Any]:
+    def metadata(self):
         return {"heard": len(self.heard)}
 
 

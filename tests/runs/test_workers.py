@@ -102,7 +102,7 @@ class CannotBeUnpickled:
     def __call__(self, job):
         raise AssertionError(job)
 
-    def __reduce__(self) -> tuple[object, ...]:
+    def __reduce__(self):
         return os._exit, (3,)
 
 
