@@ -5,20 +5,20 @@ from __future__ import annotations
 import pytest
 from flat_jobs import frame_of, make_result
 
-from roboirg.analysis.measures.arm_figures import ArmFigure, arm_figures
+from roboirg.analysis.measures.arm_figures import arm_figures
 from roboirg.analysis.measures.chance import silent_chance
 from roboirg.analysis.measures.measure import mean_rate
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.tables.arm_table import language_use_sentences, make_arm_table
 from roboirg.analysis.tables.rendering import get_format
 from roboirg.core.errors import InvalidValueError
-from roboirg.records.record import GoalOutcomes, Summary
+from roboirg.records.record import GoalOutcomes
 
 TASKS = ("PickXtimes", "VideoUnmask")
 SCENES = range(12)
 
 
-def goals(arm: str, done: str) -> tuple[str, GoalOutcomes]:
+def goals(arm, done):
     """Return the verdict of an episode, and which goals were reached in it.
 
     In the arm `other-goal` the instruction states the `other` goal of the scene, elsewhere its
@@ -39,9 +39,7 @@ def goals(arm: str, done: str) -> tuple[str, GoalOutcomes]:
     )
 
 
-def results_of_policy(
-    policy: str, acts: dict[str, str], scenes: range = SCENES, **fields: object
-) -> list[Summary]:
+def results_of_policy(policy, acts, scenes=SCENES, **fields):
     """Return results of a policy in some scenes of both tasks.
 
     Args:
@@ -71,15 +69,15 @@ ALWAYS_THE_OTHER_GOAL = {
 }
 
 
-def run_data_of(*results: list[Summary]) -> RunData:
+def run_data_of(*results):
     return RunData(frame_of(*results))
 
 
-def both_rates(arm_figure: ArmFigure) -> tuple[float, float]:
+def both_rates(arm_figure):
     return float(arm_figure.rate), float(mean_rate(arm_figure.others))
 
 
-def figure_named(data: RunData, name: str) -> ArmFigure:
+def figure_named(data, name):
     return next(drawn for drawn in arm_figures(data.frame) if drawn.key.contrast.name == name)
 
 
@@ -155,7 +153,7 @@ def test_an_episode_that_lacks_a_verdict_in_some_arm_is_left_out():
     assert found.gap.episodes == 6
 
 
-def results_of_a_policy_that_mostly_listens() -> list[Summary]:
+def results_of_a_policy_that_mostly_listens():
     """Return results with another rate in each arm, and of two policy seeds."""
     reads_order_not = DOES_WHAT_IT_HEARS | {"scrambled": "own"}
     needs_order = SAME_GOAL_IN_EVERY_ARM | {"scrambled": "none"}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -14,7 +13,6 @@ from page_text import call, store
 
 from roboirg.analysis.tables.facts_table import NO_NETWORK, NOT_REPORTED, RUN
 from roboirg.core.inference_facts import InferenceFacts, inference_facts
-from roboirg.records.record import Record
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.plan.stored_plans import write_plan
 
@@ -29,7 +27,7 @@ def record_of(episode, outcome="success", *, setting="explicit", **fields):
     return make_record(job, outcome, cause, started_at=start, **fields)
 
 
-def facts_of_run(folder: Path, *records: Record) -> Facts:
+def facts_of_run(folder, *records):
     """Return the table of facts as ``{"the run": {"tasks": "PickXtimes"}, "mine": {…}}``."""
     store(folder, records)
     rows = json.loads(call("tables", folder, "--which", "facts", "--format", "json"))

@@ -14,12 +14,12 @@ from roboirg.analysis.tables.diagnostic_tables import make_heard_table
 from roboirg.analysis.tables.run_tables import make_run_tables
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
-from roboirg.records.record import Job, Summary
+from roboirg.records.record import Job
 from roboirg.runs.job_instruction import PreparedJob
 from roboirg.runs.play.episode_record import audit_record
 
 
-def results_of_rows(*rows: tuple[str, str], **fields: object) -> list[Summary]:
+def results_of_rows(*rows, **fields):
     """Return a result for each row of an outcome and of how much of the prompt was read.
 
     Episodes are numbered from 0; ``("failure", "cut")`` is a failure whose prompt was cut.
@@ -30,7 +30,7 @@ def results_of_rows(*rows: tuple[str, str], **fields: object) -> list[Summary]:
     ]
 
 
-def results_with_cut_and_unknown_prompts() -> list[Summary]:
+def results_with_cut_and_unknown_prompts():
     """Return results of the listener in two settings, and one of another policy."""
     explicit = results_of_rows(("success", "heard"), ("failure", "heard"))
     contextual = results_of_rows(

@@ -79,7 +79,7 @@ class Leaker(Hostile):
     """Leaves a thread that spoils what comes after it."""
 
     def act(self, observation):
-        def spoil() -> None:
+        def spoil():
             while True:
                 time.sleep(0.001)
                 np.random.seed(0)  # noqa: NPY002
@@ -172,7 +172,7 @@ class Forger(Hostile):
         time.sleep(3600)
 
 
-def host_of(frame: Any) -> Any:
+def host_of(frame):
     """Return the object that carries out the calls of this process."""
     while not hasattr(frame.f_locals.get("self"), "_under_way"):
         frame = frame.f_back
@@ -331,7 +331,7 @@ class Turncoat(Hostile):
 
     if any("host_process" in word for word in sys.orig_argv):
 
-        def attach(self, env: Any) -> None:
+        def attach(self, env):
             env.total = 1e9
 
 

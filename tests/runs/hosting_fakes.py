@@ -188,7 +188,7 @@ class Picky(BatchedDice):
         return [rng.standard_normal((4, 8)) for rng, _ in states]
 
 
-def fake_world_plan(policy: str, episodes: int = 8, seeds: int = 1, **options: Any) -> Plan:
+def fake_world_plan(policy, episodes=8, seeds=1, **options):
     return Plan(
         policies=(f"{Path(__file__).stem}:{policy}" if policy.isidentifier() else policy,),
         tasks=("PickXtimes",),

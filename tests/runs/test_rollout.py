@@ -175,14 +175,20 @@ def test_an_episode_ends_within_a_chunk_of_actions_and_its_record_counts_what_wa
     assert world.closed
 
 
-def test_a_plan_may_prescribe_the_frames_of_the_video_but_not_other_actions(record_of_episode):
-    """A policy that wants other actions than the plan prescribes is an error."""
+def test_a_plan_may_prescribe_the_frames_of_the_video(record_of_episode):
     job = replace(JOB, environment=EnvironmentOptions(demonstration_frames=4))
+
     needs = record_of_episode(FakeWorld(), FakePolicy(), job).needs
+
     assert (needs["demonstration_frames"], needs["cameras"]) == (4, [])
 
+
+def test_a_policy_that_wants_other_actions_than_the_plan_prescribes_is_an_error(record_of_episode):
     job = replace(JOB, environment=EnvironmentOptions(actions="ee_pose"))
-    assert record_of_episode(FakeWorld(), FakePolicy(), job).cause == (
+
+    record = record_of_episode(FakeWorld(), FakePolicy(), job)
+
+    assert record.cause == (
         "policy: the policy's action space is 'joint_angle', but the plan requires 'ee_pose'."
     )
 
@@ -246,25 +252,39 @@ def test_a_policy_that_raises_or_answers_nonsense_ends_its_episode_as_an_error_n
         (np.eye(2), [[1.0, 0.0], [0.0, 1.0]]),
         ((np.bool_(True), {Path("x"): None}), [True, {"x": None}]),
         (np.zeros((9, 9)), "array of shape (9, 9), float64"),
+    ],
+    ids=str,
+)
+def test_metadata_of_a_policy_are_stored_as_json(record_of_episode, value, stored):
+    """Large arrays by their shape alone."""
+    policy = FakePolicy()
+    policy.metadata = {"deep": {"value": value}}
+
+    record = record_of_episode(FakeWorld(), policy)
+
+    assert record.policy_metadata == {"deep": {"value": stored}}
+    assert read_record(encode(record), Path(), 1) == record
+
+
+@pytest.mark.parametrize(
+    ("value", "sentence"),
+    [
         (np.float32("nan"), "'deep.value' is nan; it must be a text, a finite number"),
         ({"more": [0, b"x"]}, "'deep.value.more[1]' is b'x'; it must be"),
         ({(1, 2): 3}, "'deep.value' is (1, 2); it must be"),
     ],
     ids=str,
 )
-def test_metadata_of_a_policy_are_stored_as_json_or_refused_by_the_name_of_their_key(
-    record_of_episode, value, stored
+def test_metadata_that_json_cannot_hold_are_an_error_that_names_their_key(
+    record_of_episode, value, sentence
 ):
     policy = FakePolicy()
-    policy.metadata = {"deep": {"value": value}}  # type: ignore[attr-defined]
+    policy.metadata = {"deep": {"value": value}}
 
     record = record_of_episode(FakeWorld(), policy)
 
-    if record.outcome == "success":
-        assert record.policy_metadata == {"deep": {"value": stored}}
-        assert read_record(encode(record), Path(), 1) == record
-    else:
-        assert str(record.cause).startswith(f"policy: the policy's metadata: {stored}")
+    assert record.outcome == "error"
+    assert record.cause.startswith(f"policy: the policy's metadata: {sentence}")
 
 
 @pytest.mark.parametrize(
@@ -294,10 +314,8 @@ def test_missing_graphics_or_packages_stop_the_run_instead_of_one_episode(record
 
 
 def test_ctrl_c_in_a_policy_stops_the_run_and_is_no_error_of_the_episode(record_of_episode):
-    policy = FakePolicy()
-    policy.act = lambda _observation: (_ for _ in ()).throw(KeyboardInterrupt)  # type: ignore[method-assign]
     with pytest.raises(KeyboardInterrupt):
-        record_of_episode(FakeWorld(), policy)
+        record_of_episode(FakeWorld(), FakePolicy(KeyboardInterrupt()))
 
 
 @pytest.mark.parametrize(
@@ -350,16 +368,21 @@ def test_a_full_disk_costs_the_video_but_not_the_verdict(
     assert {path.suffix for path in tmp_path.rglob("*") if path.is_file()} == {".npz"}
 
 
-def test_a_record_has_the_pattern_of_its_words_and_whether_its_policy_is_privileged():
-    """The oracle knows the goal from the simulator's state: privileged. The random one does not."""
-    job = replace(JOB.with_options(setting="reasoning"), policy="oracle", ref=read_policy("oracle"))
-    record = make_record(job, "success")
+def test_a_record_has_the_pattern_of_its_words():
+    """A reasoning instruction follows one of several patterns, with values drawn for it."""
+    record = make_record(JOB.with_options(setting="reasoning"), "success")
 
     assert record.metadata["pattern"]
     assert record.metadata["draws"]
-    assert record.privileged
-    assert not make_record(JOB).privileged
     assert read_record(encode(record), Path(), 1) == record
+
+
+@pytest.mark.parametrize(("policy", "privileged"), [("oracle", True), ("random", False)])
+def test_a_record_says_whether_its_policy_knows_the_simulators_state(policy, privileged):
+    """The oracle knows the goal from it."""
+    record = make_record(replace(JOB, policy=policy, ref=read_policy(policy)), "success")
+
+    assert record.privileged == privileged
 
 
 @pytest.mark.parametrize(
@@ -461,25 +484,39 @@ JOB_IN_TURNS = JOB.with_options(setting="contextual", delivery="turns")
 def test_a_record_has_the_step_at_which_each_utterance_was_heard(policy_class, record_of_episode):
     """Four of five utterances come at steps 0, 3, 6 and 6; the fifth never (None).
 
-    A policy without hear() gets the first alone, in reset(), and the record is the same.
+    Whether the policy has a method hear() or not.
     """
     world = SpeakingWorld((0, 3, 6, 6), length=10)
-    policy = policy_class()
+
+    record = record_of_episode(world, policy_class(), JOB_IN_TURNS)
+
+    assert record.outcome == "success"
+    assert [turn.text for turn in record.instruction] == list(world.instruction.turns)
+    assert [turn.step for turn in record.instruction] == [0, 3, 6, 6, None]
+    assert read_record(encode(record), Path(), 1) == record
+
+
+def test_a_policy_hears_the_first_utterance_in_its_reset_and_the_others_with_their_steps(
+    record_of_episode,
+):
+    """The reset also has the video, of 3 steps. Each later utterance is noted as text and step."""
+    world = SpeakingWorld((0, 3, 6, 6), length=10)
+    policy = NotesWhatItHears()
 
     record = record_of_episode(world, policy, JOB_IN_TURNS)
 
-    assert record.outcome == "success"
     turns = world.instruction.turns
-    steps = [turn.step for turn in record.instruction]
-    assert [turn.text for turn in record.instruction] == list(turns)
-    assert steps == [0, 3, 6, 6, None]
-    if policy_class is NotesWhatItHears:
-        assert policy.heard == [turns[0], 3, turns[1], 3, turns[2], 6, turns[3], 6]
-        assert record.policy_metadata == {"heard": 8}
-    else:
-        assert policy.heard == [turns[0], 3]
-        assert record.policy_metadata == {}
-    assert read_record(encode(record), Path(), 1) == record
+    assert policy.heard == [turns[0], 3, turns[1], 3, turns[2], 6, turns[3], 6]
+    assert record.policy_metadata == {"heard": 8}
+
+
+def test_a_policy_without_a_method_hear_gets_the_first_utterance_alone(record_of_episode):
+    world = SpeakingWorld((0, 3, 6, 6), length=10)
+    policy = FakePolicy()
+
+    record_of_episode(world, policy, JOB_IN_TURNS)
+
+    assert policy.heard == [world.instruction.turns[0], 3]
 
 
 def test_the_caption_of_a_video_grows_with_each_utterance(give_world_and_policy, tmp_path):
