@@ -160,9 +160,9 @@ def test_singular_words_leave_the_goals_of_one_and_plural_words_the_others(speak
     """*Once for that take*, or *for each take*."""
     words = Meaning({}, agrees={"repeats": speaks_of_one})
 
-    left = meaning.command_goals(words, EPISODE)
+    left = meaning.command_goals(words, THREE_CUBES)
 
-    expected = [goal for goal in goals_of(EPISODE) if (goal["repeats"] == 1) == speaks_of_one]
+    expected = [goal for goal in goals_of(THREE_CUBES) if (goal["repeats"] == 1) == speaks_of_one]
     assert list(left) == expected
 
 

@@ -45,13 +45,16 @@ from roboirg.util.atomic_write import locked, write_atomically
 
 
 @pytest.mark.parametrize("field", Versions._fields[1:])
-def test_a_run_is_refused_if_any_of_its_versions_differs_unless_it_is_unknown(field: str) -> None:
+def test_a_run_is_refused_if_any_of_its_versions_differs_unless_it_is_unknown(field):
     """As those of the language, the environment and the server."""
     first = Versions(**{field: "a"})
-    words = f"^x whose {field.replace('_', ' ')} is a, but now it is b; choose another --out.$"
-    with pytest.raises(StoreError, match=words):
-        check_same("x", first.differences(Versions(**{field: "b"})))
-    assert not first.differences(Versions())
+    other = Versions(**{field: "b"})
+    unknown = Versions()
+
+    sentence = f"^x whose {field.replace('_', ' ')} is a, but now it is b; choose another --out.$"
+    with pytest.raises(StoreError, match=sentence):
+        check_same("x", first.differences(other))
+    assert not first.differences(unknown)
 
 
 @functools.cache
@@ -145,18 +148,20 @@ def test_a_file_system_without_locks_is_reported_with_the_advice_to_use_a_local_
 
 
 def test_records_of_a_newer_format_are_refused_and_stay_as_they_are(tmp_path):
-    whole = (fill(tmp_path, *eight_records()) / RECORDS_FILE).read_bytes()
-    newer = whole.replace(b'"schema_version":1', b'"schema_version":7', 1)
-    (tmp_path / RECORDS_FILE).write_bytes(newer)
-    with pytest.raises(StoreError, match=r"line 1 has schema version 7, .* reads only version 1;"):
-        RecordStore(tmp_path)
-    assert (tmp_path / RECORDS_FILE).read_bytes() == newer
+    """And the lock of the folder is given back, so that a second attempt says the same."""
+    path = fill(tmp_path, *eight_records()) / RECORDS_FILE
+    newer = path.read_bytes().replace(b'"schema_version":1', b'"schema_version":7', 1)
+    path.write_bytes(newer)
 
-    (tmp_path / RECORDS_FILE).write_bytes(whole)
-    RecordStore(tmp_path).close()  # the lock was given back
-    assert (tmp_path / RECORDS_FILE).read_bytes() == whole
+    for _ in range(2):
+        with pytest.raises(
+            StoreError, match=r"line 1 has schema version 7, .* reads only version 1;"
+        ):
+            RecordStore(tmp_path)
+    assert path.read_bytes() == newer
 
 
+@pytest.mark.parametrize("read", [read_records, read_results, read_index])
 @pytest.mark.parametrize(
     ("line", "sentence"),
     [
@@ -164,11 +169,11 @@ def test_records_of_a_newer_format_are_refused_and_stay_as_they_are(tmp_path):
         (b"[]", "line 1 has schema version None"),
     ],
 )
-def test_a_line_that_is_no_record_is_reported_with_its_number(tmp_path, line, sentence):
+def test_a_line_that_is_no_record_is_reported_with_its_number(tmp_path, read, line, sentence):
     (tmp_path / RECORDS_FILE).write_bytes(line + b"\n")
-    for read in (read_records, read_results, read_index):
-        with pytest.raises(StoreError, match=sentence):
-            read(tmp_path)
+
+    with pytest.raises(StoreError, match=sentence):
+        read(tmp_path)
 
 
 @pytest.mark.parametrize(

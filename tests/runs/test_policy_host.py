@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
@@ -64,16 +64,16 @@ THREE_POLICIES = tuple(f"hosting_fakes:{name}" for name in ("Dice", "BatchedDice
 
 
 @pytest.fixture
-def host_pool_of_test() -> Iterator[HostPool]:
+def host_pool_of_test():
     with HostPool(HostSettings()) as opened:
         yield opened
 
 
 @pytest.fixture
-def write_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
+def write_policy(tmp_path, monkeypatch):
     """Return what writes a module of a name with a class ``It``, and returns its spec."""
 
-    def write(name: str, text: str) -> str:
+    def write(name, text):
         (tmp_path / f"{name}.py").write_text(
             "import os, pathlib, sys, time\nimport hostile_policies\nimport numpy as np\n" + text
         )
@@ -84,7 +84,7 @@ def write_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
 
 
 @pytest.fixture
-def begun_policy(host_pool_of_test: HostPool, write_policy: Write) -> Host:
+def begun_policy(host_pool_of_test, write_policy):
     """Return what writes a policy and begins an episode of it in a process of its own."""
     return lambda name, text: HostedPolicy(
         host_pool_of_test.connect(), read_policy(write_policy(name, text)), 0
@@ -206,7 +206,7 @@ class It:
     class Video(dict[str, Any]):
         drawn: list[str]
 
-        def __getitem__(self, field: str) -> Any:
+        def __getitem__(self, field):
             self.drawn.append(field)
             return super().__getitem__(field)
 
@@ -232,7 +232,7 @@ class It:
 
 
 @pytest.fixture(scope="module")
-def records_without_a_host(tmp_path_factory: pytest.TempPathFactory) -> dict[Job, dict[str, Any]]:
+def records_without_a_host(tmp_path_factory):
     """Records of worlds that share no host: the policies are in their process."""
     plan = changed(fake_world_plan("Dice", policy_process="shared"), policies=THREE_POLICIES)
     return records_by_job(plan, tmp_path_factory.mktemp("alone"), InProcess())
@@ -458,7 +458,7 @@ def test_a_policys_process_serves_others_after_a_world_died_or_was_interrupted(
     """Would find an interrupt that is forgotten, and a worker whose calls are not answered."""
 
     class Video(dict[str, Any]):
-        def __getitem__(self, field: str) -> Any:
+        def __getitem__(self, field):
             raise KeyboardInterrupt
 
     hosts = host_pool_of_test.connect()
@@ -556,7 +556,7 @@ class It(hostile_policies.Hostile):
     world = begun_policy("viewer", text)
 
     class Video(dict[str, Any]):
-        def __getitem__(self, field: str) -> Any:
+        def __getitem__(self, field):
             child_of(host_pool_of_test).check(10.0)  # of a world that waits
             return super().__getitem__(field)
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import socket
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import hosting_fakes
 import pytest
@@ -41,14 +39,14 @@ PLAN_OF_TWO_ARMS = small_plan(5).model_copy(update={"arms": ("told", "silent")})
 
 
 @pytest.fixture(scope="module")
-def records_of_one_process(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, object]]:
+def records_of_one_process(tmp_path_factory):
     folder = tmp_path_factory.mktemp("here")
     run_plan(PLAN_OF_TWO_ARMS, folder, FakePlayer(folder), InProcess())
     return all_comparable(folder)
 
 
 @pytest.fixture
-def cluster() -> Iterator[Any]:
+def cluster():
     from ray.cluster_utils import Cluster
 
     nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
@@ -65,7 +63,7 @@ def test_a_cluster_that_loses_a_machine_half_way_gives_the_same_records_as_one_p
     ray.init(address=cluster.address, log_to_driver=False)
     killed = threading.Event()
 
-    def kill() -> None:
+    def kill():
         # Until each of the three machines has one of the endless episodes in hand.
         while line_count(tmp_path) < 8 or len(players := worker_pids(tmp_path, "waiting")) < 3:
             time.sleep(0.05)
