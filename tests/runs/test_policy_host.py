@@ -253,7 +253,7 @@ def test_records_are_the_same_whatever_the_number_of_workers_or_the_size_of_batc
     assert {record["outcome"] for record in found.values()} == {"success", "failure", "error"}
     # What fails for one episode of a batch costs only that one.
     causes = {record["cause"] for record in found.values() if record["outcome"] == "error"}
-    assert causes == {"policy: ValueError: one of them is bad (hosting_fakes.py, line 188)"}
+    assert causes == {"policy: ValueError: one of them is bad (hosting_fakes.py, line 187)"}
 
     sizes = [int(line) for line in (tmp_path / "sizes").read_text().split()]
     assert sum(sizes) == 8 * hosting_fakes.LENGTH / 4

@@ -253,6 +253,23 @@ def test_a_policy_that_raises_or_answers_nonsense_ends_its_episode_as_an_error_n
         ((np.bool_(True), {Path("x"): None}), [True, {"x": None}]),
         (np.zeros((9, 9)), "array of shape (9, 9), float64"),
         (np.zeros((1000, 0)), "array of shape (1000, 0), float64"),
+    ],
+    ids=str,
+)
+def test_metadata_of_a_policy_are_stored_as_json(record_of_episode, value, stored):
+    """Large arrays by their shape alone."""
+    policy = FakePolicy()
+    policy.metadata = {"deep": {"value": value}}
+
+    record = record_of_episode(FakeWorld(), policy)
+
+    assert record.policy_metadata == {"deep": {"value": stored}}
+    assert read_record(encode(record), Path(), 1) == record
+
+
+@pytest.mark.parametrize(
+    ("value", "sentence"),
+    [
         (np.float32("nan"), "'deep.value' is nan; it must be a text, a finite number"),
         ({"more": [0, b"x"]}, "'deep.value.more[1]' is b'x'; it must be"),
         ({(1, 2): 3}, "deep.value has the key (1, 2); keys must be text"),

@@ -72,7 +72,7 @@ def refuse_links(folder: Path) -> None:
         ForeignPathError: there is a symbolic link, a pipe or a device, or a file in the folder has
             another name, too (a hard link). The folder itself may be a link.
     """
-    for path in folder.iterdir():
+    for path in folder.glob("*"):  # nothing if there is no folder yet
         is_written = path.is_file() and path.name != PLAN_FILE
         if is_written and path.stat().st_nlink > 1:
             raise ForeignPathError(
