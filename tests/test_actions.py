@@ -121,7 +121,8 @@ def test_a_tensor_of_flags_is_refused():
 
 
 @pytest.mark.parametrize("space", ACTION_SPACES.values(), ids=ACTION_SPACES)
-def test_each_space_takes_its_own_size_and_names_itself_when_it_refuses(space):
+def test_each_action_space_takes_actions_of_its_own_size(space):
+    """It is found by its name; its lowest values are an action, and below its highest."""
     assert find_action_space(space.name) is space
     assert np.array_equal(check_chunk(space.low, space), space.low[None])
     assert (space.low < space.high).all()

@@ -64,7 +64,7 @@ print(json.dumps([*told, env.instruction.text]))
 
 
 @pytest.fixture
-def source_with_the_option(tmp_path: Path) -> Path:
+def source_with_the_option(tmp_path):
     folder = tmp_path / "src" / "roboirg"
     shutil.copytree(Path(roboirg.__file__).parent, folder)
     for name, changes in CHANGES_THAT_ADD_THE_OPTION.items():
@@ -79,8 +79,8 @@ def source_with_the_option(tmp_path: Path) -> Path:
 @pytest.mark.sim
 @pytest.mark.slow
 def test_a_new_instruction_option_reaches_words_commands_plans_records_and_tables(
-    source_with_the_option: Path, tmp_path: Path
-) -> None:
+    source_with_the_option, tmp_path
+):
     """`greeting` is added to a copy of the package, as a field and the code that reads it."""
     few = ("--tasks", "PickXtimes", "--settings", "explicit,direct")
     plan = plan_file(greeting="hello", max_steps=2, episodes=1)

@@ -28,7 +28,7 @@ def answer_messages(connection: Connection) -> None:
     serve(connection, obey_message)
 
 
-def obey_message(message: str) -> object:
+def obey_message(message):
     if message == "leave":
         os._exit(3)
     if message == "ignore":
@@ -38,7 +38,7 @@ def obey_message(message: str) -> object:
     return os.getpid(), signal.getsignal(signal.SIGINT)
 
 
-def is_alive(pid: int) -> bool:
+def is_alive(pid):
     try:
         return "(sleep) Z" not in Path(f"/proc/{pid}/stat").read_text()
     except OSError:
@@ -162,7 +162,7 @@ def test_children_do_not_outlive_a_parent_that_is_killed(tmp_path):
     assert wait_for(lambda: not is_alive(pid))
 
 
-def square_root_but_for_7_and_9(number: int) -> float:
+def square_root_but_for_7_and_9(number):
     if number == 7:
         raise ValueError("seven")
     if number == 9:

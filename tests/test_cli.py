@@ -36,7 +36,7 @@ RUN_RANDOM = ("run", "--policy", "random", "--tasks", "PickXtimes")
 
 
 @pytest.fixture
-def roboirg(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+def roboirg(monkeypatch, capsys):
     """The command, in this process."""
 
     def call(*words: str | Path) -> SimpleNamespace:
@@ -57,15 +57,15 @@ class CannedPlayer:
 
     result: Mapping[str, Any] = {"outcome": "success", "steps": 7}
 
-    def __init__(self, folder: Path, video: str, **_options: object) -> None:
+    def __init__(self, folder, video, **_options):
         del folder, video
 
-    def __call__(self, job: Job):
+    def __call__(self, job):
         return make_record(job, **self.result)
 
 
 @pytest.fixture
-def player_without_simulator(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
+def player_without_simulator(monkeypatch):
     monkeypatch.setattr("roboirg.runs.run.runner.EpisodeRunner", CannedPlayer)
     monkeypatch.setattr(CannedPlayer, "result", {"outcome": "success", "steps": 7})
     return CannedPlayer
@@ -395,6 +395,14 @@ def test_a_dry_run_counts_model_calls_only_for_episodes_that_are_not_stored(robo
     assert re.search(r"p\W+direct\W+2\W", result.out)
 
 
+def test_a_dry_run_needs_no_output_folder_and_the_run_itself_does(roboirg):
+    counted = roboirg(*RUN_RANDOM, "--dry-run")
+    assert (counted.code, "0 already stored" in counted.out) == (0, True)
+
+    refused = roboirg(*RUN_RANDOM)
+    assert (refused.code, "No folder given" in refused.err) == (2, True)
+
+
 @pytest.mark.parametrize(
     ("words", "caption"),
     [
@@ -462,7 +470,7 @@ class Wanderer(CannedPlayer):
 
     away = Path()
 
-    def __call__(self, job: Job):
+    def __call__(self, job):
         os.chdir(self.away)
         return super().__call__(job)
 

@@ -80,7 +80,7 @@ def words_of(line: str) -> list[str] | None:
     return None if found is None else shlex.split(found[1], comments=True)
 
 
-def write_run(folder_of_a_reader: Path, lost: int) -> None:
+def write_run(folder_of_a_reader, lost):
     plan = make_plan(
         ["listener", "forgetful"], tasks="PickXtimes,VideoUnmask", forms="implicit,resolved",
         episodes="2",
@@ -95,7 +95,7 @@ def write_run(folder_of_a_reader: Path, lost: int) -> None:
 
 
 @pytest.fixture(scope="module")
-def folder_of_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder_of_runs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages") / "runs"
     for lost, name in enumerate(("first", "second", "a", "b")):
         write_run(folder / name, lost)
@@ -103,9 +103,7 @@ def folder_of_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def folder_of_a_reader(
-    folder_of_runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Path:
+def folder_of_a_reader(folder_of_runs, tmp_path, monkeypatch):
     policy = next(
         block.text for block in blocks_of(ROOT / "README.md") if "class MyPolicy" in block.text
     )
@@ -118,7 +116,7 @@ def folder_of_a_reader(
     sys.modules.pop("my_policy", None)
 
 
-def run_script(text: str, folder_of_a_reader: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def run_script(text, folder_of_a_reader, monkeypatch):
     for line in command_lines(text):
         words = words_of(line)
         if words is None:
@@ -134,8 +132,8 @@ def run_script(text: str, folder_of_a_reader: Path, monkeypatch: pytest.MonkeyPa
 @pytest.mark.sim
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_the_code_blocks_of_a_page_run_in_order_without_an_error(
-    page: Path, folder_of_a_reader: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    page, folder_of_a_reader, monkeypatch
+):
     namespace: dict[str, object] = {"__name__": "page"}
     for block in blocks_of(page) if page.name not in PAGES_TESTED_ELSEWHERE else ():
         if block.why is not None:
@@ -178,7 +176,7 @@ def check_command(command: Any, words: list[str]) -> None:
         pass
 
 
-def test_every_roboirg_command_in_the_documents_exists_with_its_options() -> None:
+def test_every_roboirg_command_in_the_documents_exists_with_its_options():
     lines = [(page.name, line) for page in PAGES for line in commands_of(page)]
     assert len(lines) > 100
     command, wrong = typer.main.get_command(app), []
@@ -190,7 +188,7 @@ def test_every_roboirg_command_in_the_documents_exists_with_its_options() -> Non
     assert not wrong, "\n".join(wrong)
 
 
-def test_code_blocks_that_are_not_run_give_a_reason_and_are_not_too_many() -> None:
+def test_code_blocks_that_are_not_run_give_a_reason_and_are_not_too_many():
     found = [
         block
         for page in PAGES

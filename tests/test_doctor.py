@@ -55,7 +55,7 @@ def test_a_missing_or_old_package_is_named_with_the_command_that_installs_it(mon
     versions = {"roboirgbench": "0.1.0", "av": "9.2", "sapien": "3.0.3", "jinja2": "3.2rc1"}
     versions[headless] = "5.0"
 
-    def version(name: str) -> str:
+    def version(name):
         if name not in versions:
             raise metadata.PackageNotFoundError(name)
         return versions[name]

@@ -49,7 +49,7 @@ def bash(code: str, apt_dir: Path | None = None) -> subprocess.CompletedProcess[
 
 
 @pytest.fixture
-def apt_dir(tmp_path: Path) -> Path:
+def apt_dir(tmp_path):
     (tmp_path / "sources.list.d").mkdir()
     return tmp_path
 
@@ -161,7 +161,7 @@ ensure_libraries() { :; }
 
 
 @pytest.fixture
-def checkout(tmp_path: Path) -> Path:
+def checkout(tmp_path):
     """A checkout in which nothing is set up, and of which only the set-up script is real."""
     (tmp_path / "scripts").mkdir()
     shutil.copy(SETUP, tmp_path / "scripts")

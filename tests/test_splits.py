@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from roboirg.core.episode import SPLITS, Episode
+from roboirg.core.episode import SPLITS
 from roboirg.core.errors import InvalidValueError, SceneRejectedError, UnknownNameError
 from roboirg.tasks import all_tasks, every_task, get_task
 from roboirg.tasks.splits import splits
@@ -136,31 +136,40 @@ def test_seeds_are_unique_over_all_splits(task):
     assert max(seeds) < slot_seed(get_task(task), "random", 0)
 
 
-def test_a_fingerprint_of_episodes_changes_with_a_small_turn_but_not_with_rounding():
+def episode_with_a_thing_turned(angle):
+    """Return an episode whose first thing is turned by an angle in radians."""
     episode = get_episode("PickXtimes", "test", 3)
     first, *others = episode.scene.objects
-
-    def turned(by: float) -> Episode:
-        nudged = dataclasses.replace(first, yaw=first.yaw + by)
-        return dataclasses.replace(
-            episode, scene=dataclasses.replace(episode.scene, objects=(nudged, *others))
-        )
-
-    assert fingerprint([turned(1e-8)]) != fingerprint([episode])
-    # Mathematics libraries differ by as much.
-    assert fingerprint([turned(1e-14)]) == fingerprint([episode])
-    assert fingerprint([episode]) == fingerprint([get_episode("PickXtimes", "test", 3)])
-
-    other = get_episode("PickXtimes", "test", 2)
-    assert fingerprint([episode, other]) != fingerprint([other, episode])
+    turned = dataclasses.replace(first, yaw=first.yaw + angle)
+    scene = dataclasses.replace(episode.scene, objects=(turned, *others))
+    return dataclasses.replace(episode, scene=scene)
 
 
-def test_only_plain_data_has_a_fingerprint():
-    episode = get_episode("VideoUnmask", "test", 0)
-    assert json.loads(json.dumps(plain(episode))) == plain(episode)
-    for wrong in (np.float64(1.0), np.int64(1), [1], {1}):
-        with pytest.raises(TypeError, match="is not plain data"):
-            plain((wrong,))
+def test_a_fingerprint_of_episodes_changes_with_a_small_turn_but_not_with_rounding():
+    """Mathematics libraries differ by some 1e-14."""
+    usual = fingerprint([episode_with_a_thing_turned(0)])
+
+    assert fingerprint([episode_with_a_thing_turned(1e-8)]) != usual
+    assert fingerprint([episode_with_a_thing_turned(1e-14)]) == usual
+
+
+def test_a_fingerprint_of_episodes_depends_on_their_order():
+    first = get_episode("PickXtimes", "test", 2)
+    second = get_episode("PickXtimes", "test", 3)
+
+    assert fingerprint([first, second]) != fingerprint([second, first])
+
+
+def test_what_a_fingerprint_is_made_of_is_the_same_after_json():
+    data = plain(get_episode("VideoUnmask", "test", 0))
+
+    assert json.loads(json.dumps(data)) == data
+
+
+@pytest.mark.parametrize("wrong", [np.float64(1.0), np.int64(1), [1], {1}], ids=repr)
+def test_only_plain_data_has_a_fingerprint(wrong):
+    with pytest.raises(TypeError, match="is not plain data"):
+        plain((wrong,))
 
 
 def test_the_file_of_splits_is_read_back_and_has_a_line_for_each_task():
@@ -171,17 +180,31 @@ def test_the_file_of_splits_is_read_back_and_has_a_line_for_each_task():
     assert {task: TaskSplits(**entry) for task, entry in json.loads(text).items()} == splits
 
 
-def test_an_unknown_task_split_or_episode_is_refused_with_those_that_exist():
-    with pytest.raises(UnknownNameError, match=r"no task 'PickXTime'.*PickXtimes.*Did you mean"):
-        get_episode("PickXTime", "test", 0)
-    with pytest.raises(UnknownNameError, match=r"no split 'dev'.*train, val, test, random"):
-        get_episode("PickXtimes", "dev", 0)
+@pytest.mark.parametrize(
+    ("task", "split", "words"),
+    [
+        ("PickXTime", "test", r"no task 'PickXTime'.*PickXtimes.*Did you mean"),
+        ("PickXtimes", "dev", r"no split 'dev'.*train, val, test, random"),
+    ],
+)
+def test_an_unknown_task_or_split_is_refused_with_those_that_exist(task, split, words):
+    with pytest.raises(UnknownNameError, match=words):
+        get_episode(task, split, 0)
+
+
+@pytest.mark.parametrize("index", [-1, 50, 1.0, "0", True])
+def test_an_episode_that_is_no_number_of_its_split_is_refused(index):
+    with pytest.raises(InvalidValueError, match="has episodes 0 to 49"):
+        get_episode("PickXtimes", "test", index)
+
+
+def test_an_episode_may_be_a_number_of_numpy():
     assert get_episode("PickXtimes", "test", np.int64(3)) == get_episode("PickXtimes", "test", 3)
+
+
+def test_the_random_split_is_none_of_those_with_a_fixed_number_of_episodes():
     with pytest.raises(UnknownNameError, match=r"no split 'random'.*train, val, test"):
         splits.check_fixed_split("random")
-    for wrong in (-1, 50, 1.0, "0", True):
-        with pytest.raises(InvalidValueError, match="has episodes 0 to 49"):
-            get_episode("PickXtimes", "test", wrong)
 
 
 def test_an_episode_of_a_new_task_takes_the_first_seed_for_which_a_scene_can_be_made(monkeypatch):

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Iterator
 
 import pytest
 
 
 @pytest.fixture(scope="module")
-def patient_sockets(wait_s: float) -> Iterator[None]:
+def patient_sockets(wait_s):
     before = socket.getdefaulttimeout()
     socket.setdefaulttimeout(wait_s)
     yield

@@ -5,21 +5,30 @@ from __future__ import annotations
 import pytest
 from flat_jobs import frame_of, make_result
 
-from roboirg.analysis.measures.arm_figures import ArmFigure, arm_figures
+from roboirg.analysis.measures.arm_figures import arm_figures
 from roboirg.analysis.measures.chance import silent_chance
 from roboirg.analysis.measures.measure import mean_rate
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.tables.arm_table import language_use_sentences, make_arm_table
 from roboirg.analysis.tables.rendering import get_format
 from roboirg.core.errors import InvalidValueError
-from roboirg.records.record import GoalOutcomes, Summary
+from roboirg.records.record import GoalOutcomes
 
 TASKS = ("PickXtimes", "VideoUnmask")
 SCENES = range(12)
 
 
-def goals(arm: str, done: str) -> tuple[str, GoalOutcomes]:
-    """Return verdict and goals of a policy that does `own` or `other`."""
+def goals(arm, done):
+    """Return the verdict of an episode, and which goals were reached in it.
+
+    In the arm `other-goal` the instruction states the `other` goal of the scene, elsewhere its
+    `own`. A policy that does what was stated wins: ``goals("told", "own")`` is a success,
+    ``goals("other-goal", "own")`` a failure.
+
+    Args:
+        arm: how the instruction was given, such as `told` or `silent`.
+        done: the goal that the policy reached: `own`, `other` or `none`.
+    """
     stated = "other" if arm == "other-goal" else "own"
     won = done == stated
     return ("success" if won else "failure"), GoalOutcomes(
@@ -30,10 +39,15 @@ def goals(arm: str, done: str) -> tuple[str, GoalOutcomes]:
     )
 
 
-def results_of_policy(
-    policy: str, acts: dict[str, str], scenes: range = SCENES, **fields: object
-) -> list[Summary]:
-    """Return results of a policy that does something in each arm."""
+def results_of_policy(policy, acts, scenes=SCENES, **fields):
+    """Return results of a policy in some scenes of both tasks.
+
+    Args:
+        policy: its name.
+        acts: the goal that it reaches in each arm, as in ``{"told": "own", "silent": "none"}``.
+        scenes: the episodes.
+        fields: other fields of the results.
+    """
     found = []
     for arm, done in acts.items():
         outcome, outcomes = goals(arm, done)
@@ -55,109 +69,142 @@ ALWAYS_THE_OTHER_GOAL = {
 }
 
 
-def run_data_of(*results: list[Summary]) -> RunData:
+def run_data_of(*results):
     return RunData(frame_of(*results))
 
 
-def both_rates(arm_figure: ArmFigure) -> tuple[float, float]:
+def both_rates(arm_figure):
     return float(arm_figure.rate), float(mean_rate(arm_figure.others))
 
 
-def figure_named(data: RunData, name: str) -> ArmFigure:
+def figure_named(data, name):
     return next(drawn for drawn in arm_figures(data.frame) if drawn.key.contrast.name == name)
 
 
 @pytest.mark.parametrize(
-    ("acts", "use", "habit", "worth"),
+    ("acts", "use", "habit"),
     [
-        (DOES_WHAT_IT_HEARS, 1.0, 0.0, 1.0),
-        (SAME_GOAL_IN_EVERY_ARM, 0.0, 1.0, 0.0),
-        (ALWAYS_THE_OTHER_GOAL, 0.0, 1.0, 0.0),
+        pytest.param(DOES_WHAT_IT_HEARS, 1.0, 0.0, id="does what it hears"),
+        pytest.param(SAME_GOAL_IN_EVERY_ARM, 0.0, 1.0, id="always its own goal"),
+        pytest.param(ALWAYS_THE_OTHER_GOAL, 0.0, 1.0, id="always the other goal"),
     ],
 )
-def test_who_follows_the_words_is_told_from_who_does_the_same_whatever_it_hears(
-    acts, use, habit, worth
-):
-    """Each episode is played in four arms: the instruction, another goal, silence, mixed words.
+def test_who_follows_the_words_is_told_from_who_does_the_same_whatever_it_hears(acts, use, habit):
+    """*Language use* is a difference of two rates in the arm *other-goal*.
 
-    *Language use* is the rate at which the goal that was stated is done, minus that of the own goal
-    where another one was stated. Would find one arm counted as another.
+    `use` is how often the other goal is reached there, which was stated; `habit` how often the own
+    one is, which was not. Would find one arm counted as another.
     """
-    data = run_data_of(results_of_policy("mine", acts))
-    found = figure_named(data, "language use")
-    assert (both_rates(found), found.gap.value) == ((use, habit), use - habit)
-    assert found.gap.episodes == len(TASKS) * len(SCENES)
+    results = results_of_policy("mine", acts)
+
+    found = figure_named(run_data_of(results), "language use")
+
+    assert both_rates(found) == (use, habit)
+    assert found.gap.value == use - habit
+    assert found.gap.episodes == 24, "12 scenes of 2 tasks"
     assert found.p_holm < 0.001
-
-    intervals = (found.interval, found.other_interval)
-    for interval, rate in zip(intervals, both_rates(found), strict=True):
-        assert interval.low <= rate <= interval.high
-
-    worths = {
-        figure_named(data, contrast).gap.value for contrast in ("words' worth", "order's worth")
-    }
-    assert worths == {worth}
+    assert found.interval.low <= use <= found.interval.high
+    assert found.other_interval.low <= habit <= found.other_interval.high
 
 
-def test_paraphrases_are_compared_with_the_instruction_and_incomplete_episodes_are_left_out():
+@pytest.mark.parametrize("contrast", ["words' worth", "order's worth"])
+@pytest.mark.parametrize(
+    ("acts", "worth"),
+    [
+        pytest.param(DOES_WHAT_IT_HEARS, 1.0, id="does what it hears"),
+        pytest.param(SAME_GOAL_IN_EVERY_ARM, 0.0, id="always its own goal"),
+    ],
+)
+def test_words_are_worth_what_success_loses_in_silence_and_their_order_when_scrambled(
+    contrast, acts, worth
+):
+    found = figure_named(run_data_of(results_of_policy("mine", acts)), contrast)
+
+    assert found.gap.value == worth
+
+
+def test_the_success_with_paraphrases_is_their_mean_less_that_with_the_instruction():
     """Of 8 episodes in 2 tasks the first paraphrase wins all, the second half: 0.75 on average.
 
-    Would find paraphrases that are pooled, or an episode without its counterpart that counts.
+    The instruction itself wins all. Would find paraphrases that are pooled.
     """
-    half = results_of_policy("mine", {"told": "own", "paraphrase-1": "own"}, range(8))
-    half += results_of_policy("mine", {"paraphrase-2": "own"}, range(4))
-    half += results_of_policy("mine", {"paraphrase-2": "none"}, range(4, 8))
-    found = figure_named(run_data_of(half), "paraphrases")
-
-    assert (both_rates(found), found.gap.value, found.gap.episodes) == ((0.5, 0.75), -0.25, 16)
-
-    # Of 3 complete episodes in 2 tasks, one that was played in a single arm, and one of errors.
-    results = results_of_policy("mine", DOES_WHAT_IT_HEARS, range(3))
-    results += [make_result("success", 7, policy="mine", task=TASKS[0])]
-    results += [
-        make_result("error", 8, policy="mine", task=TASKS[0], arm=arm) for arm in DOES_WHAT_IT_HEARS
+    results = [
+        *results_of_policy("mine", {"told": "own", "paraphrase-1": "own"}, range(8)),
+        *results_of_policy("mine", {"paraphrase-2": "own"}, range(4)),
+        *results_of_policy("mine", {"paraphrase-2": "none"}, range(4, 8)),
     ]
-    assert figure_named(run_data_of(results), "words' worth").gap.episodes == 6
+
+    found = figure_named(run_data_of(results), "paraphrases")
+
+    assert both_rates(found) == (0.5, 0.75)
+    assert found.gap.value == -0.25
+    assert found.gap.episodes == 16
 
 
-def test_tables_and_sentences_are_as_stored(snapshot):
-    """Of a policy that listens, mostly, with another rate in each arm, and one that never does.
+def test_an_episode_that_lacks_a_verdict_in_some_arm_is_left_out():
+    """Three scenes of two tasks are complete; scene 7 has one arm, and 8 nothing but errors."""
+    results = results_of_policy("mine", DOES_WHAT_IT_HEARS, range(3))
+    results.append(make_result("success", 7, policy="mine", task=TASKS[0]))
+    for arm in DOES_WHAT_IT_HEARS:
+        results.append(make_result("error", 8, policy="mine", task=TASKS[0], arm=arm))
 
-    In two settings each, and with two seeds.
-    """
-    mixed = results_of_policy("mine", DOES_WHAT_IT_HEARS | {"scrambled": "own"}, range(6))
-    mixed += results_of_policy("mine", SAME_GOAL_IN_EVERY_ARM | {"scrambled": "none"}, range(6, 9))
-    mixed += results_of_policy("mine", ALWAYS_THE_OTHER_GOAL, range(9, 11)) + results_of_policy(
-        "mine", {"again": "own"}, range(4, 11)
+    found = figure_named(run_data_of(results), "words' worth")
+
+    assert found.gap.episodes == 6
+
+
+def results_of_a_policy_that_mostly_listens():
+    """Return results with another rate in each arm, and of two policy seeds."""
+    reads_order_not = DOES_WHAT_IT_HEARS | {"scrambled": "own"}
+    needs_order = SAME_GOAL_IN_EVERY_ARM | {"scrambled": "none"}
+    second_seed = SAME_GOAL_IN_EVERY_ARM | {"paraphrase-1": "own"}
+    return [
+        *results_of_policy("mine", reads_order_not, range(6)),
+        *results_of_policy("mine", needs_order, range(6, 9)),
+        *results_of_policy("mine", ALWAYS_THE_OTHER_GOAL, range(9, 11)),
+        *results_of_policy("mine", {"again": "own"}, range(4, 11)),
+        *results_of_policy("mine", second_seed, range(3), policy_seed=1),
+        *results_of_policy("mine", {"paraphrase-1": "own", "paraphrase-2": "none"}, range(5)),
+        *results_of_policy("mine", {"paraphrase-2": "own"}, range(3), policy_seed=1),
+    ]
+
+
+def test_the_table_of_arms_is_as_stored(snapshot):
+    """Of a policy that mostly listens and of one, *knows*, that never does; in two settings."""
+    data = run_data_of(
+        results_of_a_policy_that_mostly_listens(),
+        results_of_policy("knows", SAME_GOAL_IN_EVERY_ARM),
+        results_of_policy("mine", SAME_GOAL_IN_EVERY_ARM, range(2), setting="direct"),
+        results_of_policy("knows", {"told": "own", "silent-empty": "none"}, setting="direct"),
     )
-    mixed += results_of_policy(
-        "mine", SAME_GOAL_IN_EVERY_ARM | {"paraphrase-1": "own"}, range(3), policy_seed=1
-    )
-    mixed += results_of_policy("mine", {"paraphrase-1": "own", "paraphrase-2": "none"}, range(5))
-    mixed += results_of_policy("mine", {"paraphrase-2": "own"}, range(3), policy_seed=1)
-    other = [results_of_policy("mine", SAME_GOAL_IN_EVERY_ARM, range(2), setting="direct")]
-    other += [results_of_policy("knows", {"told": "own", "silent-empty": "none"}, setting="direct")]
-    table = make_arm_table(
-        run_data_of(mixed, results_of_policy("knows", SAME_GOAL_IN_EVERY_ARM), *other)
-    )
 
-    assert get_format("markdown").draw(table) == snapshot
+    assert get_format("markdown").draw(make_arm_table(data)) == snapshot
 
+
+def test_sentences_that_compare_the_language_use_of_two_policies_are_as_stored(snapshot):
+    mine = frame_of(results_of_a_policy_that_mostly_listens())
+    knows = frame_of(results_of_policy("knows", SAME_GOAL_IN_EVERY_ARM))
+
+    assert [*language_use_sentences(mine, knows, ("mine", "knows"))] == snapshot
+
+
+def test_a_run_without_control_arms_has_neither_their_table_nor_a_sentence_about_them():
+    mine = run_data_of(results_of_policy("mine", DOES_WHAT_IT_HEARS))
     told = run_data_of(results_of_policy("knows", {"told": "own"}))
+
     with pytest.raises(InvalidValueError, match="--arms told"):
         make_arm_table(told)
-
-    mine = run_data_of(mixed)
-    knows = run_data_of(results_of_policy("knows", SAME_GOAL_IN_EVERY_ARM))
-    assert [*language_use_sentences(mine.frame, knows.frame, ("mine", "knows"))] == snapshot
     assert not [*language_use_sentences(mine.frame, told.frame, ("", ""))]
 
 
-def test_the_chance_to_guess_a_goal_in_silence_counts_goals_that_begin_alike():
+@pytest.mark.parametrize("episode", range(12))
+def test_the_chance_to_guess_a_goal_in_silence_counts_goals_that_begin_alike(episode):
     """Lifting one of three things is a goal; lifting two in order is another: 3 + 6 goals.
 
     Who lifts the first thing of a pair is right about two pairs, too: 1 of 9 goals, or 3 of 9.
     """
-    for episode in range(12):
-        assert silent_chance("VideoUnmask", "test", episode) in {1 / 9, 3 / 9}
+    assert silent_chance("VideoUnmask", "test", episode) in {1 / 9, 3 / 9}
+
+
+def test_the_chance_to_guess_one_of_four_visits_is_a_quarter():
     assert silent_chance("StopCube", "test", 0) == 0.25

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import tracemalloc
-from pathlib import Path
 
 import pytest
 from flat_jobs import frame_of, make_results
@@ -25,7 +24,7 @@ from roboirg.analysis.results.reading import (
 )
 from roboirg.analysis.tables.diagnostic_tables import make_breakdown_table
 from roboirg.core.errors import InvalidValueError
-from roboirg.records.record import Job, Record
+from roboirg.records.record import Record, Summary
 from roboirg.records.store import RECORDS_FILE, iterate_records
 from roboirg.runs.plan.plan import Plan
 
@@ -39,7 +38,7 @@ PLAN = Plan(
 BY_LETTERS = Breakdown("letters", "letter", "Made up.")
 
 
-def record_of_job(job: Job) -> Record:
+def record_of_job(job):
     """The forgetful policy fails in every implicit instruction that says *it*, and in no other."""
     record = make_record(job, "success")
     says_it = any(mention.expression == "it" for mention in record.mentions)
@@ -49,14 +48,12 @@ def record_of_job(job: Job) -> Record:
 
 
 @pytest.fixture(scope="module")
-def records_of_two_policies() -> Records:
+def records_of_two_policies():
     return tuple(record_of_job(job) for job in PLAN.jobs())
 
 
 @pytest.fixture(scope="module")
-def folder_of_two_policies(
-    records_of_two_policies: Records, tmp_path_factory: pytest.TempPathFactory
-) -> Path:
+def folder_of_two_policies(records_of_two_policies, tmp_path_factory):
     return store(tmp_path_factory.mktemp("runs") / "both", records_of_two_policies, PLAN).folder
 
 
@@ -64,62 +61,80 @@ def folder_of_two_policies(
 
 
 def test_a_rival_is_labeled_with_the_words_that_single_it_out(records_of_two_policies):
-    read = record_columns()["rival"].read
+    """A rival is a second thing that fits: of *the cube*, the label may be "one of two: left".
+
+    Only the setting direct-rival has one; elsewhere the label is None.
+    """
+    read_label = record_columns()["rival"].read
+
     for record in records_of_two_policies:
-        reference = record.metadata["rival_reference"]
-        assert (reference is not None) == (record.setting == "direct-rival")
-        assert read(record) == (f"one of two: {reference}" if reference else None)
+        label = read_label(record)
+        if record.setting == "direct-rival":
+            assert label == f"one of two: {record.metadata['rival_reference']}"
+        else:
+            assert label is None, record.slug
 
 
 def test_an_episode_is_labeled_with_the_expressions_of_its_command_alone(records_of_two_policies):
+    """A contextual instruction also has turns before the command, such as a reinforcement.
+
+    These turns refer with expressions of their own, which must not become labels.
+    """
     read = record_columns()["expression"].read
-    contextual = [record for record in records_of_two_policies if record.setting == "contextual"]
-    found = {label for record in contextual for label in read(record)}  # type: ignore[attr-defined]
-    said = {mention.expression for record in contextual for mention in record.mentions}
+    labels = set()
+    said = set()
 
-    assert found < said, "a reinforcement has others"
+    for record in records_of_two_policies:
+        if record.setting == "contextual":
+            labels.update(read(record))
+            said.update(mention.expression for mention in record.mentions)
 
+    assert labels < said
+
+
+def test_an_instruction_with_references_spelled_out_has_no_expression():
     job = PLAN.jobs()[0].with_options(setting="contextual", form="resolved")
-    resolved = make_record(job, "success")
-    assert read(resolved) == ()
+
+    assert record_columns()["expression"].read(make_record(job, "success")) == ()
 
 
 # Numbers
 
 
-def explicit_wins_6_of_12_and_direct_3(*settings: str) -> Frame:
-    """Return the results of these settings. Direct has one more episode, an error.
-
-    Even episodes have the labels "9" and "zebra", odd ones "10 b".
-    """
-    results = [*make_results("1" * 6 + "0" * 6), *make_results("1" * 3 + "0" * 9 + "!", "direct")]
-    frame = frame_of([result for result in results if result.setting in settings])
+def labeled_by_letters(results: list[Summary]) -> Frame:
+    """Return results of which even episodes have the labels "9" and "zebra", odd ones "10 b"."""
+    frame = frame_of(results)
     labels = [("10 b",) if episode % 2 else ("9", "zebra") for episode in frame["episode"]]
     return frame.extended({"letters": as_column(labels)})
 
 
 def test_the_gap_of_a_label_is_over_the_episodes_with_that_label():
-    """Of the even episodes ("9", "zebra") explicit wins 0, 2, 4 and direct 0, 2: a gap of -1 of 6.
+    """A letter is an episode: 1 won, 0 lost, ! an error, which counts nowhere.
 
-    Of the odd ones ("10 b") explicit wins 1, 3, 5 and direct 1: -2 of 6.
+    Of the even episodes ("9", "zebra") explicit wins 0, 2, 4 and direct 0, 2: a gap of -1 of 6. Of
+    the odd ones ("10 b") explicit wins 1, 3, 5 and direct 1: -2 of 6.
     """
-    rows = break_down(explicit_wins_6_of_12_and_direct_3("explicit", "direct"), BY_LETTERS)
-    assert [(row.key.label, row.counts.episodes) for row in rows] == [
-        ("9", 6),
-        ("10 b", 6),
-        ("zebra", 6),
-    ]
+    explicit = make_results("111111000000")
+    direct = make_results("111000000000!", "direct")
 
-    gaps = [row.gap for row in rows]
-    assert [gap and round(gap.value * 6) for gap in gaps] == [-1, -2, -1]
+    rows = break_down(labeled_by_letters([*explicit, *direct]), BY_LETTERS)
+
+    found = []
+    for row in rows:
+        gap = row.gap
+        assert gap is not None
+        found.append((row.key.label, row.counts.episodes, round(gap.value * 6), gap.p_value))
     # Tests of 1 and of 2 episodes that differ; corrected for 3 tests, all reach the most, 1.
-    assert [gap and gap.p_value for gap in gaps] == [1.0, 0.5, 1.0]
+    assert found == [("9", 6, -1, 1.0), ("10 b", 6, -2, 0.5), ("zebra", 6, -1, 1.0)]
     assert [row.p_holm for row in rows] == [1.0, 1.0, 1.0]
 
 
 def test_without_explicit_results_a_label_has_a_rate_and_no_gap():
-    """2 of 6 are won; would find a gap to episodes that were not played."""
-    table = make_breakdown_table(BY_LETTERS, explicit_wins_6_of_12_and_direct_3("direct"))
+    """Of the six even episodes two are won; would find a gap to episodes that were not played."""
+    direct = make_results("111000000000!", "direct")
+
+    table = make_breakdown_table(BY_LETTERS, labeled_by_letters(direct))
+
     assert [entry.text for entry in table.rows[0].entries] == ["6", "33.33", "–", "–", "–"]
     assert "– without explicit on the same episodes." in table.notes
     assert table.notes[-1].startswith("Incomplete: 1 trial without a verdict")
@@ -127,15 +142,12 @@ def test_without_explicit_results_a_label_has_a_rate_and_no_gap():
 
 def test_two_policies_are_compared_on_the_episodes_of_each_label():
     """The better one wins all 12, so it gains 4 of 6, 5 of 6 and again 4 of 6 episodes."""
-    direct = explicit_wins_6_of_12_and_direct_3("direct")
-    better = Frame({
-        **direct, "run": as_column([result._replace(policy="better") for result in direct["run"]]),
-        "outcome": as_column(["success"] * len(direct["run"])),
-    })  # fmt: skip
+    better = labeled_by_letters(make_results("1" * 12, "direct", policy="better"))
+    direct = labeled_by_letters(make_results("111000000000", "direct"))
+
     found = compare(better, direct, [BY_LETTERS])
 
     parts = found.parts["letter"]
-
     assert [(part.key.label, round(part.gap.value * 6)) for part in parts] == [
         ("9", 4), ("10 b", 5), ("zebra", 4),
     ]  # fmt: skip

@@ -45,6 +45,7 @@ def run_data_of(*results):
 
 
 def named_differences(results, planned=()) -> tuple[str, ...] | None:
+    """Return what keeps the only cell of these results from the paper's; None if it has no such."""
     ((key, cell),) = cells_of(frame_of(results, planned=planned)).items()
     return differences_of(key, cell)
 
@@ -75,77 +76,99 @@ def test_each_difference_to_how_the_paper_played_is_named(fields, expected):
 
 
 def test_errors_and_planned_trials_without_a_result_are_named():
-    """Would find an incomplete rate that stands next to a published one without a sign."""
-    several = [*results_like_the_papers(), *results_like_the_papers(policy_seed=1)]
-    # A planned trial counts as played even if its policy or its words came from another place.
+    """Of 100 planned trials (50 episodes, 2 seeds) one is an error and two were not played.
+
+    Would find an incomplete rate that stands next to a published one without a sign.
+    """
+    first_seed = results_like_the_papers()
+    second_seed = results_like_the_papers(policy_seed=1)
+    planned = [result.identity for result in [*first_seed, *second_seed]]
+    error = replace(second_seed[10], outcome="error", error="policy")
+
+    played = [*first_seed, *second_seed[:10], error, *second_seed[13:]]
+
+    assert named_differences(played, planned) == ("1 error", "2 trials still to be played")
+
+
+def test_a_planned_trial_counts_as_played_although_policy_and_words_came_from_another_place():
+    results = results_like_the_papers()
     elsewhere = {"ref": unknown_policy("openpi://other:1"), "wordings_file": "elsewhere.toml"}
-    planned = [replace(result.identity, **elsewhere) for result in several]
-    assert named_differences(several, planned) == ()
+    planned = [replace(result.identity, **elsewhere) for result in results]
 
-    third = replace(several[60], outcome="error", error="policy")
-    rest = [*several[:60], third, *several[63:]]
-    assert named_differences(rest, planned) == ("1 error", "2 trials still to be played")
+    assert named_differences(results, planned) == ()
 
 
-def test_implicit_settings_real_robots_and_unknown_tasks_have_their_own_reasons():
-    """PutInBox is a task of the paper's real robot; Outside is in no table of the paper."""
-    assert named_differences(results_like_the_papers(settings=("direct",))) == IMPLICIT
-    assert named_differences(results_like_the_papers(tasks=("PutInBox",))) == REAL
-    assert named_differences(results_like_the_papers(tasks=("Outside",))) is None
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        pytest.param({"settings": ("direct",)}, IMPLICIT, id="implicit setting"),
+        pytest.param({"tasks": ("PutInBox",)}, REAL, id="task of the paper's real robot"),
+        pytest.param({"tasks": ("Outside",)}, None, id="task in no table of the paper"),
+    ],
+)
+def test_implicit_settings_real_robots_and_unknown_tasks_have_their_own_reasons(fields, reason):
+    assert named_differences(results_like_the_papers(**fields)) == reason
 
+
+def test_a_cell_of_which_nothing_was_played_is_not_compared():
     planned = [result.identity for result in results_like_the_papers()]
+
     assert named_differences([], planned) is None
 
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_marks_the_cells_and_says_what_differs(snapshot, name):
     """Of two tasks, one with too few episodes, in explicit and in a setting of other words."""
-    results = results_like_the_papers(settings=("explicit", "direct"))
-    table = make_table(
-        "main",
-        run_data_of(results, results_like_the_papers(range(4), ("StopCube",))),
-        published=True,
-    )
+    whole = results_like_the_papers(settings=("explicit", "direct"))
+    partial = results_like_the_papers(range(4), ("StopCube",))
+    table = make_table("main", run_data_of(whole, partial), published=True)
+    shown = tuple(row for row in table.rows if row.source == "ours" or row.name == "MemER")
 
-    ours = [row for row in table.rows if row.source == "ours" or row.name == "MemER"]
-
-    assert FORMATS[name].draw(dataclasses.replace(table, rows=tuple(ours))) == snapshot
+    assert FORMATS[name].draw(dataclasses.replace(table, rows=shown)) == snapshot
 
 
 def test_a_table_without_published_rates_marks_the_best_rate_alone():
     """The sign of the best is *; = and ≠ would refer to rates that the table does not show."""
-    plain = make_table(
-        "main", run_data_of(results_like_the_papers(settings=("explicit", "direct")))
-    )
-    assert "comparable" not in " ".join(plain.notes)
-    assert {entry.signs for row in plain.rows for entry in row.entries} == {"", "*"}
+    data = run_data_of(results_like_the_papers(settings=("explicit", "direct")))
+
+    table = make_table("main", data)
+
+    signs = set()
+    for row in table.rows:
+        signs.update(entry.signs for entry in row.entries)
+    assert signs == {"", "*"}
+    assert "comparable" not in " ".join(table.notes)
 
 
-def test_a_note_names_the_policies_only_where_their_differences_are_not_the_same():
-    ours = results_like_the_papers(wordings=None)
-    different = "≠ not comparable with the published rate"
-    same = make_table(
-        "main",
-        run_data_of(ours, results_like_the_papers(wordings=None, policy="b")),
-        published=True,
-    )
-    assert f"{different}: our own words." in same.notes
+def test_a_note_on_differences_names_no_policy_if_all_differ_alike():
+    listener = results_like_the_papers(wordings=None)
+    other = results_like_the_papers(wordings=None, policy="b")
 
-    table = make_table(
-        "main", run_data_of(ours, results_like_the_papers(policy="b", max_steps=9)), published=True
-    )
-    assert f"{different} (listener, max steps 1300, our own words): our own words." in table.notes
+    table = make_table("main", run_data_of(listener, other), published=True)
+
+    assert "≠ not comparable with the published rate: our own words." in table.notes
+
+
+def test_a_note_on_differences_names_the_policy_that_alone_has_them():
+    """The listener plays in other words, policy b with another step limit."""
+    listener = results_like_the_papers(wordings=None)
+    other = results_like_the_papers(policy="b", max_steps=9)
+
+    table = make_table("main", run_data_of(listener, other), published=True)
+
+    assert (
+        "≠ not comparable with the published rate (listener, max steps 1300, our own words): "
+        "our own words."
+    ) in table.notes
 
 
 def test_in_the_terminal_only_explicit_rates_are_marked_as_comparable_or_not():
     """50 episodes in one task (=), and 4 in the other (≠): 40 of 50 and 3 of 4 are won."""
     settings = ("explicit", "direct")
-    (table,) = make_run_tables(
-        frame_of(
-            results_like_the_papers(settings=settings),
-            results_like_the_papers(range(4), ("StopCube",), settings),
-        )
-    )
+    whole = results_like_the_papers(settings=settings)
+    partial = results_like_the_papers(range(4), ("StopCube",), settings)
+
+    (table,) = make_run_tables(frame_of(whole, partial))
 
     assert [str(row.entries[0]) for row in table.rows[:2]] == ["80 =", "75 ≠"]
     assert not any(row.entries[1].signs for row in table.rows)

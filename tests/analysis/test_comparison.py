@@ -70,21 +70,37 @@ def test_episodes_without_instruction_do_not_count_in_a_comparison():
     silent = make_results("00", arm="silent")
 
     assert comparison_of([*first, *silent], second) == comparison_of(first, second)
-    assert comparison_of(silent, silent).averages, "unless there is nothing else"
 
 
-def test_policies_without_a_common_episode_are_refused():
-    for changes in ({"task": "BinFill"}, {"setting": "direct"}):
-        with pytest.raises(InvalidValueError, match="no episode in common"):
-            comparison_of(make_results("11"), make_results("11", policy=POOR, **changes))
+def test_episodes_without_instruction_are_compared_if_there_is_nothing_else():
+    silent = make_results("00", arm="silent")
+
+    assert comparison_of(silent, silent).averages
 
 
-def test_each_side_of_a_comparison_must_be_one_policy_of_one_version():
+@pytest.mark.parametrize("changes", [{"task": "BinFill"}, {"setting": "direct"}])
+def test_policies_without_a_common_episode_are_refused(changes):
+    first = make_results("11")
+    second = make_results("11", policy=POOR, **changes)
+
+    with pytest.raises(InvalidValueError, match="no episode in common"):
+        comparison_of(first, second)
+
+
+@pytest.mark.parametrize(
+    ("added", "reason"),
+    [
+        (make_results("11", policy=POOR), "name one as RUN:forgetful"),
+        (make_results("--1", policy_version="2"), "in several versions"),
+    ],
+)
+def test_each_side_of_a_comparison_must_be_one_policy_of_one_version(added, reason):
     results = make_results("11")
-    for side, words in (
-        ([*results, *make_results("11", policy=POOR)], "name one as RUN:forgetful"),
-        ([*results, *make_results("--1", policy_version="2")], "in several versions"),
-        ([], "no results"),
-    ):
-        with pytest.raises(InvalidValueError, match=words):
-            comparison_of(side, results)
+
+    with pytest.raises(InvalidValueError, match=reason):
+        comparison_of([*results, *added], results)
+
+
+def test_a_side_without_results_is_refused():
+    with pytest.raises(InvalidValueError, match="no results"):
+        comparison_of([], make_results("11"))

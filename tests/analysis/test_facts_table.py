@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -14,22 +13,22 @@ from page_text import call, store
 
 from roboirg.analysis.tables.facts_table import NO_NETWORK, NOT_REPORTED, RUN
 from roboirg.core.inference_facts import InferenceFacts, inference_facts
-from roboirg.records.record import Record
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.plan.stored_plans import write_plan
 
 Facts = dict[str, dict[str, str]]
 
 
-def record_of(episode: int, outcome: str = "success", **fields) -> Record:
-    setting = fields.pop("setting", "explicit")
+def record_of(episode, outcome="success", *, setting="explicit", **fields):
+    """Return the record of an episode of PickXtimes, played by the policy *mine*."""
     job = job_of(policy="mine", task="PickXtimes", split="test", episode=episode, setting=setting)
     cause = None if outcome == "success" else "why"
     start = f"{episode}{setting}{outcome}"
     return make_record(job, outcome, cause, started_at=start, **fields)
 
 
-def facts_of_run(folder: Path, *records: Record) -> Facts:
+def facts_of_run(folder, *records):
+    """Return the table of facts as ``{"the run": {"tasks": "PickXtimes"}, "mine": {…}}``."""
     store(folder, records)
     rows = json.loads(call("tables", folder, "--which", "facts", "--format", "json"))
     found: Facts = {}
@@ -39,15 +38,20 @@ def facts_of_run(folder: Path, *records: Record) -> Facts:
 
 
 def test_the_table_of_facts_says_what_was_planned_played_and_begun_again(tmp_path):
-    """Of five records one is a failed first attempt; three planned trials were not played.
+    """Of four records one is a failed first attempt; three planned trials were not played.
 
     Would find a repeated episode that counts twice, or an error that vanishes.
     """
-    failed = {"error": "policy", "steps": 50, "calls": 1, "executed": 20}
-    again = record_of(0, "error", **failed), record_of(0, attempt=2, steps=30, calls=3, executed=10)
-    code = {"code": "0a", "verdict_code": None}
-    later = record_of(2, "error", error="timeout", **code), record_of(3, setting="direct")
+    records = [
+        record_of(0, "error", error="policy"),
+        record_of(0, attempt=2),
+        record_of(2, "error", error="timeout", code="0a", verdict_code=None),
+        record_of(3, setting="direct"),
+    ]
     write_plan(make_plan(["mine=random"], tasks="PickXtimes", settings="direct"), tmp_path)
+
+    found = facts_of_run(tmp_path, *records)
+
     expected = {
         "tasks": "PickXtimes",
         "settings": "explicit; direct",
@@ -60,15 +64,22 @@ def test_the_table_of_facts_says_what_was_planned_played_and_begun_again(tmp_pat
         "trials planned and not played": "3",
         "trials begun again": "1",
         "render device": NOT_REPORTED,
-        "package code": f"{again[0].code}; 0a",
-        "verdict code": again[0].verdict_code,
+        "package code": f"{records[0].code}; 0a",
+        "verdict code": records[0].verdict_code,
     }
-
-    found = facts_of_run(tmp_path, *again, *later)
-
     assert found[RUN].items() >= expected.items()
-    # 30 steps by 3 calls; the failed first attempt, 50 steps by 1, is left out.
-    assert found["mine"]["control steps per call, mean"] == "10.0"
+
+
+def test_steps_per_call_are_over_all_episodes_and_without_failed_attempts(tmp_path):
+    """60 steps by 4 calls; a mean of the episodes' 10 and 30 would be 20."""
+    failed = record_of(0, "error", error="policy", steps=50, calls=1, executed=20)
+    again = record_of(0, attempt=2, steps=30, calls=3, executed=16)
+    other = record_of(1, steps=30, calls=1, executed=10)
+
+    found = facts_of_run(tmp_path, failed, again, other)
+
+    assert found["mine"]["control steps per call, mean"] == "15.0"
+    assert found["mine"]["actions executed per call, most"] == "16"
 
 
 UNKNOWN_UNLESS_DECLARED = ("version", "cameras", "trained on", "dtype", "python", "prompts")
@@ -80,7 +91,7 @@ FACTS_OF_A_NETWORK = InferenceFacts(
 @pytest.mark.parametrize(
     ("fields", "metadata", "expected"),
     [
-        (
+        pytest.param(
             {},
             {},
             {
@@ -89,14 +100,12 @@ FACTS_OF_A_NETWORK = InferenceFacts(
                 ),
                 "reads the simulator's state": "no",
             },
+            id="nothing is declared",
         ),
-        (
+        pytest.param(
             {
                 "needs": {"cameras": ["front"], "actions": "ee_pose", "lowers_prompt": True},
                 "inference": FACTS_OF_A_NETWORK,
-                "steps": 30,
-                "calls": 3,
-                "executed": 16,
             },
             {"trained_on": "explicit", "device": "two cards"},
             {
@@ -110,21 +119,24 @@ FACTS_OF_A_NETWORK = InferenceFacts(
                 "dtype": NOT_REPORTED,
                 "libraries": "torch 2.9",
                 "python": "3.12.1",
-                "control steps per call, mean": "10.0",
-                "actions executed per call, most": "16",
             },
+            id="declared and reported",
         ),
-        (  # The client's process of a server has libraries, too, but computes nothing.
+        # The client's process of a server has libraries, too, but computes nothing.
+        pytest.param(
             {"inference": FACTS_OF_A_NETWORK},
             {"server": "openpi://host:8000", "dtype": "float16"},
             {"dtype": "float16", "python": NOT_REPORTED, "libraries": NOT_REPORTED},
+            id="on a server",
         ),
-        (
+        pytest.param(
             {},
             {"network": "none"},
             {"dtype": NO_NETWORK, "preprocessing": NO_NETWORK, "device": NOT_REPORTED},
+            id="no network",
         ),
-        (  # The policy behind a planner does not speak for the planner.
+        # The policy behind a planner does not speak for the planner.
+        pytest.param(
             {},
             {
                 "planner": {"model": "large"},
@@ -137,6 +149,7 @@ FACTS_OF_A_NETWORK = InferenceFacts(
                 "dtype": NOT_REPORTED,
                 "device": "a card",
             },
+            id="behind a planner",
         ),
     ],
 )
@@ -144,45 +157,51 @@ def test_the_facts_of_a_policy_are_what_it_declares_and_what_its_process_reports
     tmp_path, fields, metadata, expected
 ):
     """What neither says is *not reported*: a guess would look like a fact in a paper."""
-    # A second episode of 10 steps by 1 call: 40 by 4 together.
-    short = {**fields, "steps": 10, "calls": 1, "executed": 10} if "steps" in fields else fields
-    both = (
-        record_of(at, policy_metadata=metadata, **own) for at, own in enumerate((fields, short))
-    )
+    record = record_of(0, policy_metadata=metadata, **fields)
 
-    found = facts_of_run(tmp_path, *both)
+    found = facts_of_run(tmp_path, record)
 
     assert found["mine"].items() >= expected.items()
     assert found[RUN]["errors, in no rate"] == "0"
 
 
 class Network:
-    """Parameters of some dtype, device and size each."""
+    """A network with parameters of some (dtype, device, number of values) each."""
 
-    def __init__(self, *parameters: tuple[str, str, int]) -> None:
+    def __init__(self, *parameters):
         self._parameters = [
             SimpleNamespace(dtype=f"torch.{dtype}", device=device, numel=lambda size=size: size)
             for dtype, device, size in parameters
         ]
 
-    def parameters(self) -> list[SimpleNamespace]:
+    def parameters(self):
         return self._parameters
 
 
-def test_types_and_devices_of_a_network_are_found_wherever_the_policy_keeps_it(monkeypatch):
-    """In dictionaries, lists and objects, also in a circle; that of most parameters comes first."""
+@pytest.fixture
+def networks_are_modules_of_torch(monkeypatch):
+    """Stand in for PyTorch, of which nothing but the class of networks is asked."""
     torch = SimpleNamespace(nn=SimpleNamespace(Module=Network))
     monkeypatch.setitem(sys.modules, "torch", torch)
+
+
+def test_types_and_devices_of_a_network_are_found_wherever_the_policy_keeps_it(
+    networks_are_modules_of_torch,
+):
+    """In dictionaries, lists and objects, also in a circle; that of most parameters comes first."""
     large = Network(("bfloat16", "cuda:0", 400))
     small = Network(("float32", "cpu", 6), ("float32", "cuda:0", 2))
-    body = SimpleNamespace(nets={"large": large}, behind=SimpleNamespace(heads=[small]))
+    policy = SimpleNamespace(nets={"large": large}, behind=SimpleNamespace(heads=[small]))
+    policy.itself = policy
 
-    body.itself = body
+    found = inference_facts(policy)
 
-    for policy, dtypes, devices in (
-        (body, ("bfloat16", "float32"), ("cuda:0", "cpu")),
-        (object(), (), ()),
-    ):
-        found = inference_facts(policy)
-        assert (found.dtypes, found.devices) == (dtypes, devices)
-        assert found.python.startswith("3.")
+    assert found.dtypes == ("bfloat16", "float32")
+    assert found.devices == ("cuda:0", "cpu")
+
+
+def test_of_a_policy_without_a_network_only_its_python_is_known(networks_are_modules_of_torch):
+    found = inference_facts(object())
+
+    assert (found.dtypes, found.devices) == ((), ())
+    assert found.python.startswith("3.")

@@ -18,7 +18,6 @@ from roboirg.analysis.measures.measure import ALL_TASKS
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.published import published_rows
 from roboirg.analysis.results.frame import make_frame
-from roboirg.core.failures import FAILURES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.records.record import Summary
 from roboirg.runs.plan.plan import Plan
@@ -43,13 +42,15 @@ PLAN = Plan(
 
 @functools.cache
 def results_of_two_policies() -> list[Summary]:
+    """Return results of which the forgetful policy loses all implicit ones, the listener none."""
     return [*played(PLAN)]
 
 
 def run_data(found: list[Summary] | None = None, **options: object) -> RunData:
-    return RunData(
-        make_frame([("run", results_of_two_policies() if found is None else found)], **options)
-    )  # type: ignore[arg-type]
+    """Return what figures are drawn from: these results, or those of the two policies."""
+    if found is None:
+        found = results_of_two_policies()
+    return RunData(make_frame([("run", found)], **options))
 
 
 def drawn_texts(figure: Figure) -> list[Text]:
@@ -65,13 +66,18 @@ def text_without_line_breaks(text: Text) -> str:
 
 
 def drawn_figure(name: str, found: RunData, *, published: bool = False) -> Figure:
+    """Return a figure that has something to show, next to the published rates or without them."""
     figure = draw_figure(name, found, published=published)
     assert figure is not None
     return figure
 
 
 def dot_positions(figure: Figure) -> dict[tuple[str, str], list[float]]:
-    """Reference and rate, or the rate alone, by panel and label of the row, in percent."""
+    """Return where the dots of each row stand, in percent, by panel and label of the row.
+
+    A row has two dots, the reference and the rate, or the rate alone, as in
+    ``{("direct", "listener"): [100.0, 50.0]}``.
+    """
     found: dict[tuple[str, str], list[float]] = {}
     for panel in figure.axes:
         labels = dict(zip(panel.get_yticks(), figure.axes[0].get_yticklabels(), strict=True))
@@ -86,20 +92,21 @@ def dot_positions(figure: Figure) -> dict[tuple[str, str], list[float]]:
 @pytest.mark.slow
 def test_wanted_figures_are_written_byte_for_byte_the_same_from_results_in_any_order(tmp_path):
     """Would find figures that change from run to run, so that a paper's cannot be made again."""
-    paths = write_figures(
-        run_data(planned=PLAN.jobs()), tmp_path / "a" / "b", ("gaps", "context", "failures")
-    )
+    first = tmp_path / "a" / "b"
+    paths = write_figures(run_data(planned=PLAN.jobs()), first, ("gaps", "context", "failures"))
+
+    turned = run_data(results_of_two_policies()[::-1], planned=PLAN.jobs())
+    again = write_figures(turned, tmp_path / "again", ["gaps"])
+
     # The third, context, needs results of several context lengths; there are none.
     assert {path.name for path in paths} == {
         f"{name}{ending}"
         for name in ("gaps", "failures")
         for ending in (".png", ".svg", ".pdf", "-dark.png", "-dark.svg")
     }
-
-    turned = run_data(results_of_two_policies()[::-1], planned=PLAN.jobs())
-    again = write_figures(turned, tmp_path / "again", ["gaps"])
-    for first, second in zip(sorted(paths)[-5:], sorted(again), strict=True):
-        assert first.read_bytes() == second.read_bytes(), first.name
+    assert len(again) == 5
+    for path in again:
+        assert path.read_bytes() == (first / path.name).read_bytes(), path.name
 
 
 def test_a_link_with_the_name_of_a_figure_is_replaced_and_its_target_stays(tmp_path):
@@ -124,9 +131,10 @@ CONDITIONS_BELOW_A_FIGURE = "Played on the test split, in our own words, with at
     ],
 )
 def test_a_figure_has_its_labels_its_counts_and_the_conditions_of_its_runs(name, shown):
-    texts = [
-        text_without_line_breaks(drawn) for drawn in drawn_texts(drawn_figure(name, run_data()))
-    ]
+    """Three episodes in each of two tasks were played."""
+    figure = drawn_figure(name, run_data())
+
+    texts = [text_without_line_breaks(text) for text in drawn_texts(figure)]
     assert {*shown} <= {*texts}
     assert CONDITIONS_BELOW_A_FIGURE in texts[0]
 
@@ -145,53 +153,63 @@ def bar_widths_by_color(panel: Axes) -> dict[str, float]:
 
 
 def test_each_part_of_a_bar_is_as_long_as_its_share_of_the_played_episodes(monkeypatch):
-    """Also parts too short for a number; would find one that is covered by the next."""
+    """Also parts too short for a number; would find one that is covered by the next.
+
+    A bar is a setting, with 6 episodes. The forgetful policy loses all in four settings, so its
+    bars add up to 400 %; the listener loses none. Two causes of failure may share a color.
+    """
     monkeypatch.setattr(failures, "MIN_LABELED_PERCENT", 20.0)
-    found = run_data(planned=PLAN.jobs())
-    failed = [
-        result.attribution.failure
+    colors = [
+        failures.COLORS[result.attribution.failure]
         for result in results_of_two_policies()
         if result.attribution is not None
     ]
 
-    listener, forgetful = (
-        bar_widths_by_color(panel) for panel in drawn_figure("failures", found).axes
-    )
+    figure = drawn_figure("failures", run_data(planned=PLAN.jobs()))
 
-    # The forgetful policy fails everywhere in four of its bars: 4 times 100 %. The other never.
+    listener, forgetful = (bar_widths_by_color(panel) for panel in figure.axes)
     assert sum(listener.values()) == 0
     assert sum(forgetful.values()) == pytest.approx(400)
-    for name, color in failures.COLORS.items():
-        assert forgetful.get(color, 0) == pytest.approx(100 * failed.count(name) / 6)
-    assert len({*failures.COLORS.values()}) == len(FAILURES) + 1
+    for color in failures.COLORS.values():
+        share = 100 * colors.count(color) / 6
+        assert forgetful.get(color, 0) == pytest.approx(share), color
 
 
-def test_drawn_gaps_are_those_of_the_tables_and_a_policy_that_lacks_a_trial_is_marked():
+def test_drawn_gaps_are_those_of_the_tables():
     """A dot for explicit, one for the implicit setting: their distance is the gap, in points."""
-    found = run_data(planned=[*PLAN.jobs(), replace(PLAN.jobs()[0], policy_seed=1)])
+    found = run_data()
 
     shown = dot_positions(drawn_figure("gaps", found))
 
+    assert {setting for setting, _ in shown} == {"direct", "reasoning", "contextual", "spatial"}
+    for policy_run, name in found.frame.names.items():
+        for (setting, label), (explicit, implicit) in shown.items():
+            if label.startswith(name):
+                gap = found.summaries[policy_run, ALL_TASKS, InstructionOptions(setting)].gap
+                assert implicit - explicit == pytest.approx(100 * gap.value), (setting, label)
+
+
+def test_a_policy_that_lacks_a_planned_trial_is_marked_as_incomplete():
+    """The listener has one more planned, with another policy seed."""
+    missing = replace(PLAN.jobs()[0], policy_seed=1)
+
+    shown = dot_positions(drawn_figure("gaps", run_data(planned=[*PLAN.jobs(), missing])))
+
     names = {label.partition(",")[0] for _, label in shown}
     assert names == {"listener (privileged) (incomplete)", "forgetful (privileged)"}
-    assert {setting for setting, _ in shown} == {"direct", "reasoning", "contextual", "spatial"}
-    runs = {name: policy_run for policy_run, name in found.frame.names.items()}
-    for (setting, label), (explicit, implicit) in shown.items():
-        (policy_run,) = [run for name, run in runs.items() if label.startswith(name)]
-        gap = found.summaries[policy_run, ALL_TASKS, InstructionOptions(setting)].gap
-        assert implicit - explicit == pytest.approx(100 * gap.value)
 
 
 @pytest.mark.parametrize(
     ("rate", "ends"),
     [
-        (Rate(0.5, None, Interval(0.25, 0.625)), [25, 62.5]),
-        (Rate(0.5, 0.75, Interval(-0.375, -0.125)), [37.5, 62.5]),
+        pytest.param(Rate(0.5, None, Interval(0.25, 0.625)), [25, 62.5], id="rate"),
+        pytest.param(Rate(0.5, 0.75, Interval(-0.375, -0.125)), [37.5, 62.5], id="difference"),
     ],
 )
 def test_an_interval_is_drawn_around_its_rate(rate, ends):
     """Of a difference to a reference, 0.75, it is added to the reference: 0.75 - 0.375 = 37.5 %."""
     figure = draw_rates({"direct": ""}, [RateRow("a", {"direct": rate})], WORDS["main"], [])
+
     assert [*figure.axes[0].lines[0].get_xdata()] == ends
 
 
@@ -216,8 +234,11 @@ def test_there_is_no_figure_of_gaps_without_results():
 
 def test_published_rows_stand_below_a_line_and_own_rates_that_differ_have_a_sign():
     """One episode of ours stands next to 50 times 3 of the paper's: marked ≠, with its n = 1."""
-    found = [result for result in like_published("main", "MemER") if result.task == "PickXtimes"]
-    first = next(result for result in found if (result.setting, result.episode) == ("direct", 0))
+    first = next(
+        result
+        for result in like_published("main", "MemER")
+        if (result.task, result.setting, result.episode) == ("PickXtimes", "direct", 0)
+    )
 
     figure = drawn_figure("gaps", run_data([first]), published=True)
 
@@ -228,7 +249,7 @@ def test_published_rows_stand_below_a_line_and_own_rates_that_differ_have_a_sign
 
     (line,) = (line for line in panel.lines if [*line.get_xdata()] == [0, 1])
     own, heading = panel.get_yticks()[:2]
-    assert own < line.get_ydata()[0] < heading  # type: ignore[index]
+    assert own < line.get_ydata()[0] < heading
 
     texts = [text_without_line_breaks(text) for text in drawn_texts(figure)]
     assert "≠ Implicit settings are not comparable with the published rates" in texts[0]
@@ -237,24 +258,28 @@ def test_published_rows_stand_below_a_line_and_own_rates_that_differ_have_a_sign
 
 def test_a_figure_without_published_rates_does_not_mention_them():
     found = [result for result in like_published("main", "MemER") if result.task == "PickXtimes"]
-    assert "published" not in text_without_line_breaks(
-        drawn_figure("gaps", run_data(found)).texts[0]
-    )
+
+    figure = drawn_figure("gaps", run_data(found))
+
+    assert "published" not in text_without_line_breaks(figure.texts[0])
 
 
 def test_rates_of_each_context_length_are_drawn_from_those_of_the_shortest():
-    """A context has up to five stages; the shortest has the first and the last, (1, 5)."""
+    """A context has up to five stages; the shortest has the first and the last, (1, 5).
+
+    Rows of our results, which have the rates of the paper but for rounding, have a count in their
+    labels, as in "MemER, n = 50".
+    """
     rates = {(row.model, row.options.stages): row.average for row in published_rows("context")}
 
-    shown = dot_positions(
-        drawn_figure("context", run_data(like_published("context")), published=True)
-    )
+    figure = drawn_figure("context", run_data(like_published("context")), published=True)
 
+    shown = dot_positions(figure)
     assert {title for title, _ in shown} == {"stages 1,2,5", "stages 1,2,3,5", "stages 1,2,3,4,5"}
     for (title, label), (shortest, rate) in shown.items():
-        model, _, own = label.partition(",")
+        model, _, own_count = label.partition(",")
         stages = tuple(map(int, title.removeprefix("stages ").split(",")))
-        near = 0.01 if own else 1e-9
+        near = 0.01 if own_count else 1e-9
         assert shortest == pytest.approx(float(rates[model, (1, 5)]), abs=near)
         assert rate == pytest.approx(float(rates[model, stages]), abs=near)
 
@@ -276,6 +301,7 @@ POLICIES_WITH_LONG_NAMES = (
 
 @pytest.mark.parametrize(("name", "count"), [("gaps", 5), ("context", 1), ("failures", 5)])
 def test_no_text_leaves_the_figure_or_lies_on_another(name, count):
+    """With long names of policies; two texts may touch by a pixel."""
     found = like_published("context") if name == "context" else results_of_two_policies()
     played = [result for result in found if result.policy in ("forgetful", "MemER")]
     many = []
@@ -287,28 +313,29 @@ def test_no_text_leaves_the_figure_or_lies_on_another(name, count):
     texts = drawn_texts(figure)
     assert any("NetWithA" in "".join(text.get_text().split()) for text in texts)
     boxes = {text: text.get_window_extent() for text in texts}
+    edge = figure.bbox
     for text, box in boxes.items():
-        assert figure.bbox.x0 <= min(box.x0, figure.bbox.x1 - box.x1), text
-        assert figure.bbox.y0 <= min(box.y0, figure.bbox.y1 - box.y1), text
+        assert edge.x0 <= box.x0 < box.x1 <= edge.x1, text
+        assert edge.y0 <= box.y0 < box.y1 <= edge.y1, text
     for (text, box), (other, other_box) in combinations(boxes.items(), 2):
         across = min(box.x1, other_box.x1) - max(box.x0, other_box.x0)
         down = min(box.y1, other_box.y1) - max(box.y0, other_box.y0)
         assert min(across, down) <= 1, (text, other)
 
 
-@pytest.mark.parametrize("kept", ["explicit", "direct"])
-def test_results_of_one_setting_are_drawn_as_rates_without_a_gap(kept):
-    found = run_data(
-        [
-            result
-            for result in results_of_two_policies()
-            if result.setting == kept and result.form == "implicit"
-        ]
-    )
-    shown = dot_positions(drawn_figure("gaps", found))
-    assert {title for title, _ in shown} == {kept}
-
-    own = [
-        found.summaries[key, ALL_TASKS, InstructionOptions(kept)].rate for key in found.frame.names
+@pytest.mark.parametrize(
+    ("setting", "rates"),
+    [("explicit", [[100], [100]]), ("direct", [[0], [100]])],
+)
+def test_results_of_one_setting_are_drawn_as_rates_without_a_gap(setting, rates):
+    """A dot for the forgetful policy, which wins explicit alone, and one for the listener."""
+    found = [
+        result
+        for result in results_of_two_policies()
+        if (result.setting, result.form) == (setting, "implicit")
     ]
-    assert [*shown.values()] == [[100 * float(rate)] for rate in own if rate is not None]
+
+    shown = dot_positions(drawn_figure("gaps", run_data(found)))
+
+    assert {title for title, _ in shown} == {setting}
+    assert [*shown.values()] == rates

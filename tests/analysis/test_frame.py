@@ -25,41 +25,52 @@ OUTCOMES = ("success", "failure", "error")
 
 
 @pytest.fixture(scope="module")
-def run_with_wins_losses_and_errors(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run_with_wins_losses_and_errors(tmp_path_factory):
     """Of each task and setting the first episode is won, the next lost; one is an error."""
     folder = tmp_path_factory.mktemp("runs") / "run"
     plan = make_plan("oracle", tasks="PickXtimes,StopCube", settings="all", episodes="4")
     found = [
-        make_record(job, OUTCOMES[job.episode], "why" if job.episode else None, video=None)  # type: ignore[arg-type]
+        make_record(job, OUTCOMES[job.episode], "why" if job.episode else None, video=None)
         for job in plan.jobs()
         if job.episode < 3
     ]
     return store(folder, found, plan).folder
 
 
-def test_each_column_of_the_results_has_the_type_it_declares_and_gaps_only_where_it_may(
-    run_with_wins_losses_and_errors,
-):
+TYPES_OF_KINDS = {
+    "text": "string",
+    "texts": "object",
+    "number": "Int64",
+    "decimal": "Float64",
+    "flag": "boolean",
+}
+"""What pandas calls the types of columns."""
+
+
+def test_each_column_of_the_results_has_the_type_it_declares(run_with_wins_losses_and_errors):
     found = roboirg.results(run_with_wins_losses_and_errors)
 
     declared = {**COLUMNS, **record_columns()}
     assert list(found) == list(declared)
+    for name, column in declared.items():
+        assert str(found[name].dtype) == TYPES_OF_KINDS[column.kind], name
+        if not column.missing:
+            assert found[name].notna().all(), name
 
-    types = found.dtypes.astype(str).to_dict()
-    assert {(column.kind, types[name]) for name, column in declared.items()} == {
-        ("text", "string"),
-        ("texts", "object"),
-        ("number", "Int64"),
-        ("decimal", "Float64"),
-        ("flag", "boolean"),
-    }
 
-    full = {name for name in found if found[name].notna().all()}
-    assert {name for name, column in declared.items() if not column.missing} <= full
+def test_the_results_have_a_row_for_each_played_episode_and_values_where_they_apply(
+    run_with_wins_losses_and_errors,
+):
+    """Three episodes of two tasks were played in five settings, but StopCube has no spatial one.
 
-    assert len(found) == 2 * 5 * 3 - 3, "what is planned has no row; StopCube has no spatial"
-    assert (found["success"].isna() == (found["outcome"] == "error")).all()
-    assert (found["error"].notna() == (found["outcome"] == "error")).all()
+    The fourth episode of each is planned and has no row.
+    """
+    found = roboirg.results(run_with_wins_losses_and_errors)
+
+    is_error = found["outcome"] == "error"
+    assert len(found) == 2 * 5 * 3 - 3
+    assert (found["success"].isna() == is_error).all()
+    assert (found["error"].notna() == is_error).all()
     assert (found["pattern"].notna() == (found["setting"] == "reasoning")).all()
     assert found["privileged"].all()
     assert set(found["suite"]) == {"counting"}
@@ -68,31 +79,44 @@ def test_each_column_of_the_results_has_the_type_it_declares_and_gaps_only_where
 def test_the_column_words_counts_the_words_of_all_turns_of_an_instruction(
     run_with_wins_losses_and_errors,
 ):
-    texts = []
+    words = 0
     for record in iterate_records(run_with_wins_losses_and_errors):
-        texts += [turn.text for turn in record.instruction]
-    assert roboirg.results(run_with_wins_losses_and_errors)["words"].sum() == len(
-        " ".join(texts).split()
-    )
+        for turn in record.instruction:
+            words += len(turn.text.split())
+
+    found = roboirg.results(run_with_wins_losses_and_errors)
+
+    assert found["words"].sum() == words
 
 
 def test_policies_are_named_without_version_and_ordered_as_planned():
-    """Two policies with a version each need none in their names; would find it added anyway."""
-    both = [make_result(policy=name, policy_version=name) for name in "ba"]
-    assert list(frame_of(both).names.values()) == ["a", "b"]
-    assert list(frame_of(both).names_as_played.values()) == ["b", "a"]
+    """Two policies with a version each need none in their names; would find it added anyway.
 
-    planned = [result.identity for result in both]
-    assert list(frame_of(both, planned=planned).names.values()) == ["b", "a"]
+    Without a plan they are in alphabetical order.
+    """
+    played = [make_result(policy=name, policy_version=name) for name in ("b", "a")]
+    planned = [result.identity for result in played]
+
+    without_plan = frame_of(played)
+    with_plan = frame_of(played, planned=planned)
+
+    assert list(without_plan.names.values()) == ["a", "b"]
+    assert list(without_plan.names_as_played.values()) == ["b", "a"]
+    assert list(with_plan.names.values()) == ["b", "a"]
 
 
 def test_rows_are_sorted_by_task_then_episode_then_seed():
     """In the order of the benchmark; unknown tasks come last."""
-    rows = [("StopCube", 0, 0), ("StopCube", 0, 1), ("StopCube", 1, 0), ("BinFill", 2, 0),
-            ("Another", 0, 0)]  # fmt: skip
-    found = [
-        make_result("success", at, task=task, policy_seed=seed) for task, at, seed in rows[::-1]
+    rows = [
+        ("StopCube", 0, 0),
+        ("StopCube", 0, 1),
+        ("StopCube", 1, 0),
+        ("BinFill", 2, 0),
+        ("Another", 0, 0),
     ]
+    found = []
+    for task, episode, seed in reversed(rows):
+        found.append(make_result("success", episode, task=task, policy_seed=seed))
 
     frame = frame_of(found)
 
@@ -101,14 +125,19 @@ def test_rows_are_sorted_by_task_then_episode_then_seed():
 
 def test_a_planned_episode_without_result_is_missing_for_the_first_version_that_played():
     """A policy played an episode as version b and one as a; the plan had three."""
-    two = [make_result("success", at, policy_version=name) for at, name in enumerate("ba")]
-    cells = cells_of(frame_of(two, planned=[make_result("success", 2).identity]))
-    missing = {key.policy_run.versions.policy_version: cell.missing for key, cell in cells.items()}
+    played = [
+        make_result("success", 0, policy_version="b"),
+        make_result("success", 1, policy_version="a"),
+    ]
+    planned = [make_result("success", 2).identity]
 
+    cells = cells_of(frame_of(played, planned=planned))
+
+    missing = {key.policy_run.versions.policy_version: cell.missing for key, cell in cells.items()}
     assert missing == {"a": 0, "b": 1}
 
 
-ANY_RESULTS = st.dictionaries(
+OUTCOMES_BY_TRIAL = st.dictionaries(
     st.tuples(
         st.sampled_from(["explicit", "direct"]),
         st.sampled_from(["PickXtimes", "BinFill"]),
@@ -117,10 +146,11 @@ ANY_RESULTS = st.dictionaries(
     ),
     st.sampled_from([*OUTCOMES, "missing"]),
 )
+"""Outcomes by setting, task, episode and policy seed."""
 
 
 @settings(max_examples=25)
-@given(ANY_RESULTS, st.randoms(use_true_random=False))
+@given(OUTCOMES_BY_TRIAL, st.randoms(use_true_random=False))
 def test_shuffled_results_in_two_runs_are_the_same_table_as_one_run_in_order(plays, random):
     """Two runs of one plan complete each other; what neither played is missing."""
     found = []
@@ -130,10 +160,10 @@ def test_shuffled_results_in_two_runs_are_the_same_table_as_one_run_in_order(pla
     planned = [result.identity for result in found]
     played = [result for result in found if result.outcome != "missing"]
     mixed = random.sample(played, len(played))
-    at = random.randint(0, len(mixed))
+    cut = random.randint(0, len(mixed))
 
     whole = make_frame([("whole", played)], planned)
-    parts = make_frame([("a", mixed[:at]), ("b", mixed[at:])], planned)
+    parts = make_frame([("a", mixed[:cut]), ("b", mixed[cut:])], planned)
 
     for name in ("run", "outcome", "options", "task", "episode"):
         assert list(parts[name]) == list(whole[name])
@@ -143,46 +173,59 @@ def test_shuffled_results_in_two_runs_are_the_same_table_as_one_run_in_order(pla
 
 def test_an_episode_played_in_two_runs_counts_in_each_under_a_name_of_its_own():
     """Won in run a and lost in run b: 1 and 0. Would find a mean of both under one name."""
-    both = [make_result(outcome, 0, started_at=outcome) for outcome in ("success", "failure")]
+    won = make_result("success", 0, started_at="first")
+    lost = make_result("failure", 0, started_at="second")
 
-    twice = make_frame([("a", both[:1]), ("none", []), ("b", both[1:])])
+    twice = make_frame([("a", [won]), ("none", []), ("b", [lost])])
 
     assert list(twice.names.values()) == ["listener, a", "listener, b"]
     assert [cell.rate for cell in cells_of(twice).values()] == [1, 0]
 
 
 def test_an_added_column_has_the_value_of_each_row_although_records_come_in_another_order():
-    both = [make_result(outcome, 0, started_at=outcome) for outcome in ("success", "failure")]
-    twice = make_frame([("a", both[:1]), ("b", both[1:])])
-    reads = {"cause": lambda record: record.outcome, "1": lambda _: 1, "true": lambda _: True}
+    won = make_result("success", 0, started_at="first")
+    lost = make_result("failure", 0, started_at="second")
+    frame = make_frame([("a", [won]), ("b", [lost])])
 
-    found = with_columns(twice, both[::-1], reads)
+    found = with_columns(frame, [lost, won], {"ended": lambda record: record.outcome})
 
-    assert list(found["cause"]) == ["success", "failure"]
-    assert [*map(repr, found["true"])] == ["True"] * 2, "equal values of two kinds are two"
+    assert list(found["ended"]) == ["success", "failure"]
+
+
+def test_added_columns_tell_equal_values_of_different_types_apart():
+    """1 == True; would find the flag stored as the number."""
+    result = make_result("success")
+    reads = {"number": lambda _: 1, "flag": lambda _: True}
+
+    found = with_columns(frame_of([result]), [result], reads)
+
+    assert found["flag"][0] is True
+    assert found["number"][0] is not True
 
 
 def test_a_planned_policy_without_a_result_has_a_row_with_its_missing_episode():
     frame = make_frame([], [make_result(policy="late").identity], run_name="mine")
-    ((key, cell),) = cells_of(frame).items()
-    expected = ("late", Versions(), "mine", 1)
 
-    assert (key.policy_run[0], *key.policy_run[2:4], cell.missing) == expected
+    ((key, cell),) = cells_of(frame).items()
+
+    policy, _, versions, run_name = key.policy_run[:4]
+    assert (policy, versions, run_name) == ("late", Versions(), "mine")
+    assert cell.missing == 1
 
 
 def test_the_documentation_lists_every_column_of_the_results():
     page = (Path(__file__).parents[2] / "docs" / "own-tables.md").read_text(encoding="utf-8")
-    rows = [
-        f"| `{column.name}` | {column.kind} | {column.meaning} | {column.missing or 'never'} |"
-        for column in (*COLUMNS.values(), *record_columns().values())
-    ]
-    assert "\n".join(rows) in page, "\n".join(rows)
+
+    for column in (*COLUMNS.values(), *record_columns().values()):
+        missing = column.missing or "never"
+        row = f"| `{column.name}` | {column.kind} | {column.meaning} | {missing} |"
+        assert row in page
 
 
 def test_a_run_that_is_named_several_times_is_opened_once_with_all_wanted_policies(
     tmp_path, monkeypatch
 ):
-    """A source is FOLDER or FOLDER:POLICY; a folder alone wants all of its policies.
+    """A source is FOLDER or FOLDER:POLICY; a folder alone wants all of its policies (None).
 
     Two spellings of a path are one folder; of "c:d:e" the folder is "c:d", as that exists.
     """

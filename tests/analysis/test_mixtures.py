@@ -21,12 +21,12 @@ DIFFERENCES_THAT_FORBID_A_COMPARISON = [
 ]
 TWO_DIGESTS_OF_WORDS = "PickXtimes/test@0a", "PickXtimes/test@1b"
 DIFFERENCES_OF_ONE_POLICY = [
-    ({"policy_version": "new"}, "Mixed versions of {}: new, unknown."),
+    ({"policy_version": "new"}, "Mixed versions of listener: new, unknown."),
     (
         {"policy_version": "new", "server_version": "8"},
-        "Mixed versions of {}: new (server 8), unknown.",
+        "Mixed versions of listener: new (server 8), unknown.",
     ),
-    ({"demonstration_frames": 5}, "Mixed demonstration frames of {}: 5, None."),
+    ({"demonstration_frames": 5}, "Mixed demonstration frames of listener: 5, None."),
 ]
 DIFFERENCES_THAT_ARE_POOLED = [
     ({"render_device": "H100"}, "Mixed render devices: H100, llvmpipe."),
@@ -38,38 +38,51 @@ DIFFERENCES_THAT_ARE_POOLED = [
 @pytest.mark.parametrize("policy", ["listener", "other"])
 @pytest.mark.parametrize(
     ("fields", "sentence"),
-    [
-        *DIFFERENCES_THAT_FORBID_A_COMPARISON,
-        *DIFFERENCES_OF_ONE_POLICY,
-        *DIFFERENCES_THAT_ARE_POOLED,
-    ],
+    [*DIFFERENCES_THAT_FORBID_A_COMPARISON, *DIFFERENCES_THAT_ARE_POOLED],
 )
 def test_each_difference_between_two_runs_is_named_in_one_sentence_below_the_table(
     policy, fields, sentence
 ):
-    """Whether the other run is of the same policy or of another one."""
-    runs = two_runs_that_differ_in(policy, fields)
-    expected = [sentence.format(policy)]
-    if "{}" in sentence and policy == "other":
-        expected = []  # of two policies each has its own
+    """Whether the other run is of the same policy, the listener, or of another one."""
+    assert notes_on_mixtures(two_runs_that_differ_in(policy, fields)) == [sentence]
 
+
+@pytest.mark.parametrize(("fields", "sentence"), DIFFERENCES_OF_ONE_POLICY)
+def test_a_difference_within_a_policy_is_named_and_one_between_two_policies_is_not(
+    fields, sentence
+):
+    """Of two policies each has its own version anyway."""
+    same_policy = two_runs_that_differ_in("listener", fields)
+    two_policies = two_runs_that_differ_in("other", fields)
+
+    assert notes_on_mixtures(same_policy) == [sentence]
+    assert notes_on_mixtures(two_policies) == []
+
+
+def notes_on_mixtures(runs):
+    """Return the first sentence of each note on what runs do not have in common.
+
+    These notes stand last below the table, which has a row for each name of a policy run.
+    """
+    frame = make_frame([*runs.items()])
     found = mixtures([*runs["a"], *runs["b"]])
 
-    assert [words.partition(". ")[0] + "." for words in found] == expected
-
-    frame = make_frame([*runs.items()])
     (table,) = with_mixtures([make_table("main", RunData(frame))], frame)
+
     assert list(table.notes[len(table.notes) - len(found) :]) == found
     assert len({row.name for row in table.rows}) == len(table.rows) == len(frame.names)
+    return [words.partition(". ")[0] + "." for words in found]
 
 
 def two_runs_that_differ_in(policy, fields):
-    """Return results of two runs that differ in some fields, and the second in its policy."""
+    """Return results of two runs: `a` of the listener, `b` of a policy and with other fields.
+
+    One result of `a` was not rendered, and what decides its verdict is not known: it fits all.
+    """
     usual = {"render_device": "llvmpipe", "verdict_code": "0a"}
     first = [make_result(episode=episode, **usual) for episode in range(2)]
     second = [make_result(episode=episode, policy=policy, **usual | fields) for episode in range(2)]
-    not_rendered = make_result(episode=2)  # and what decides verdicts is not known: fits all
-    return {"a": [*first, not_rendered], "b": second}
+    return {"a": [*first, make_result(episode=2)], "b": second}
 
 
 @pytest.mark.parametrize("fields", [fields for fields, _ in DIFFERENCES_THAT_FORBID_A_COMPARISON])
@@ -107,19 +120,20 @@ def test_a_change_of_code_is_not_reported_if_the_code_that_decides_verdicts_is_t
 
 
 def test_results_of_one_task_in_other_words_are_not_compared():
-    """Words are known by a digest for each task. In a table they are pooled, with a note."""
-    first, same_task = (make_result(words=words) for words in TWO_DIGESTS_OF_WORDS)
-    other_task = make_result(words="StopCube/test@2c", task="StopCube")
-
-    (sentence,) = mixtures([first, other_task, same_task])
+    """Words are known by a digest for each task; the refusal names both."""
+    first = make_result(words=TWO_DIGESTS_OF_WORDS[0])
+    second = make_result(words=TWO_DIGESTS_OF_WORDS[1])
+    (sentence,) = mixtures([first, second])
 
     with pytest.raises(InvalidValueError, match=sentence[:60]):
-        compare(frame_of([first]), frame_of([same_task]))
-    both = [
-        ("a", [first, other_task]),
-        ("b", [make_result(words=TWO_DIGESTS_OF_WORDS[1], episode=1)]),
-    ]
-    assert len(make_frame(both).names) == 1
+        compare(frame_of([first]), frame_of([second]))
+
+
+def test_results_of_one_task_in_other_words_are_pooled_in_a_table():
+    first = make_result(words=TWO_DIGESTS_OF_WORDS[0])
+    second = make_result(words=TWO_DIGESTS_OF_WORDS[1], episode=1)
+
+    assert len(make_frame([("a", [first]), ("b", [second])]).names) == 1
 
 
 def test_words_are_mixed_only_if_they_are_of_the_same_task_and_setting():
@@ -130,8 +144,18 @@ def test_words_are_mixed_only_if_they_are_of_the_same_task_and_setting():
 
     assert not mixtures([first, other_task, own_words])
 
-    (sentence,) = mixtures([own_words, make_result(words="PickXtimes/test/lab@4e")])
+
+def test_two_digests_of_the_words_of_a_setting_are_mixed():
+    first = make_result(words="PickXtimes/test/lab@3d", setting="lab")
+    second = make_result(words="PickXtimes/test/lab@4e")
+
+    (sentence,) = mixtures([first, second])
+
     assert sentence.startswith("Mixed words of a task and pool: PickXtimes/test/lab@3d, Pick")
 
+
+def test_words_of_a_file_are_reported_once_although_their_digest_differs_too():
+    first = make_result(words=TWO_DIGESTS_OF_WORDS[0])
     other_words = make_result(words=TWO_DIGESTS_OF_WORDS[1], wordings="mine@0a")
-    assert len(mixtures([first, other_words])) == 1, "that alone"
+
+    assert len(mixtures([first, other_words])) == 1

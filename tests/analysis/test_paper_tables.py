@@ -30,21 +30,23 @@ from roboirg.tasks import all_tasks
 @given(st.integers(1, 5000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
 def test_a_rate_is_rounded_half_up_to_two_decimals(counts):
     """As the paper's; would find 0.125 printed as 0.12, or rounding that is done twice."""
-    exact = 100 * Fraction(*counts)
-    printed = Fraction(percent(Fraction(*counts)))
-    assert Fraction(-1, 200) < printed - exact <= Fraction(1, 200)
-    assert str(percent(Fraction(*counts)))[-3] == "."
+    rate = Fraction(*counts)
 
-    # So are means of printed rates.
-    rate = percent(Fraction(*counts))
-    assert mean_percent([rate, more := rate + Decimal("0.01")]) == more
+    printed = percent(rate)
+
+    assert Fraction(-1, 200) < Fraction(printed) - 100 * rate <= Fraction(1, 200)
+    assert str(printed)[-3] == "."
+
+
+def test_the_mean_of_printed_rates_is_rounded_half_up_too():
+    assert mean_percent([Decimal("12.34"), Decimal("12.35")]) == Decimal("12.35")
 
 
 STORED_TABLE = Path(__file__).with_name("printed_main_table.md")
 
 
 def entries_of_row(table: Table, group: str, name: str | None = None, source: str = "ours"):
-    """Return the entries of a row by column."""
+    """Return the entries of the only such row by column; without a name, that of any policy."""
     (row,) = [
         row
         for row in table.rows
@@ -54,14 +56,15 @@ def entries_of_row(table: Table, group: str, name: str | None = None, source: st
 
 
 def results_of_all_tasks(policy: str = "a", settings=("explicit", "direct"), **fields) -> list:
-    """Two episodes of every task that has the setting, the first won."""
-    return [
-        make_result(outcome, episode, policy=policy, task=name, setting=setting, **fields)
-        for name, task in all_tasks().items()
-        for setting in settings
-        if setting in settings_of(task)
-        for episode, outcome in enumerate(("success", "failure"))
-    ]
+    """Return two episodes of every task that has the setting, the first won, the second lost."""
+    found = []
+    for name, task in all_tasks().items():
+        for setting in settings:
+            if setting in settings_of(task):
+                own = {"policy": policy, "task": name, "setting": setting, **fields}
+                found.append(make_result("success", 0, **own))
+                found.append(make_result("failure", 1, **own))
+    return found
 
 
 def table_of(which: str, *results: list, planned=(), **options) -> Table:
@@ -75,35 +78,24 @@ def test_a_rate_with_errors_or_missing_episodes_is_marked_and_has_no_change_to_e
     explicit; no policy played PickXtimes. What is of other options or tasks is named below.
     """
     settings = ("explicit", "direct", "spatial")
-    good, poor = (
-        [
-            result
-            for result in results_of_all_tasks(name, settings, split="val")
-            if result.task != "PickXtimes"
-        ]
-        for name in ("good", "poor")
-    )
-    good = [
-        replace(result, outcome="success")
-        if "BinFill" in result.task or "sp" in result.setting
-        else result
-        for result in good
+    good = []
+    for result in results_of_all_tasks("good", settings, split="val"):
+        wins = result.task == "BinFill" or result.setting == "spatial"
+        if result.task != "PickXtimes":
+            good.append(replace(result, outcome="success") if wins else result)
+    poor = [
+        result
+        for result in results_of_all_tasks("poor", settings, split="val")
+        if result.task != "PickXtimes"
     ]
     planned = [result.identity for result in (*good, *poor)]
     missing = ("StopCube", "explicit", 1)
     poor = [result for result in poor if (result.task, result.setting, result.episode) != missing]
+    of_poor = {"policy": "poor", "split": "val"}
     poor += [
-        make_result("error", 2, policy="poor", task="ButtonUnmask", setting="direct", split="val"),
-        make_result(
-            "failure",
-            0,
-            policy="poor",
-            task="BinFill",
-            setting="direct",
-            form="resolved",
-            split="val",
-        ),
-        make_result("failure", 0, policy="poor", task="Other", split="val"),
+        make_result("error", 2, task="ButtonUnmask", setting="direct", **of_poor),
+        make_result("failure", 0, task="BinFill", setting="direct", form="resolved", **of_poor),
+        make_result("failure", 0, task="Other", **of_poor),
     ]
 
     table = table_of("main", good, poor, planned=planned, floors=(CHANCE,))
@@ -113,115 +105,157 @@ def test_a_rate_with_errors_or_missing_episodes_is_marked_and_has_no_change_to_e
 
 def test_each_split_has_its_own_row_of_chance():
     """Chance depends on the scenes of a split; a mean over both would be true of neither."""
-    runs = {
-        split: make_results("1" * 9, "direct", split=split, task="BinFill")
-        for split in ("test", "val")
-    }
-    both = table_of("main", *runs.values(), floors=(CHANCE,))
-    found = []
+    test = make_results("1" * 9, "direct", split="test", task="BinFill")
+    val = make_results("1" * 9, "direct", split="val", task="BinFill")
 
-    for split, run in runs.items():
-        alone = entries_of_row(table_of("main", run, floors=(CHANCE,)), "direct", CHANCE, "chance")
-        own = entries_of_row(both, "direct", f"{CHANCE}, split {split}", "chance")
-        assert own["BinFill"].percent == alone["BinFill"].percent
-        found.append(own["BinFill"].percent)
+    both = table_of("main", test, val, floors=(CHANCE,))
 
-    assert found[0] != found[1]
+    rates = []
+    for split, results in (("test", test), ("val", val)):
+        alone = table_of("main", results, floors=(CHANCE,))
+        row = entries_of_row(both, "direct", f"{CHANCE}, split {split}", "chance")
+        row_alone = entries_of_row(alone, "direct", CHANCE, "chance")
+        assert row["BinFill"].percent == row_alone["BinFill"].percent
+        rates.append(row["BinFill"].percent)
+    assert rates[0] != rates[1]
 
 
-def test_tables_without_a_choice_are_those_for_which_a_run_has_something_to_compare():
-    """As *planner*, for planners next to other policies; *context*, for two context lengths."""
+def informative_tables(*results: list) -> set[str]:
+    """Return the names of the tables that are shown if none is asked for."""
+    data = RunData(frame_of(*results))
+    return {name for name in WHICH if is_informative(name, data)}
 
-    def wanted(*results: list) -> set[str]:
-        data = RunData(frame_of(*results))
-        return {name for name in WHICH if is_informative(name, data)}
 
-    two = [*results_of_all_tasks(), *results_of_all_tasks("b")]
+@pytest.mark.parametrize(
+    ("results", "tables"),
+    [
+        pytest.param([make_result(task="PutInBox")], {"real"}, id="task of the real robot"),
+        pytest.param([make_result(task="Outside")], {"other"}, id="task of another package"),
+        pytest.param(results_of_all_tasks(), {"main"}, id="a policy"),
+        pytest.param(
+            results_of_all_tasks(settings=("explicit", "contextual")), {"main"}, id="a length"
+        ),
+        pytest.param(
+            [make_result(arm="silent"), *results_of_all_tasks()], {"main"}, id="a control arm"
+        ),
+        pytest.param(
+            [
+                *results_of_all_tasks(settings=("contextual",)),
+                *results_of_all_tasks(settings=("contextual",), stages=(1, 5)),
+            ],
+            {"main", "context"},
+            id="two lengths of the context",
+        ),
+    ],
+)
+def test_tables_without_a_choice_are_those_for_which_a_run_has_something_to_compare(
+    results, tables
+):
+    assert informative_tables(results) == tables
+
+
+def test_the_table_of_planners_is_shown_if_a_planner_stands_next_to_another_policy():
+    """A planner is known by the hands that carry out its orders."""
+    policies = [*results_of_all_tasks(), *results_of_all_tasks("b")]
     planners = [
         with_version(result, "planner + scripted hands") for result in results_of_all_tasks()
     ]
-    contextual = results_of_all_tasks(settings=("contextual",))
-    short = results_of_all_tasks(settings=("contextual",), stages=(1, 5))
 
-    assert wanted(results_of_all_tasks(settings=("explicit", "contextual"))) == {"main"}
-    assert wanted(two) == {"main"}
-    assert wanted([planners[0], *two]) == {"main", "planner"}
-    assert wanted(planners) == {"main"}
-    assert wanted(contextual, short) == {"main", "context"}
-    assert wanted([make_result(task="PutInBox")]) == {"real"}
-    assert wanted([make_result(task="Outside")]) == {"other"}
-    assert wanted([make_result(arm="silent"), *two]) == {"main"}
+    assert informative_tables(policies) == {"main"}
+    assert informative_tables(planners) == {"main"}
+    assert informative_tables(planners, policies) == {"main", "planner"}
 
 
 LONG_POLICY_NAME = "a_package.with_a_long_name.policies:" + "Net" * 40
 
 
-@pytest.mark.parametrize(
-    ("name", "width", "parts"),
-    [
-        ("a", 400, 1),
-        ("a", 120, 3),
-        ("a", 72, 6),
-        ("a", 45, 15),
-        (LONG_POLICY_NAME, 200, None),
-        (LONG_POLICY_NAME, 60, None),
-    ],
-)
-def test_a_table_wider_than_the_terminal_is_drawn_in_parts_without_losing_a_rate_or_name(
-    name, width, parts
-):
-    table = table_of("main", results_of_all_tasks(name))
-    texts = []
-    for terminal in (True, False):
-        console = Console(
-            file=io.StringIO(), width=width, force_terminal=terminal, color_system=None
-        )
-        console.print(renderable(table, console))
-        texts.append(console.file.getvalue())
+def drawn_table(table: Table, width: int, *, in_terminal: bool) -> str:
+    """Return a table as it is drawn in so many characters, in a terminal or into a file."""
+    console = Console(
+        file=io.StringIO(), width=width, force_terminal=in_terminal, color_system=None
+    )
+    console.print(renderable(table, console))
+    return console.file.getvalue()
 
-    folded, written = texts
 
-    assert parts in (None, folded.count("Success by task and setting"))
+@pytest.mark.parametrize(("width", "parts"), [(400, 1), (120, 3), (72, 6), (45, 15)])
+def test_a_table_wider_than_the_terminal_is_drawn_in_parts_without_losing_a_rate(width, parts):
+    """In two settings all rates are 50.00."""
+    table = table_of("main", results_of_all_tasks())
+
+    text = drawn_table(table, width, in_terminal=True)
+
+    assert text.count("Success by task and setting") == parts
+    assert text.count("50.00") == 2 * len(table.columns)
+    assert "…" not in text
+
+
+@pytest.mark.parametrize("width", [200, 60])
+def test_a_long_name_is_folded_in_a_terminal_and_whole_in_a_file(width):
+    """Without all that may stand between its parts, the terminal has the whole name, too."""
+    table = table_of("main", results_of_all_tasks(LONG_POLICY_NAME))
+
+    folded = drawn_table(table, width, in_terminal=True)
+    written = drawn_table(table, width, in_terminal=False)
+
+    assert LONG_POLICY_NAME in re.sub(r"\d+\.\d+|[^\w.:]|explicit|direct", "", folded)
     assert folded.count("50.00") == 2 * len(table.columns)
-    # In terminals names are folded; in files lines are as long as they need.
-    assert name in re.sub(r"\d+\.\d+|[^\w.:]|explicit|direct", "", folded)
-    assert name in written
+    assert LONG_POLICY_NAME in written
     assert "…" not in folded + written
 
 
+def test_a_task_of_which_nothing_was_played_has_no_column_in_the_terminal():
+    console = Console(file=io.StringIO(), width=400)
+    explicit = make_results("10", policy="a", task="PickXtimes")
+    direct = make_results("10", "direct", policy="a", task="PickXtimes")
+
+    console.print(renderable(table_of("main", explicit, direct), console))
+
+    drawn = console.file.getvalue()
+    assert "PickXtimes" in drawn
+    assert "StopCube" not in drawn
+
+
 def test_csv_has_a_line_for_each_rate_with_the_counts_behind_it():
+    """Of three episodes of BinFill one is won, one lost, and one an error."""
     error = make_results("--!", "direct", policy="a", task="BinFill")
     table = table_of("main", results_of_all_tasks(), error)
-    lines = list(csv.DictReader(io.StringIO(get_format("csv").draw(table))))
-    assert len(lines) == sum(len(row.entries) for row in table.rows)
 
+    lines = list(csv.DictReader(io.StringIO(get_format("csv").draw(table))))
+
+    assert len(lines) == sum(len(row.entries) for row in table.rows)
     (line,) = [line for line in lines if (line["group"], line["column"]) == ("direct", "BinFill")]
     counts = {"successes": "1", "trials": "2", "episodes": "2", "errors": "1", "missing": "0"}
     assert line.items() >= {"incomplete": "errors", **counts}.items()
 
 
-def test_a_task_that_the_paper_lacks_has_a_table_of_its_own_and_is_not_in_the_papers():
-    of_task = {"policy": "a", "task": "Outside"}
-    outside = [*make_results("1", **of_task), *make_results("1", "direct", **of_task)]
-    table = table_of("other", results_of_all_tasks(), outside, published=True)
+def test_a_task_that_the_paper_lacks_has_a_table_of_its_own():
+    explicit = make_results("1", policy="a", task="Outside")
+    direct = make_results("1", "direct", policy="a", task="Outside")
+
+    table = table_of("other", results_of_all_tasks(), explicit, direct, published=True)
+
     assert [column.name for column in table.columns] == ["Outside", "Avg"]
     assert str(entries_of_row(table, "direct")["Outside"]) == "100.00 →0.00"
 
-    main = table_of("main", results_of_all_tasks(), outside)
-    assert main.rows == table_of("main", results_of_all_tasks()).rows
+
+def test_a_task_that_the_paper_lacks_is_not_in_the_papers_table():
+    outside = make_results("1", policy="a", task="Outside")
+
+    with_it = table_of("main", results_of_all_tasks(), outside)
+
+    assert with_it.rows == table_of("main", results_of_all_tasks()).rows
 
 
 def test_results_in_simulation_are_marked_and_kept_apart_from_those_of_a_real_robot():
     """PutInBox is a task of the real study; its simulated copy is called the twin."""
-    table = table_of(
-        "real",
-        [make_result("success", task="PutInBox", privileged=True)],
-        [make_result("failure", task="PutInBox", privileged=True, robot="a robot")],
-        published=True,
-    )
-    ours = {row.name: row.entries[0].text for row in table.rows if row.source == "ours"}
+    simulated = make_result("success", task="PutInBox", privileged=True)
+    real = make_result("failure", task="PutInBox", privileged=True, robot="a robot")
 
-    assert ours == {
+    table = table_of("real", [simulated], [real], published=True)
+
+    rates = {row.name: row.entries[0].text for row in table.rows if row.source == "ours"}
+    assert rates == {
         "listener (privileged) (twin)": "100.00",
         "listener, on a robot (privileged)": "0.00",
     }

@@ -12,7 +12,7 @@ from roboirg.analysis.results.frame import make_frame
 from roboirg.analysis.tables.subgoal_table import make_subgoal_table
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.subgoal_text import UNKNOWN_WORDS
-from roboirg.records.record import Attribution, Job, Record, SubgoalRecord
+from roboirg.records.record import Attribution, Job, SubgoalRecord
 
 TOOK_THE_WRONG_THING = Attribution(
     kind="grounding", failure="wrong_object", sentence="It took another one."
@@ -24,7 +24,8 @@ MEANING_OF_THE_ACT_IS_UNCLEAR = Attribution(
 
 
 @pytest.fixture(scope="module")
-def failed_record_of_a_planner() -> Record:
+def failed_record_of_a_planner():
+    """A record that still lacks subgoals and the cause of the failure."""
     options = InstructionOptions("explicit")
     job = Job(policy="random", task="PickXtimes", split="test", episode=0, options=options)
     record = make_record(job, "failure", "no")
@@ -34,10 +35,10 @@ def failed_record_of_a_planner() -> Record:
 @pytest.mark.parametrize(
     ("verdicts", "attribution", "named"),
     [
-        ("right", TOOK_THE_WRONG_THING, "wrong thing"),
-        ("wrong_place", MEANING_OF_THE_ACT_IS_UNCLEAR, "wrong place"),
-        ("wrong_place wrong_count right", None, "wrong count"),
-        ("right", None, "hands"),
+        (["right"], TOOK_THE_WRONG_THING, "wrong thing"),
+        (["wrong_place"], MEANING_OF_THE_ACT_IS_UNCLEAR, "wrong place"),
+        (["wrong_place", "wrong_count", "right"], None, "wrong count"),
+        (["right"], None, "hands"),
     ],
 )
 def test_a_planners_failure_is_named_by_the_wrong_act_or_else_by_its_last_wrong_subgoal(
@@ -47,19 +48,24 @@ def test_a_planners_failure_is_named_by_the_wrong_act_or_else_by_its_last_wrong_
 
     If all were right, the hands that carried them out failed.
     """
-    said = [
-        SubgoalRecord(step=5, text="pick it up", verdict=verdict) for verdict in verdicts.split()
-    ]
+    subgoals = tuple(
+        SubgoalRecord(step=5, text="pick it up", verdict=verdict) for verdict in verdicts
+    )
     record = replace(
-        failed_record_of_a_planner, steps=9, subgoals=tuple(said), attribution=attribution
+        failed_record_of_a_planner, steps=9, subgoals=subgoals, attribution=attribution
     )
 
     assert planner_failure(record) == named
-    assert planner_failure(replace(record, policy_metadata={}, subgoals=())) is None
+
+
+def test_a_failure_of_a_policy_that_is_no_planner_has_no_such_name(failed_record_of_a_planner):
+    record = replace(failed_record_of_a_planner, policy_metadata={}, subgoals=())
+
+    assert planner_failure(record) is None
 
 
 @pytest.mark.parametrize(
-    ("ended", "why", "ago", "named"),
+    ("ended", "why", "steps_since", "named"),
     [
         ("refused", UNKNOWN_WORDS, 9, "unreadable"),
         ("refused", "it fits two things", 9, "refused"),
@@ -70,21 +76,22 @@ def test_a_planners_failure_is_named_by_the_wrong_act_or_else_by_its_last_wrong_
     ],
 )
 def test_an_episode_without_an_end_is_named_by_what_became_of_the_last_subgoal(
-    failed_record_of_a_planner, ended, why, ago, named
+    failed_record_of_a_planner, ended, why, steps_since, named
 ):
-    """`ago` are the steps since then. Replies that could not be read before it do not matter."""
-    steps = failed_record_of_a_planner.environment.max_steps
-    said = SubgoalRecord(
-        step=steps - ago, text="pick up the cube", verdict="right", ended=ended, why=why
-    )
-    usage = {"unparsed": 2.0}
+    """The episode ran into the step limit, so many steps after the last subgoal was given.
 
+    Replies that could not be read before it, here two, do not matter.
+    """
+    limit = failed_record_of_a_planner.environment.max_steps
+    subgoal = SubgoalRecord(
+        step=limit - steps_since, text="pick up the cube", verdict="right", ended=ended, why=why
+    )
     record = replace(
         failed_record_of_a_planner,
-        steps=steps,
-        subgoals=(said,),
+        steps=limit,
+        subgoals=(subgoal,),
         attribution=TOOK_THE_WRONG_THING,
-        usage=usage,
+        usage={"unparsed": 2.0},
     )
 
     assert planner_failure(record) == named

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -78,7 +77,10 @@ USUAL_CONDITIONS = ResultConditions(
 
 @st.composite
 def conditions_that_nearly_agree(draw: st.DrawFn) -> list[ResultConditions]:
-    """Words that differ from others in one or two things, so that they could be taken together."""
+    """Draw conditions of which each differs from the one before in one or two things.
+
+    So they could be taken for each other: two that differ in the split alone, for example.
+    """
     found = [
         draw(st.sampled_from([USUAL_CONDITIONS, USUAL_CONDITIONS._replace(setting="explicit")]))
     ]
@@ -89,7 +91,10 @@ def conditions_that_nearly_agree(draw: st.DrawFn) -> list[ResultConditions]:
 
 
 def numbers_in_table(table: Table, *names: str) -> Iterator[float]:
-    """Yield the numbers of a table in some columns, or in all, without what is behind them."""
+    """Yield the numbers of a table in some columns, or in all.
+
+    Of an entry such as ``−33 (≠) 2…`` this is -33.0; empty entries and dashes have none.
+    """
     for row in table.rows:
         for column, entry in zip(table.columns, row.entries, strict=True):
             word = entry.text.split(" ")[0].replace("−", "-").lstrip("±")
@@ -130,7 +135,7 @@ def results_of(data: RunData) -> Results:
 
 @settings(max_examples=60, deadline=None)
 @given(conditions_that_nearly_agree(), st.data())
-def test_no_printed_rate_mixes_episodes_of_different_conditions(told, data):
+def test_no_printed_rate_mixes_episodes_of_different_conditions(conditions, data):
     """Conditions are policy, words, split, step limit and the like.
 
     Episodes of the same conditions all end alike here: every honest rate is 0 or 100 %, and one
@@ -138,8 +143,8 @@ def test_no_printed_rate_mixes_episodes_of_different_conditions(told, data):
     """
     places = st.lists(st.tuples(st.sampled_from(TASKS), st.integers(0, 2)), min_size=1, unique=True)
     results = []
-    for words in told:
-        fields = words._asdict()
+    for condition in conditions:
+        fields = condition._asdict()
         fields["prompt_verdict"] = data.draw(st.sampled_from(["heard", "cut"]))
         outcome = data.draw(st.sampled_from(["success", "failure"]))
         for task, episode in data.draw(places):
@@ -148,8 +153,9 @@ def test_no_printed_rate_mixes_episodes_of_different_conditions(told, data):
 
     assert {abs(rate) for rate in all_rates_of(frame)} <= {0, 100}
 
-    in_full = [words for words in told if words.arm == "told"]
-    assert len(results_of(RunData(frame)).rates()) == len(in_full or told), "none hides another one"
+    with_instruction = [condition for condition in conditions if condition.arm == "told"]
+    rates = results_of(RunData(frame)).rates()
+    assert len(rates) == len(with_instruction or conditions), "none hides another one"
 
     by = data.draw(st.lists(st.sampled_from([*KEPT_APART, "setting"]), unique=True))
     with contextlib.suppress(InvalidValueError):  # refused
@@ -158,11 +164,11 @@ def test_no_printed_rate_mixes_episodes_of_different_conditions(told, data):
 
 def test_the_rate_over_tasks_is_the_same_in_the_terminal_on_the_page_and_in_python():
     """9 of 10 episodes of a task and 1 of 2 of another: a mean of 70 %, not 10 of 12."""
-    results = [*make_results("0111111111"), *make_results("01", task="BinFill", policy_seed=1)]
-    frame = frame_of(results)
-    data = RunData(frame)
+    first_task = make_results("0111111111")
+    second_task = make_results("01", task="BinFill", policy_seed=1)
+    data = RunData(frame_of(first_task, second_task))
 
-    (table,) = make_run_tables(frame)
+    (table,) = make_run_tables(data.frame)
     (whole,) = (summary for key, summary in data.summaries.items() if key.scope == ALL_TASKS)
 
     assert [*numbers_in_table(table)][-1] == 70
@@ -171,13 +177,14 @@ def test_the_rate_over_tasks_is_the_same_in_the_terminal_on_the_page_and_in_pyth
 
 
 def intervals_of(measured: Measured) -> Iterator[Interval | None]:
+    """Yield the intervals of a rate, of that beside it, and of the gaps between them."""
     yield from (measured.interval, measured.other_interval)
     for gap in (measured.gap, measured.second_gap):
         if gap is not None:
             yield from (gap.interval, gap.retention_interval)
 
 
-ANY_OUTCOMES = st.dictionaries(
+OUTCOMES_BY_CONDITIONS = st.dictionaries(
     st.tuples(
         st.sampled_from(["listener", "other"]),
         st.sampled_from(["PickXtimes", "BinFill", "VideoUnmask"]),
@@ -194,10 +201,10 @@ ANY_OUTCOMES = st.dictionaries(
 
 
 @settings(max_examples=150, deadline=None)
-@given(ANY_OUTCOMES)
-def test_no_printed_interval_has_a_width_of_zero(tables):
+@given(OUTCOMES_BY_CONDITIONS)
+def test_no_printed_interval_has_a_width_of_zero(outcomes):
     """From too few episodes there is none. Would find a rate that looks certain."""
-    frame = frame_of_tables(tables)
+    frame = frame_with_outcomes(outcomes)
     data = RunData(frame)
     measured = [*data.summaries.values(), *arm_figures(frame)]
     measured += break_down(frame, BREAKDOWNS["difficulty"])
@@ -212,37 +219,58 @@ def test_no_printed_interval_has_a_width_of_zero(tables):
         found.append(headline and headline.interval)
 
     for interval in found:
-        assert interval is None or interval.low < interval.high
-        assert interval is None or not any(map(math.isnan, interval))
+        if interval is not None:
+            assert interval.low < interval.high  # nor is one of them no number
 
 
 @settings(max_examples=150, deadline=None)
-@given(ANY_OUTCOMES)
-def test_a_rate_or_gap_without_an_interval_is_printed_with_the_reason(tables):
-    frame = frame_of_tables(tables)
+@given(OUTCOMES_BY_CONDITIONS)
+def test_a_gap_in_a_breakdown_has_the_ends_of_its_interval_or_the_reason_why_there_is_none(
+    outcomes,
+):
+    """A row may have the ends "−12.0 to +3.4" or too few episodes for them; without a gap, "–"."""
+    table = make_breakdown_table(BREAKDOWNS["difficulty"], frame_with_outcomes(outcomes))
 
-    table = make_breakdown_table(BREAKDOWNS["difficulty"], frame)
     for row in table.rows:
         *_, gap, ends, _ = row.entries
-        assert (gap.text == "–") == (ends.text == "–")
-        assert (" to " in ends.text) + (ends.text == TOO_FEW) + (ends.text == "–") == 1
-    for summary in RunData(frame).summaries.values():
-        lacks = summary.rate is not None and summary.interval is None
-        assert lacks == (TOO_FEW in cell_notes(summary, ""))
+        if gap.text == "–":
+            assert ends.text == "–"
+        else:
+            assert " to " in ends.text or ends.text == TOO_FEW
 
+
+@settings(max_examples=150, deadline=None)
+@given(OUTCOMES_BY_CONDITIONS)
+def test_a_cell_of_the_page_says_if_its_rate_has_too_few_episodes_for_an_interval(outcomes):
+    data = RunData(frame_with_outcomes(outcomes))
+
+    for summary in data.summaries.values():
+        lacks_interval = summary.rate is not None and summary.interval is None
+        assert (TOO_FEW in cell_notes(summary, "")) == lacks_interval
+
+
+@settings(max_examples=150, deadline=None)
+@given(OUTCOMES_BY_CONDITIONS)
+def test_a_sentence_of_a_comparison_has_an_interval_or_the_reason_why_there_is_none(outcomes):
+    frame = frame_with_outcomes(outcomes)
     try:
         comparison = compare(frame.where(policy="listener"), frame.where(policy="other"))
     except InvalidValueError:
-        return  # nothing in common
+        return  # no episode in common
+
     for sentence in sentences(comparison, "listener", "other"):
         if " points" in sentence and "p = " in sentence:
             assert ("95 % interval" in sentence) != (TOO_FEW in sentence)
 
 
-def frame_of_tables(tables: Mapping[tuple, str]) -> Frame:
-    """Return the results whose outcomes are in these tables."""
+def frame_with_outcomes(outcomes: Mapping[tuple, str]) -> Frame:
+    """Return the results with these outcomes, of which each letter is an episode.
+
+    ``{("listener", "BinFill", "direct", "implicit", "told", 0): "10!"}`` are three: won, lost, and
+    an error.
+    """
     results: list[Summary] = []
-    for (policy, task, setting, form, arm, seed), letters in tables.items():
+    for (policy, task, setting, form, arm, seed), letters in outcomes.items():
         words = {"policy": policy, "task": task, "setting": setting, "form": form, "arm": arm}
         results += make_results(letters, policy_seed=seed, **words)
     return frame_of(results)

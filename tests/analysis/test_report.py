@@ -36,9 +36,17 @@ PLAN_OF_ONE_TASK = PLAN.model_copy(update={"tasks": ("PickXtimes",), "forms": ("
 
 
 class Page:
-    """The parts of a page."""
+    """The parts of a page.
 
-    def __init__(self, text: str) -> None:
+    Attributes:
+        scripts: the content of each script that holds data, by its id.
+        data: what all episodes need; texts are numbers, places in its list of strings.
+        details: what each episode needs once it is opened, in the order of the records.
+        text: the markup without scripts.
+        notes: the warnings at the top.
+    """
+
+    def __init__(self, text):
         scripts = re.findall(r'<script type="[^"]*" id="([^"]*)">(.*?)</script>', text, re.DOTALL)
         self.scripts = dict(scripts)
         self.data: dict[str, Any] = json.loads(self.scripts["data"])
@@ -46,17 +54,21 @@ class Page:
         self.text = unescape(re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL))
         self.notes = " ".join(re.findall(r'<li class="\w+"><b>\w+:</b> .*</li>', self.text))
 
-    def string(self, place: int) -> str:
+    def string(self, place):
+        """Return the text for which a number stands."""
         return str(self.data["strings"][place])
 
 
 def records_with_an_error_last() -> list[Record]:
-    """The last is an error."""
+    """Return the records of one task: the forgetful policy fails where it must remember.
+
+    The last one is an error, with markup in its texts.
+    """
     *found, last = played(PLAN_OF_ONE_TASK)
     return [*found, broken(last)]
 
 
-def written_film(folder: Path, name: str = "x") -> str:
+def written_film(folder, name="x"):
     """Write a video into a run, and return its path there."""
     (folder / "videos").mkdir(parents=True, exist_ok=True)
     for suffix in ("mp4", "jpg"):
@@ -64,57 +76,90 @@ def written_film(folder: Path, name: str = "x") -> str:
     return f"videos/{name}.mp4"
 
 
-def test_the_page_loads_nothing_from_elsewhere_and_text_of_records_cannot_end_its_script():
-    """The cause of the last record has "</script>" in it; would find a page open to an attack."""
+def test_the_page_loads_nothing_from_elsewhere():
     text = render(records_with_an_error_last(), PLAN_OF_ONE_TASK)
+
     assert not re.search(r"https?:|@import|url\(", text)
     assert "default-src 'none'" in text
+
+
+def test_text_of_records_cannot_end_the_script_of_the_page():
+    """The cause of the last record has "</script><b>" in it; would find a way to attack readers."""
+    records = records_with_an_error_last()
+
+    text = render(records, PLAN_OF_ONE_TASK)
+
     assert "</script><b>" not in text
-    assert broken(records_with_an_error_last()[0]).cause in Page(text).data["strings"]
-    # Nor does the order of the file matter.
-    assert render(records_with_an_error_last()[::-1], PLAN_OF_ONE_TASK) == text
+    assert records[-1].cause in Page(text).data["strings"]
+
+
+def test_the_page_does_not_depend_on_the_order_of_the_records():
+    records = records_with_an_error_last()
+
+    assert render(records[::-1], PLAN_OF_ONE_TASK) == render(records, PLAN_OF_ONE_TASK)
 
 
 def test_an_episode_shows_its_instruction_with_references_spelled_out():
-    """This *resolved* form is made anew if it was not played; mentions are marked where they stand.
+    """This *resolved* form is made anew if it was not played.
 
     Would find the words of another goal of the same scene.
     """
     plan = PLAN_OF_ONE_TASK.model_copy(update={"forms": PLAN.forms, "arms": ("told", "other-goal")})
-    found = [record for record in played(plan) if record.setting != "explicit"]
-    implicit = [record for record in found if record.form == "implicit"]
-    resolved = [record for record in found if record.form == "resolved"]
-    texts = [" ".join(turn.text for turn in record.instruction) for record in resolved]
+    implicit = []
+    resolved_texts = []
+    for record in played(plan):
+        if record.form == "resolved":
+            resolved_texts.append(" ".join(turn.text for turn in record.instruction))
+        elif record.setting != "explicit":
+            implicit.append(record)
 
     page = Page(render(implicit))
 
-    assert sorted(page.string(detail["resolved"]) for detail in page.details) == sorted(texts)
-    details = dict(zip(page.data["columns"]["key"], page.details, strict=True))
-    for record in implicit:
-        detail = details[record.slug.rpartition("-")[2]]
+    shown = [page.string(detail["resolved"]) for detail in page.details]
+    assert sorted(shown) == sorted(resolved_texts)
+
+
+def test_an_episode_shows_where_in_its_instruction_mentions_stand():
+    """A mention is a span of an utterance, such as [0, 5, 7] for *it* in "Grab it."."""
+    records = {record.slug.rpartition("-")[2]: record for record in played(PLAN_OF_ONE_TASK)}
+
+    page = Page(render([*records.values()]))
+
+    for key, detail in zip(page.data["columns"]["key"], page.details, strict=True):
         shown = [mention[:3] for mention in detail["mentions"]]
-        spans = [[mention.utterance, mention.start, mention.end] for mention in record.mentions]
-        assert shown == spans
+        mentions = records[key].mentions
+        assert shown == [[mention.utterance, mention.start, mention.end] for mention in mentions]
 
 
-def test_records_of_other_versions_or_unknown_tasks_are_shown_without_what_cannot_be_derived():
+@pytest.mark.parametrize(
+    ("changes", "missing"),
+    [
+        ({}, set()),
+        ({"language_version": "0.1"}, {"resolved"}),
+        ({"environment_version": 9}, {"resolved", "stages"}),
+    ],
+)
+def test_records_of_other_versions_are_shown_without_what_cannot_be_derived(changes, missing):
     """Another version of the language may have other words, of the environment other stages."""
-    usual = next(record for record in records_with_an_error_last() if record.setting == "direct")
+    record = next(record for record in records_with_an_error_last() if record.setting == "direct")
+
+    page = Page(render([replace(record, **changes)]))
+
+    assert {"resolved", "stages"} - page.details[0].keys() == missing
+
+
+def test_a_record_of_an_unknown_task_is_shown_with_its_events():
+    record = next(record for record in records_with_an_error_last() if record.setting == "direct")
     turn = UtteranceRecord(stage="command", text="Do it.")
     mention = MentionSpan(
         utterance=0, start=3, end=5, role="anaphor", expression="it", slot="x", value=1
     )
 
-    unknown = replace(usual, task="Homemade", instruction=(turn,), mentions=(mention,))
+    page = Page(
+        render([replace(record, task="Homemade", instruction=(turn,), mentions=(mention,))])
+    )
 
-    for record, missing in (
-        (usual, set()),
-        (replace(usual, language_version="0.1"), {"resolved"}),
-        (replace(usual, environment_version=9), {"resolved", "stages"}),
-        (unknown, {"resolved", "stages"}),
-    ):
-        page = Page(render([record]))
-        assert {"resolved", "stages"} - page.details[0].keys() == missing
+    assert not {"resolved", "stages"} & page.details[0].keys()
     assert page.string(page.details[0]["events"][-1][1]) == "took cube green off target"
 
 
@@ -130,17 +175,32 @@ def test_events_tell_equal_cubes_apart_by_number_and_leave_out_what_ends_by_itse
     assert acts == ["picked up the red cube (1)"]
 
 
-def test_missing_episodes_errors_and_a_single_policy_are_named_at_the_top_of_the_page():
-    found = records_with_an_error_last()
-    page = Page(render([*found[:-6], found[-1]], PLAN_OF_ONE_TASK))
-    assert f"Incomplete: 5 of {len(found)} planned" in page.notes
-    assert f"1 of {len(found) - 5} episodes ended in an error (1 policy)" in page.notes
+def test_missing_episodes_and_errors_are_named_at_the_top_of_the_page():
+    """Five records before the last, which is an error, are lost."""
+    records = records_with_an_error_last()
+    kept = [*records[:-6], records[-1]]
 
+    page = Page(render(kept, PLAN_OF_ONE_TASK))
+
+    assert f"Incomplete: 5 of {len(records)} planned" in page.notes
+    assert f"1 of {len(kept)} episodes ended in an error (1 policy)" in page.notes
     cells = page.data["matrix"]["levels"][0]["cells"]
     assert sum(cell.get("missing", 0) for cell in cells) == 5
-    assert Page(render(found[:-1])).notes == ""
 
-    lost = [replace(record, outcome="failure") for record in found if record.policy == "listener"]
+
+def test_a_complete_run_of_two_policies_has_no_note():
+    without_error = records_with_an_error_last()[:-1]
+
+    assert Page(render(without_error)).notes == ""
+
+
+def test_a_run_of_a_single_policy_that_fails_everywhere_is_named_at_the_top_of_the_page():
+    lost = [
+        replace(record, outcome="failure")
+        for record in records_with_an_error_last()
+        if record.policy == "listener"
+    ]
+
     assert "Only one policy" in Page(render(lost)).notes
 
 
@@ -191,8 +251,18 @@ def test_cells_choices_and_details_are_as_stored(snapshot, monkeypatch):
     assert re.sub(r"language \S+, environment \d+", "", shown) == snapshot
 
 
+def texts_of_goals(**fields):
+    """Return how the page shows the true goal of a failed record, and the one understood."""
+    failed = next(record for record in records_with_an_error_last() if record.attribution)
+    page = EpisodeDetails(Path(), embeds=False)
+    details = page.details_of(replace(failed, **fields))
+    texts = list(page.strings)
+    understood = texts[details["named"]] if "named" in details else None
+    return texts[details["goal"]], understood
+
+
 @pytest.mark.parametrize(
-    ("understood", "goal"),
+    ("understood", "text"),
     [
         ({"color": "red", "repeats": 1}, "red, once"),
         ({"color": "green", "repeats": 3}, "green, 3 times"),
@@ -204,95 +274,131 @@ def test_cells_choices_and_details_are_as_stored(snapshot, monkeypatch):
     ],
 )
 def test_a_failed_episode_shows_the_goal_that_the_policy_understood_next_to_the_true_one(
-    understood, goal
+    understood, text
 ):
-    """Of a planner, the last subgoal up to the failure; of an episode that succeeded, nothing."""
-    first = next(record for record in records_with_an_error_last() if record.attribution)
-    said = tuple(
+    shown = texts_of_goals(policy_metadata={"understood": understood})
+
+    assert shown == ("green, 3 times", text)
+
+
+@pytest.mark.parametrize(
+    ("outcome", "text"), [("failure", "“dance”; due was “pick it up”"), ("success", None)]
+)
+def test_a_failed_episode_of_a_planner_shows_its_last_subgoal_up_to_the_failure(outcome, text):
+    """It failed at step 60. An episode that succeeded shows none."""
+    subgoals = tuple(
         SubgoalRecord(step=step, text=text, due="pick it up", verdict="lost")
-        for step, text in ((51, "sing"), (60, "dance"), (61, "rest"))  # it failed at step 60
+        for step, text in ((51, "sing"), (60, "dance"), (61, "rest"))
     )
-    for fields, expected in (
-        ({"policy_metadata": {"understood": understood}}, goal),
-        ({"subgoals": said}, "“dance”; due was “pick it up”"),
-        ({"subgoals": said, "outcome": "success"}, None),
-    ):
-        page = EpisodeDetails(Path(), embeds=False)
-        details = page.details_of(replace(first, **fields))
-        texts = [*page.strings, None]
-        assert texts[details["goal"]] == "green, 3 times"
-        assert texts[details.get("named", -1)] == expected
+
+    shown = texts_of_goals(subgoals=subgoals, outcome=outcome)
+
+    assert shown == ("green, 3 times", text)
 
 
 def test_the_same_policy_with_other_words_is_shown_as_another_with_a_warning():
     """ "mine@1a" are words of another file; spelled-out references exist in our own words only."""
-    first = next(record for record in records_with_an_error_last() if record.setting == "direct")
-    page = Page(render([first, first.with_options(wordings="mine@1a")]))
+    ours = next(record for record in records_with_an_error_last() if record.setting == "direct")
+    theirs = ours.with_options(wordings="mine@1a")
+
+    page = Page(render([ours, theirs]))
+
     assert "Mixed words: our own words, the words of mine@1a." in page.notes
     assert page.data["matrix"]["policies"] == [
         "listener, the words of mine@1a (privileged)",
         "listener, our own words (privileged)",
     ]
-
-    theirs, ours = page.details
-    assert "resolved" in ours
-    assert "resolved" not in theirs  # it can be derived in our own words only
-    assert "in the words of mine@1a" in page.string(theirs["conditions"])
+    details_of_theirs, details_of_ours = page.details
+    assert "resolved" in details_of_ours
+    assert "resolved" not in details_of_theirs
+    assert "in the words of mine@1a" in page.string(details_of_theirs["conditions"])
 
 
 def test_two_policies_are_paired_on_a_scene_only_with_equal_words_seed_and_split():
-    """Two results agree in all, four differ in seed, arm, form or split: one pair, four alone."""
+    """Two results agree in all, four differ in seed, arm, form or split: one pair, four alone.
+
+    The one of another split is of another scene.
+    """
     first, theirs = (
         record
         for record in records_with_an_error_last()
         if (record.setting, record.episode) == ("direct", 0)
     )
     others = [
-        replace(first, policy_seed=1), replace(first, arm="silent"),
-        first.with_options(form="resolved"), replace(first, split="val", difficulty="odd"),
-    ]  # fmt: skip
+        replace(first, policy_seed=1),
+        replace(first, arm="silent"),
+        first.with_options(form="resolved"),
+        replace(first, split="val", difficulty="odd"),
+    ]
+
     page = Page(render([first, theirs, *others]))
-    pairs, scenes = (Counter(page.data["columns"][name]) for name in ("pair", "scene"))
 
-    assert sorted(pairs.values()) == [1, 1, 1, 1, 2]
-    assert sorted(scenes.values()) == [1, 5]
-
+    sizes_of_pairs = Counter(page.data["columns"]["pair"]).values()
+    sizes_of_scenes = Counter(page.data["columns"]["scene"]).values()
+    assert sorted(sizes_of_pairs) == [1, 1, 1, 1, 2]
+    assert sorted(sizes_of_scenes) == [1, 5]
     choices = {choice["name"]: choice["values"] for choice in page.data["choices"]}
     assert choices["difficulty"] == [first.difficulty, "odd"]
-    assert len(page.data["comparisons"]) == 3, "of the three policy runs that were told"
+    assert len(page.data["comparisons"]) == 3, "of the three policy runs with instructions"
 
 
-def test_small_videos_are_stored_in_the_page_and_large_ones_are_linked(tmp_path, monkeypatch):
-    """The film has 4 bytes, its picture 4: 8 fit, 7 do not. A lost film has its reason."""
+@pytest.fixture
+def filmed_run(tmp_path):
+    """A run of two records. The film of one has 4 bytes, its picture 4; that of the other is lost.
+
+    The title picture of a video is shown before it plays.
+    """
     first, second, *_ = records_with_an_error_last()
     filmed = replace(first, video=written_film(tmp_path, "a-b"))
     lost = replace(second, video="videos/gone.mp4", video_error="no room")
-    run = store(tmp_path, [filmed, lost])
+    return store(tmp_path, [filmed, lost])
+
+
+def test_videos_that_fit_are_stored_in_the_page(filmed_run, monkeypatch):
     monkeypatch.setattr(report, "MAX_EMBEDDED_BYTES", 8)
 
-    page = Page(write_report(run).read_text())
-    key = filmed.slug.rpartition("-")[2]
-    assert page.scripts[f"film-{key}"] == "data:video/mp4;base64,ZmlsbQ=="
-    assert page.scripts[f"poster-{key}"] == "data:image/jpeg;base64,ZmlsbQ=="
+    page = Page(write_report(filmed_run).read_text())
+
+    (film,) = (name for name in page.scripts if name.startswith("film-"))
+    assert page.scripts[film] == "data:video/mp4;base64,ZmlsbQ=="
+    assert page.scripts[film.replace("film", "poster")] == "data:image/jpeg;base64,ZmlsbQ=="
     assert [details.get("film") for details in page.details] == ["#", None]
     assert page.string(page.details[1]["lost"]) == "no room"
-    without = write_report(run, videos=False).read_text()
-    assert not [name for name in Page(without).scripts if name.startswith("film")]
 
+
+def test_a_page_may_be_asked_to_store_no_videos(filmed_run):
+    page = Page(write_report(filmed_run, videos=False).read_text())
+
+    assert not [name for name in page.scripts if name.startswith("film")]
+
+
+@pytest.mark.parametrize(
+    ("options", "folder"),
+    [({"served": True}, "videos"), ({"out": "pages/a.html"}, "../videos")],
+)
+def test_videos_that_do_not_fit_are_linked_from_where_the_page_is(
+    filmed_run, monkeypatch, options, folder
+):
     monkeypatch.setattr(report, "MAX_EMBEDDED_BYTES", 7)
-    elsewhere = tmp_path / "pages" / "a.html"
-    for text, before in (
-        (write_report(run, served=True).read_text(), ""),
-        (write_report(run, out=elsewhere).read_text(), "../"),
-    ):
-        page = Page(text)
-        assert page.details[0]["film"] == f"{before}videos/a-b.mp4"
-        assert page.details[0]["poster"] == f"{before}videos/a-b.jpg"
-        assert "plays them from the folder" in page.text
-    # The files of a pack are gone when it is closed.
-    packed = Page(write_report(Source(tmp_path / "a.roboirg.zip", tmp_path)).read_text())
-    assert "film" not in packed.details[0]
-    assert "plays them from the folder" not in packed.text
+    if "out" in options:
+        options = {"out": filmed_run.folder / options["out"]}
+
+    page = Page(write_report(filmed_run, **options).read_text())
+
+    assert page.details[0]["film"] == f"{folder}/a-b.mp4"
+    assert page.details[0]["poster"] == f"{folder}/a-b.jpg"
+    assert "plays them from the folder" in page.text
+
+
+def test_videos_of_a_pack_that_do_not_fit_are_not_linked(filmed_run, monkeypatch):
+    """The files of a pack are gone when it is closed."""
+    monkeypatch.setattr(report, "MAX_EMBEDDED_BYTES", 7)
+    pack = Source(filmed_run.folder / "a.roboirg.zip", filmed_run.folder)
+
+    page = Page(write_report(pack).read_text())
+
+    assert "film" not in page.details[0]
+    assert "plays them from the folder" not in page.text
 
 
 def test_a_page_of_two_runs_compares_their_policies_and_finds_the_videos_of_both(tmp_path):

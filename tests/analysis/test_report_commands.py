@@ -16,7 +16,10 @@ from roboirg.runs.plan.plan_maker import make_plan
 
 
 def write_run(folder: Path, policies: tuple[str, ...], device: str | None = None) -> Path:
-    """The listener succeeds always, others in explicit only."""
+    """Write the records of 8 episodes of two tasks in two settings, and return the folder.
+
+    The listener wins all, others explicit episodes alone.
+    """
     plan = make_plan(
         policies, tasks="PickXtimes,StopCube", settings="explicit,direct", episodes="8"
     )
@@ -25,76 +28,92 @@ def write_run(folder: Path, policies: tuple[str, ...], device: str | None = None
 
 
 @pytest.fixture(scope="module")
-def run_of_two_policies(tmp_path_factory) -> Path:
+def run_of_two_policies(tmp_path_factory):
     return write_run(tmp_path_factory.mktemp("runs") / "folder-run", ("listener", "forgetful"))
 
 
 @pytest.fixture(scope="module")
-def pack_of_the_run(run_of_two_policies: Path) -> Path:
+def pack_of_the_run(run_of_two_policies):
     pack_run(run_of_two_policies, path := run_of_two_policies.parent / "shipped.roboirg.zip")
     return path
 
 
 def test_tables_out_writes_a_file_for_each_table_into_a_new_folder(run_of_two_policies, tmp_path):
+    """And prints their paths."""
     out = tmp_path / "new" / "tables"
+
     printed = call(
         "tables", run_of_two_policies, "--format", "latex", "--out", out, "--published"
     ).split()
-    names = ["coverage.tex", "main.tex", "planner.tex", "context.tex", "real.tex"]
-    assert sorted(printed) == sorted(map(str, out.iterdir())) == sorted(str(out / n) for n in names)
 
-    call("tables", "--format", "latex", "--out", out, "--published", "--which", "context")
-    assert "29.11" in (out / "context.tex").read_text()
+    names = {path.name for path in out.iterdir()}
+    assert names == {"coverage.tex", "main.tex", "planner.tex", "context.tex", "real.tex"}
+    assert sorted(printed) == sorted(map(str, out.iterdir()))
+
+
+def test_published_tables_need_no_run(tmp_path):
+    words = ("--format", "latex", "--out", tmp_path, "--published", "--which", "context")
+
+    call("tables", *words)
+
+    assert "29.11" in (tmp_path / "context.tex").read_text()
     assert "coverage,ours" in call("tables", "--which", "coverage", "--format", "csv")
 
 
 def test_several_tables_in_json_or_csv_are_one_document_that_pandas_reads(run_of_two_policies):
-    """Would find two documents one after the other, of which a reader takes the first."""
+    """Would find two documents one after the other, of which a reader takes the first.
+
+    CSV has a line for each of the five columns of a row.
+    """
     pandas = pytest.importorskip("pandas")
     words = ("tables", run_of_two_policies, "--by", "difficulty,slots", "--format")
+
     rows = pandas.read_json(io.StringIO(call(*words, "json")))
     lines = pandas.read_csv(io.StringIO(call(*words, "csv")), na_values="–")
 
     assert set(rows["table"]) == set(lines["table"]) == {"by_difficulty", "by_slots"}
-
+    assert len(lines) == 5 * len(rows)
     gaps = lines[lines["column"] == "gap"]["word"].dropna().astype(float)
     assert gaps.min() == -100.0
-    assert len(rows) == len(lines) / 5, "of each row five columns"
 
 
-def test_commands_print_the_same_of_a_packed_run_as_of_its_folder(
-    run_of_two_policies, pack_of_the_run, tmp_path
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--format", "csv"),
+        ("--by", "difficulty", "--format", "json"),
+        ("--which", "facts", "--format", "markdown"),
+        ("--which", "failures", "--format", "markdown"),
+    ],
+)
+def test_tables_of_a_packed_run_are_those_of_its_folder(
+    run_of_two_policies, pack_of_the_run, options
 ):
-    for words in (
-        ("tables", "--format", "csv"),
-        ("tables", "--by", "difficulty", "--format", "json"),
-        ("tables", "--which", "facts", "--format", "markdown"),
-        ("tables", "--which", "failures", "--format", "markdown"),
-    ):
-        assert call(*words, pack_of_the_run) == call(*words, run_of_two_policies).replace(
-            str(run_of_two_policies), str(pack_of_the_run)
-        )
+    """But for the path, which the facts have."""
+    of_folder = call("tables", *options, run_of_two_policies)
+    of_pack = call("tables", *options, pack_of_the_run)
 
-    sides = call(
-        "compare",
-        f"{pack_of_the_run}:listener",
-        f"{run_of_two_policies}:forgetful",
-        "--by",
-        "difficulty",
-    )
-    assert sides == call(
-        "compare",
-        f"{run_of_two_policies}:listener",
-        f"{pack_of_the_run}:forgetful",
-        "--by",
-        "difficulty",
-    )
-    assert "direct: listener (privileged) is better, +100.0 points" in sides
+    assert of_pack == of_folder.replace(str(run_of_two_policies), str(pack_of_the_run))
 
-    drawn = call(
-        "figures", pack_of_the_run, "--published", "--which", "gaps", "--out", tmp_path
-    ).splitlines()
-    assert [Path(path).name for path in drawn][:2] == ["gaps.png", "gaps.svg"]
+
+def test_policies_of_a_pack_and_of_a_folder_are_compared_alike(
+    run_of_two_policies, pack_of_the_run
+):
+    listener_of_pack = call(
+        "compare", f"{pack_of_the_run}:listener", f"{run_of_two_policies}:forgetful"
+    )
+    listener_of_folder = call(
+        "compare", f"{run_of_two_policies}:listener", f"{pack_of_the_run}:forgetful"
+    )
+
+    assert listener_of_pack == listener_of_folder
+    assert "direct: listener (privileged) is better, +100.0 points" in listener_of_pack
+
+
+def test_figures_of_a_pack_are_drawn_and_their_paths_printed(pack_of_the_run, tmp_path):
+    printed = call("figures", pack_of_the_run, "--published", "--which", "gaps", "--out", tmp_path)
+
+    assert [Path(path).name for path in printed.splitlines()][:2] == ["gaps.png", "gaps.svg"]
 
 
 def test_report_writes_the_page_into_the_run_next_to_a_pack_or_to_out(
@@ -118,49 +137,48 @@ def test_report_writes_the_page_into_the_run_next_to_a_pack_or_to_out(
     assert "<title>shipped:listener against folder-run" in both
 
 
-def test_run_colon_policy_shows_the_results_of_that_policy_alone(
+def test_run_colon_policy_shows_the_results_of_that_policy_alone(run_of_two_policies):
+    options = ("--which", "main", "--format", "csv")
+    head, *rows = call("tables", run_of_two_policies, *options).splitlines()
+
+    forgetful = call("tables", f"{run_of_two_policies}:forgetful", *options)
+
+    assert forgetful.splitlines() == [head, *(row for row in rows if "forgetful" in row)]
+
+
+def test_two_policies_named_apart_are_shown_as_their_whole_run_is(
     run_of_two_policies, pack_of_the_run
 ):
-    csv = ("--which", "main", "--format", "csv")
-    whole = call("tables", run_of_two_policies, *csv)
-    (head, *rows) = whole.splitlines()
-    one = call("tables", f"{run_of_two_policies}:forgetful", *csv)
+    """Both of one run, and one of a folder with one of its pack."""
+    options = ("--which", "main", "--format", "csv")
+    forgetful = f"{run_of_two_policies}:forgetful"
+    whole = call("tables", run_of_two_policies, *options)
 
-    assert one.splitlines() == [head, *(row for row in rows if "forgetful" in row)]
-    assert (
-        call(
-            "tables",
-            f"{run_of_two_policies}:forgetful",
-            f"{run_of_two_policies}:listener",
-            run_of_two_policies,
-            *csv,
-        )
-        == whole
-    )
+    both = call("tables", forgetful, f"{run_of_two_policies}:listener", *options)
+    with_pack = call("tables", forgetful, f"{pack_of_the_run}:listener", *options)
 
-    other = call("tables", f"{run_of_two_policies}:forgetful", f"{pack_of_the_run}:listener", *csv)
-    assert sorted(other.splitlines()) == sorted(whole.splitlines())
+    assert both == whole
+    assert sorted(with_pack.splitlines()) == sorted(whole.splitlines())
 
 
-def test_every_command_warns_of_runs_that_were_rendered_on_different_devices(
-    run_of_two_policies, tmp_path
-):
-    devices = ("llvmpipe", "NVIDIA H100")
-    runs = [
-        write_run(tmp_path / name, (name,), device=device)
-        for name, device in zip(("listener", "forgetful"), devices, strict=True)
-    ]
-
+def test_every_command_warns_of_runs_that_were_rendered_on_different_devices(tmp_path):
+    first = write_run(tmp_path / "listener", ("listener",), device="llvmpipe")
+    second = write_run(tmp_path / "forgetful", ("forgetful",), device="NVIDIA H100")
     merged = tmp_path / "merged"
 
     for words in (
-        ("records", "merge", *runs, "--out", merged),
-        ("tables", *runs),
-        ("compare", *runs),
+        ("records", "merge", first, second, "--out", merged),
+        ("tables", first, second),
+        ("compare", first, second),
         ("report", merged),
     ):
         assert "Mixed render devices: NVIDIA H100, llvmpipe. Their pictures" in call(*words)
-    assert "Mixed" not in call("tables", runs[0], run_of_two_policies)
+
+
+def test_a_run_whose_device_is_not_known_fits_any_other(run_of_two_policies, tmp_path):
+    run = write_run(tmp_path / "listener", ("listener",), device="llvmpipe")
+
+    assert "Mixed" not in call("tables", run, run_of_two_policies)
 
 
 @pytest.mark.parametrize(

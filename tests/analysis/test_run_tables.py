@@ -208,6 +208,15 @@ def test_the_first_ten_failures_are_listed_and_the_others_counted():
     assert failure_text(silent) == "PickXtimes test/0 explicit (silent): late"
 
 
+def test_what_a_model_named_instead_of_the_goal_follows_the_cause_of_the_failure():
+    """Of a model that never answers, *not done after 1300 steps* is not the reason."""
+    named = "Understood red, twice; meant green, once."
+    for failure, end in (("misunderstood", f". {named}"), ("dropped", "")):
+        found = Attribution(kind="grounding", failure=failure, sentence=named)
+        (result,) = play("0", cause="late", attribution=found)
+        assert failure_text(result) == f"PickXtimes test/0 explicit: late{end}"
+
+
 def test_a_rate_is_green_from_75_percent_and_red_below_50():
     """3 of 4, 2 of 3 and 1 of 3 are won."""
     tables = [make_run_tables(frame_of(play(outcomes)))[0] for outcomes in ("1110", "110", "100")]

@@ -12,7 +12,6 @@ import roboirg
 from roboirg.analysis.run_results import Results
 from roboirg.api import python_run
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
-from roboirg.records.record import Job, Record
 from roboirg.records.store import RECORDS_FILE, read_records
 from roboirg.runs.plan.stored_plans import read_plan
 
@@ -23,11 +22,11 @@ class Still:
     cameras = ()
     version = "1"
 
-    def __init__(self, reach: float = 1.0) -> None:
+    def __init__(self, reach=1.0):
         self.reach = reach
         self.instructions: list[str] = []
 
-    def reset(self, instruction, demonstration) -> None:
+    def reset(self, instruction, demonstration):
         self.instructions.append(instruction)
 
     def act(self, observation):
@@ -35,10 +34,10 @@ class Still:
 
 
 @pytest.fixture
-def episodes_decided_by_setting(monkeypatch: pytest.MonkeyPatch) -> None:
+def episodes_decided_by_setting(monkeypatch):
     """Episodes are decided by their setting."""
 
-    def play(job: Job) -> Record:
+    def play(job):
         if job.policy != "forgetful" or job.setting == "explicit":
             return make_record(job, "success")
         return make_record(job, "failure", "wrong")
@@ -49,71 +48,92 @@ def episodes_decided_by_setting(monkeypatch: pytest.MonkeyPatch) -> None:
 THREE_EPISODES = {"tasks": "PickXtimes", "episodes": 3, "workers": 0, "progress": False}
 
 
-def test_evaluate_returns_the_rates_tables_and_comparisons_of_its_records(
-    episodes_decided_by_setting, tmp_path
-):
-    """Nothing is played: the listener wins all, the forgetful policy explicit episodes alone.
+@pytest.fixture
+def results_of_two_policies(episodes_decided_by_setting, tmp_path):
+    """Two policies, three episodes, three tellings (explicit has no resolved form).
 
-    Two policies, three episodes, three tellings (explicit has no resolved form).
+    The listener wins all, the forgetful policy explicit episodes alone.
     """
-    results = roboirg.evaluate(
+    return roboirg.evaluate(
         ["listener", "forgetful"], settings=("explicit", "direct"), forms=["implicit", "resolved"],
         out=tmp_path, **THREE_EPISODES,
     )  # fmt: skip
+
+
+def test_evaluate_returns_the_records_and_rates_of_its_episodes(results_of_two_policies, tmp_path):
+    results = results_of_two_policies
+
     assert results.records == read_records(tmp_path)
-    assert (len(results.records), results.errors, results.missing) == (2 * 3 * 3, 0, 0)
+    assert (len(results.records), results.errors, results.missing) == (18, 0, 0)
     assert results.rates() == {
-        (policy, setting): float(policy == "listener" or setting == "explicit")
-        for policy in ("listener", "forgetful")
-        for setting in ("explicit", "direct", "direct (resolved)")
+        ("listener", "explicit"): 1.0,
+        ("listener", "direct"): 1.0,
+        ("listener", "direct (resolved)"): 1.0,
+        ("forgetful", "explicit"): 1.0,
+        ("forgetful", "direct"): 0.0,
+        ("forgetful", "direct (resolved)"): 0.0,
     }
     assert results.frame.equals(roboirg.results(tmp_path))
+
+
+def test_results_of_evaluate_are_printed_as_tables_and_comparisons(results_of_two_policies):
+    """The last two are what a notebook and an interactive session show."""
+    results = results_of_two_policies
+
     assert "listener" in results.table(published=True)
     assert results.table("main", "latex").startswith("% needs")
     assert "direct: no clear difference, +100.0 points" in results.compare("listener", "forgetful")
     assert results._repr_markdown_().startswith("### Success by task and setting")
     assert "forgetful explicit: 100.0 %" in repr(results)
-    with pytest.raises(UnknownNameError):
-        results.compare("listener", "nobody")
 
-    # Of a run that lost its last two records, these are missing.
+
+def test_a_comparison_with_a_policy_that_has_no_results_is_refused(results_of_two_policies):
+    with pytest.raises(UnknownNameError):
+        results_of_two_policies.compare("listener", "nobody")
+
+
+def test_episodes_that_a_run_planned_and_lost_are_missing_in_its_results(
+    results_of_two_policies, tmp_path
+):
+    """The last two of 18 records."""
     *lines, _, _ = (tmp_path / RECORDS_FILE).read_text().splitlines(keepends=True)
     (tmp_path / RECORDS_FILE).write_text("".join(lines))
-    cut = Results(tmp_path)
-    assert (len(cut.frame), cut.errors, cut.missing) == (2 * 3 * 3 - 2, 0, 2)
+
+    results = Results(tmp_path)
+
+    assert (len(results.frame), results.errors, results.missing) == (16, 0, 2)
 
 
 def test_results_of_evaluate_are_drawn_saved_and_written_as_a_page(
-    episodes_decided_by_setting, tmp_path
+    results_of_two_policies, tmp_path
 ):
-    results = roboirg.evaluate(
-        "listener",
-        settings="explicit,direct",
-        forms="implicit,resolved",
-        out=tmp_path,
-        **THREE_EPISODES,
-    )
-    assert results.plot("gaps")._repr_png_().startswith(b"\x89PNG")
-    assert results.report().read_text().startswith("<!doctype html>")
+    results = results_of_two_policies
 
     results.plot("gaps", published=True).save(tmp_path / "a.svg")
+
+    assert results.plot("gaps")._repr_png_().startswith(b"\x89PNG")
     assert "<!-- MemER -->" in (tmp_path / "a.svg").read_text()
+    assert results.report().read_text().startswith("<!doctype html>")
     with pytest.raises(InvalidValueError, match="nothing to draw for 'context'"):
         results.plot("context")
 
 
-def test_evaluate_goes_on_in_the_folder_it_is_given_and_else_makes_a_new_one(
+def test_evaluate_goes_on_in_the_folder_it_is_given(episodes_decided_by_setting, tmp_path):
+    """Three episodes in explicit, then in all five settings: 15 records, none twice."""
+    roboirg.evaluate("oracle", settings="explicit", out=tmp_path, **THREE_EPISODES)
+    roboirg.evaluate("oracle", settings="all", out=tmp_path, **THREE_EPISODES)
+
+    assert len(read_records(tmp_path)) == 3 * 5
+
+
+def test_evaluate_makes_a_new_folder_if_it_is_given_none(
     episodes_decided_by_setting, tmp_path, monkeypatch
 ):
-    """Three episodes in explicit, then in all five settings: 15 records, none twice."""
     monkeypatch.chdir(tmp_path)
-    for settings in ("explicit", "all"):
-        roboirg.evaluate("oracle", settings=settings, out="kept", **THREE_EPISODES)
-    assert len(read_records(tmp_path / "kept")) == 3 * 5
 
-    first, second = (
-        roboirg.evaluate("oracle", settings="explicit", **THREE_EPISODES) for _ in range(2)
-    )
+    first = roboirg.evaluate("oracle", settings="explicit", **THREE_EPISODES)
+    second = roboirg.evaluate("oracle", settings="explicit", **THREE_EPISODES)
+
     assert first.folder.parent == second.folder.parent == tmp_path / "runs"
     assert first.folder != second.folder
 
@@ -121,25 +141,35 @@ def test_evaluate_goes_on_in_the_folder_it_is_given_and_else_makes_a_new_one(
 def test_a_policy_given_as_class_or_object_plays_in_this_process_with_a_warning(
     episodes_decided_by_setting, tmp_path, capsys
 ):
-    given = Still(reach=0.5)
     options = {**THREE_EPISODES, "out": tmp_path, "progress": True}
-    results = roboirg.evaluate({"mine": given, "class": Still}, **options)
-    assert read_plan(tmp_path).hosting.policy_process == "shared"
-    assert {record.policy for record in results.records} == {"mine", "class"}
 
-    heard = capsys.readouterr().err
-    assert "No other process has mine: all episodes are played in this one" in heard
-    for policy, options, words in (
-        (given, {"workers": 2}, "exists in this process only"),
-        ([Still(), Still], {}, "same name"),
-        (object(), {}, "has no method"),
-    ):
-        with pytest.raises(InvalidValueError, match=words):
-            roboirg.evaluate(policy, out=tmp_path, **{**THREE_EPISODES, **options})
+    results = roboirg.evaluate({"mine": Still(reach=0.5), "class": Still}, **options)
+
+    assert {record.policy for record in results.records} == {"mine", "class"}
+    assert read_plan(tmp_path).hosting.policy_process == "shared"
+    warning = capsys.readouterr().err
+    assert "No other process has mine: all episodes are played in this one" in warning
+
+
+@pytest.mark.parametrize(
+    ("policy", "workers", "reason"),
+    [
+        (Still(), 2, "exists in this process only"),
+        ([Still(), Still], 0, "same name"),
+        (object(), 0, "has no method"),
+    ],
+)
+def test_a_policy_given_as_class_or_object_that_cannot_be_played_is_refused(
+    tmp_path, policy, workers, reason
+):
+    options = {**THREE_EPISODES, "workers": workers}
+
+    with pytest.raises(InvalidValueError, match=reason):
+        roboirg.evaluate(policy, out=tmp_path, **options)
 
 
 class StillWithAttach(Still):
-    def attach(self, env) -> None:
+    def attach(self, env):
         pass
 
 
@@ -164,29 +194,39 @@ def test_a_class_that_can_be_imported_gets_its_own_process_and_others_stay_in_th
     from roboirg.policies.builtin.random_policy import RandomPolicy
     from roboirg.policies.by_name.finding import policy_of
 
+    of_script = type("OfScript", (Still,), {"__module__": "__main__"})
+    monkeypatch.setattr(sys.modules["__main__"], "OfScript", of_script, raising=False)
+    made_here = type("Made", (Still,), {})
+
     assert policy_of(RandomPolicy).spec == "roboirg.policies.builtin.random_policy:RandomPolicy"
-    scripts = type("OfScript", (Still,), {"__module__": "__main__"})
-    monkeypatch.setattr(sys.modules["__main__"], "OfScript", scripts, raising=False)
-    given = (RandomPolicy, RandomPolicy(seed=1), type("Made", (Still,), {}), scripts)
-    assert [policy_of(policy).place for policy in given] == ["own", "python", "python", "python"]
+    assert policy_of(RandomPolicy).place == "own"
+    for policy in (RandomPolicy(seed=1), made_here, of_script):
+        assert policy_of(policy).place == "python"
 
 
-def test_evaluate_takes_the_options_of_a_plan_and_refuses_others_with_the_nearest_name(
-    episodes_decided_by_setting, tmp_path
-):
+def test_evaluate_takes_the_options_of_a_plan():
     plan = python_run.python_plan(
         "oracle", tasks=["PickXtimes"], settings="contextual", episodes=[2],
         policy_seeds=(7, 42), stages=[(1, 5), (1, 2, 5)], max_steps=600, wordings=None,
     )  # fmt: skip
+
     assert (plan.episodes, plan.policy_seeds, plan.environment.max_steps) == ((2,), (7, 42), 600)
     assert plan.stages == ((1, 5), (1, 2, 5))
-    with pytest.raises(UnknownNameError, match="PickXtimes"):
-        roboirg.evaluate("oracle", **{**THREE_EPISODES, "tasks": "PickXtime"})
-    with pytest.raises(UnknownNameError, match=r"max_stps.*mean 'max_steps'"):
-        roboirg.evaluate("oracle", max_stps=3, **THREE_EPISODES)
-    for workers in ("2", True, 2.0, 10**22):
-        with pytest.raises(InvalidValueError, match=f"workers is {workers!r}; it must be a whole"):
-            roboirg.evaluate("oracle", **{**THREE_EPISODES, "workers": workers})
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [({"tasks": "PickXtime"}, "PickXtimes"), ({"max_stps": 3}, r"max_stps.*mean 'max_steps'")],
+)
+def test_evaluate_refuses_unknown_names_with_the_nearest(option, words):
+    with pytest.raises(UnknownNameError, match=words):
+        roboirg.evaluate("oracle", **{**THREE_EPISODES, **option})
+
+
+@pytest.mark.parametrize("workers", ["2", True, 2.0, 10**22])
+def test_evaluate_refuses_a_number_of_workers_that_is_no_whole_number(workers):
+    with pytest.raises(InvalidValueError, match=f"workers is {workers!r}; it must be a whole"):
+        roboirg.evaluate("oracle", **{**THREE_EPISODES, "workers": workers})
 
 
 @pytest.mark.parametrize("name", [5, b"runs", True, "", " ", "runs/\0"])

@@ -81,18 +81,24 @@ def test_sub_environments_that_take_chunks_equal_single_ones():
     vector.close()
 
 
-def test_a_chunk_of_another_shape_is_refused_before_anything_moves():
+@pytest.mark.parametrize(
+    "wrong", [np.zeros((2, 7)), np.zeros(7), np.full((3, 7), np.nan), "up"], ids=str
+)
+def test_a_chunk_of_another_shape_is_refused_before_anything_moves(wrong):
+    """Here three poses of seven numbers are a chunk."""
+    env = ActionChunks(roboirg.make("PickXtimes", cameras=(), actions="ee_pose"), 3)
+    env.reset()
+
+    with pytest.raises(InvalidActionError):
+        env.step(wrong)
+
+    assert env.action_space.shape == (3, 7)
+    assert env.unwrapped.executed_actions == 0
+
+
+def test_a_chunk_has_at_least_one_action():
     with pytest.raises(InvalidValueError, match="length is 0; it must be a whole number from 1"):
         ActionChunks(roboirg.make("PickXtimes", cameras=()), 0)
-
-    env = ActionChunks(roboirg.make("PickXtimes", cameras=(), actions="ee_pose"), 3)
-    assert env.action_space.shape == (3, 7)
-
-    env.reset()
-    for wrong in (np.zeros((2, 7)), np.zeros(7), np.full((3, 7), np.nan), "up"):
-        with pytest.raises(InvalidActionError):
-            env.step(wrong)
-    assert env.unwrapped.executed_actions == 0
 
 
 def test_the_example_in_the_documents_runs(tmp_path):

@@ -8,15 +8,15 @@ import pytest
 import roboirg
 from roboirg.core.arms import ARMS
 from roboirg.core.errors import UnknownNameError
-from roboirg.envs.environment import RoboIRGEnv
 from roboirg.policies import make_policy, play
 from roboirg.policies.contract.play import EpisodeLoop
 
 pytestmark = pytest.mark.sim
 
 
-def make(task: str = "PickXtimes", episode: int = 2, **options: object) -> RoboIRGEnv:
-    return roboirg.make(task, episode=episode, cameras=(), arm="other-goal", **options)  # type: ignore[arg-type]
+def make(task="PickXtimes", episode=2, **options):
+    """Return an environment whose instruction states another goal than the scene's original."""
+    return roboirg.make(task, episode=episode, cameras=(), arm="other-goal", **options)
 
 
 def test_arms_change_words_and_nothing_that_is_seen():
@@ -36,14 +36,21 @@ def test_arms_change_words_and_nothing_that_is_seen():
     assert len(set(seen.values())) == 1
 
 
-def test_a_policy_that_does_the_usual_thing_is_seen_to_do_it():
-    env = make()
-    info = play(env, make_policy("habit", seed=0))
+def test_a_policy_that_does_the_original_goal_although_another_was_stated_is_seen_to_do_it():
+    """The policy *habit* does so. Its verdict is on the stated goal, *original* on the other."""
+    info = play(make(), make_policy("habit", seed=0))
+
     assert (info["status"], info["verdict"], info["original"]) == ("failure", "failure", "success")
     assert "picked up" in info["cause"]
 
-    told = roboirg.make("PickXtimes", episode=2, cameras=())
-    assert play(told, make_policy("habit", seed=0))["steps"] == info["steps"]
+
+def test_an_episode_with_another_goal_ends_when_the_original_goal_would_have_been_reached():
+    """Not with the failure that is certain before."""
+    other_goal = play(make(), make_policy("habit", seed=0))
+
+    told = play(roboirg.make("PickXtimes", episode=2, cameras=()), make_policy("habit", seed=0))
+
+    assert other_goal["steps"] == told["steps"]
 
 
 def test_between_the_verdict_and_the_end_the_episode_goes_on():
@@ -104,15 +111,20 @@ def test_a_pose_that_cannot_be_reached_fails_both_goals():
     assert info["cause"]
 
 
-def test_arms_of_a_reset_and_names_that_do_not_exist():
+def test_a_reset_may_ask_for_another_arm_which_holds_for_that_episode_alone():
+    """In the arm *other-goal* the environment knows the original words, and gives two verdicts."""
     env = roboirg.make("PickXtimes", episode=2, cameras=())
+
     _, info = env.reset(options={"arm": "other-goal"})
-    assert env.original is not None
     assert "verdict" in info
+    assert env.original is not None
     assert env.instruction.text != env.original
 
     _, info = env.reset()
-    assert env.original is None
     assert "verdict" not in info
+    assert env.original is None
+
+
+def test_an_unknown_arm_is_refused_with_the_nearest_name():
     with pytest.raises(UnknownNameError, match="other-goal"):
         roboirg.make("PickXtimes", arm="othergoal")

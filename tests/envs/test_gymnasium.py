@@ -21,27 +21,45 @@ OPTIONS = {"cameras": ("front",), "meshes": "light", "max_steps": 2}
 NAME = f"roboirg.envs.registration:{environment_id('PickXtimes')}"
 
 
-def test_a_reset_chooses_episode_and_words():
+def test_a_reset_chooses_episode_and_words_for_that_episode_alone():
+    """The seed chooses nothing here, as the environment was made for an episode."""
     env = roboirg.make("PickXtimes", cameras=(), episode=3)
-    plain, _ = env.reset()
-    chosen, _ = env.reset(options={"episode": 5, "setting": "spatial", "split": "val"})
     made = roboirg.make("PickXtimes", cameras=(), episode=5, setting="spatial", split="val")
+    plain, _ = env.reset()
 
+    chosen, _ = env.reset(options={"episode": 5, "setting": "spatial", "split": "val"})
     assert chosen["instruction"] == made.instruction.text == env.instruction.text
     assert env.episode == made.episode
 
-    again, _ = env.reset(seed=8)  # options hold for one reset; the seed chooses nothing here
+    again, _ = env.reset(seed=8)
     assert again["instruction"] == plain["instruction"]
     assert env.episode.index == 3
-    with pytest.raises(UnknownNameError, match="no reset option 'cameras'; known: split, episode"):
-        env.reset(options={"cameras": ()})
-    with pytest.raises(InvalidValueError, match="no episode 50"):
-        env.reset(options={"episode": 50})
 
-    own = roboirg.make(get_episode("PickXtimes", "test", 3), cameras=())
-    own.reset(options={"setting": "spatial"})
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        (
+            {"cameras": ()},
+            UnknownNameError,
+            "no reset option 'cameras'; known: split, episode",
+        ),
+        ({"episode": 50}, InvalidValueError, "no episode 50"),
+    ],
+)
+def test_a_reset_refuses_unknown_options_and_episodes(options, error, words):
+    env = roboirg.make("PickXtimes", cameras=())
+
+    with pytest.raises(error, match=words):
+        env.reset(options=options)
+
+
+def test_an_environment_of_an_episode_of_ones_own_may_change_its_words_and_not_the_episode():
+    env = roboirg.make(get_episode("PickXtimes", "test", 3), cameras=())
+    env.reset(options={"setting": "spatial"})
+
     with pytest.raises(InvalidValueError, match="made for one episode; reset takes no 'episode'"):
-        own.reset(options={"episode": 5})
+        env.reset(options={"episode": 5})
 
 
 def test_seeds_choose_episodes_if_none_is_named():

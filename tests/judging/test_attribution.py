@@ -125,6 +125,24 @@ def test_a_wrong_container_lifted_before_the_press_is_not_blamed_for_a_timeout()
     check_failure(play.lift("container_1").put("container_1").rest(), "stopped")
 
 
+def drop(play: Staged, name: str) -> Staged:
+    """The fingers open while it is up, and it falls."""
+    in_hand = (Fact("picked", name), Fact("held", name), Fact("reached", name))
+    return play.set(off=in_hand).tick(2).set(Fact("lying", name))
+
+
+def test_a_cube_that_fell_on_the_wrong_disc_was_dropped():
+    play = played_without_simulator("VideoPlaceOrder", 2)  # the red cube onto target_1
+    drop(play.lift("cube_red"), "cube_red").set(Fact("placed", "cube_red", "target_0"))
+    check_failure(play, "dropped")
+
+
+def test_a_cube_that_is_put_on_the_wrong_disc_is_at_the_wrong_place_though_it_fell_long_ago():
+    play = played_without_simulator("VideoPlaceOrder", 2)  # the red cube onto target_1
+    drop(play.lift("cube_red"), "cube_red").tick(100)
+    check_failure(play.lift("cube_red").put("cube_red", "target_0"), "wrong_place")
+
+
 def test_a_failed_grasp_next_to_two_cubes_is_an_ambiguous_act():
     """The fact "clutched" says that the fingers closed on nothing next to a thing."""
     both = (Fact("clutched", "cube_blue"), Fact("clutched", "cube_red"))

@@ -70,6 +70,13 @@ def test_the_words_of_a_kind_of_fact_name_its_subject_and_place(kind):
     assert (traits.role is FactRole.STATE) <= (not traits.grips)
 
 
+@pytest.mark.parametrize("kind", ["{0.__class__}", "{place}", "{", "}}"])
+def test_braces_in_an_unknown_kind_of_fact_are_shown_as_they_are(kind):
+    """A stranger's record may have them; they would be filled in, or raise `KeyError`."""
+    event = EventRecord(step=1, kind=kind, subject="cube", place="disc")
+    assert event_text(event, {}) == f"{kind} cube".replace("_", " ")
+
+
 def test_an_unknown_kind_of_fact_is_shown_by_its_name():
     assert fact_words(Fact("turned_over", "cup")) == "cup turned over"
     assert not Fact("turned_over", "cup").traits.lasts

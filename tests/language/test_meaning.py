@@ -155,6 +155,17 @@ def test_where_two_values_are_offered_no_singular_gives_the_number_one_away(publ
             assert not any(said.meaning.agrees.values()), said.text
 
 
+@pytest.mark.parametrize("speaks_of_one", [True, False])
+def test_singular_words_leave_the_goals_of_one_and_plural_words_the_others(speaks_of_one):
+    """*Once for that take*, or *for each take*."""
+    words = Meaning({}, agrees={"repeats": speaks_of_one})
+
+    left = meaning.command_goals(words, THREE_CUBES)
+
+    expected = [goal for goal in goals_of(THREE_CUBES) if (goal["repeats"] == 1) == speaks_of_one]
+    assert list(left) == expected
+
+
 def values_by_field(goal):
     return {value.field: value.value for value in values_of_goal(goal)}
 

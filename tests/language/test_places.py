@@ -44,6 +44,17 @@ one_to_seven_places = st.lists(
 """Points of a grid of centimeters, on which ties and leads of exactly the margin are common."""
 
 
+def test_an_episode_has_the_places_of_the_frame_whatever_was_said_of_it_before():
+    """The robot's left is on the right of the picture."""
+    episode = get_episode("PickXtimes", "test", 0)
+    for _ in range(2):
+        of_robot = instruct(episode, "spatial", frame="robot").metadata["landmarks"]
+        of_camera = instruct(episode, "spatial", frame="camera").metadata["landmarks"]
+
+        assert of_robot == ["on the left"]
+        assert of_camera == ["on the right of the picture"]
+
+
 def containers(places, *fixtures):
     """Return a scene with container_0, container_1 … at these places, and other things.
 

@@ -14,6 +14,7 @@ from language_variants import TASKS, first_episodes, said_where_possible
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct
+from roboirg.language.instruction_row import row
 from roboirg.language.settings import settings_of
 from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.shortcuts.command_chance import blind_goals, right_share
@@ -27,6 +28,18 @@ def instructions_with_a_rival(task, split="test", count=12):
     """Return the first episodes of a split that can have a rival, each with its instruction."""
     episodes = first_episodes(task, split, count)
     return said_where_possible(episodes, InstructionOptions("direct-rival"))
+
+
+def test_the_row_of_an_instruction_has_its_rival_and_says_none_without_one():
+    episode, said = next(instructions_with_a_rival("PickXtimes"))
+    columns = ("rival", "rival_slot", "rival_position", "rival_reference")
+
+    of_rival = row(episode, said)
+    of_explicit = row(episode, instruct(episode))
+
+    assert [of_rival[name] for name in columns] == [str(said.metadata[name]) for name in columns]
+    assert "none" not in [of_rival[name] for name in columns]
+    assert [of_explicit[name] for name in columns] == ["none"] * 4
 
 
 def values_of(goal, slot):

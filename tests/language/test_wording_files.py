@@ -235,6 +235,18 @@ def test_the_example_file_of_the_documentation_passes_the_check(tmp_path):
     assert "photos (PickXtimes, direct, both pools)" in checked.output
 
 
+def test_the_example_file_passes_the_check_where_no_tokenizer_is_installed(tmp_path, monkeypatch):
+    """As after `make setup`: only an upper bound of its tokens is too many."""
+    monkeypatch.setattr(token_counts, "_tokenizer", lambda: None)
+    token_counts.tokens_of.cache_clear()
+
+    checked = run_check(COMMAND_FILE_OF_THE_PAGE, tmp_path, "--seeds", "0")
+    token_counts.tokens_of.cache_clear()
+
+    assert re.search(r"at most (6[5-9]|7\d) of 64 tokens", checked.output)
+    assert checked.exit_code == 0, checked.output
+
+
 def test_the_identity_of_an_open_file_is_its_name_and_a_digest(tmp_path):
     """The name is that in the file, and not the file's."""
     file = tmp_path / "mine.toml"
@@ -647,6 +659,20 @@ def test_an_empty_table_of_commands_is_refused_and_not_filled_with_ours():
         "words.toml has no commands of PickXtimes in the pool train.\n"
         "words.toml has no commands of PickXtimes in the pool test."
     )
+
+
+def test_a_competing_remark_names_no_color_of_the_list_that_was_introduced():
+    """Of three colors two are listed, and five remarks all name the third."""
+    listing = PAINT.replace("the {color} cube", "a {list.0} and a {list.1} cube")
+    listing = listing.replace('"So "', '"I need <rank color: {rank}>, so "')
+    identity = identity_of(f'{listing}list = "color"\nneeds.list = [2]\n')
+    remarks = {"distractor": "competing", "distractors": 5}
+    episode = get_episode("PickXtimes", "test", 3)
+
+    said = instruct(episode, "contextual", wordings=identity, **remarks)
+
+    assert said.turns[0] == "We painted a blue and a green cube."
+    assert said.text.count("The red one comes next week.") == 5
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,14 @@
 
 import gzip
 import struct
+import threading
+import time
 
 import msgpack
 import pytest
 from attackers import (
     MAX_MIB,
+    PATIENCE,
     answering,
     attacked,
     frame,
@@ -16,7 +19,7 @@ from attackers import (
 )
 from wire_servers import WireServer
 
-from roboirg.core.errors import PolicyServerError, UnknownCostError
+from roboirg.core.errors import PolicyServerError, PolicyTimeoutError, UnknownCostError
 from roboirg.core.plain_text import printable
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import ModelOptions, ModelQuery, make_model
@@ -204,6 +207,39 @@ def test_of_a_reply_that_is_no_answer_its_type_and_beginning_are_named(content, 
 
     assert words in str(caught.value)
     assert len(str(caught.value)) < 300
+
+
+def sends_blanks_for_ever(peer):
+    read_head(peer)
+    peer.sendall(b"HTTP/1.1 200 OK\r\nContent-Length: 999999999\r\n\r\n")
+    drip(peer, b" ")
+
+
+def sends_interim_answers_for_ever(peer):
+    read_head(peer)
+    drip(peer, b"HTTP/1.1 100 Continue\r\n\r\n")
+
+
+def drip(peer, piece):
+    while True:  # until the client closes the connection
+        peer.sendall(piece)
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize("answer", [sends_blanks_for_ever, sends_interim_answers_for_ever])
+def test_what_reads_an_endless_answer_of_a_model_ends_after_the_time_limit(answer):
+    """A thread that reads on would stay with a connection for each answer that came too late."""
+    before = set(threading.enumerate())
+    with answering(answer) as place:
+        options = ModelOptions(model="m", base_url=f"http://{place}", timeout_s=1)
+        model = make_model(options)
+        for _ in range(2):
+            with pytest.raises(PolicyTimeoutError):
+                model.answer(ModelQuery("", (ChatTurn("user", ("hello",)),)))
+        for thread in set(threading.enumerate()) - before:
+            if "_fetch" in thread.name:
+                thread.join(PATIENCE)
+                assert not thread.is_alive()
 
 
 def test_control_characters_of_a_server_are_printed_as_escapes():

@@ -5,7 +5,7 @@ from string import Template
 from types import SimpleNamespace
 
 import pytest
-from forty_replies import FORTY
+from forty_replies import BLUE_TWICE, FORTY, PICK, RED_ONCE, UNREADABLE, StyledReply
 from planning_fakes import Garbage, fake_vlm, model_options
 
 from roboirg.policies.planners.model_planners import StatelessOptions, StatelessPlanner
@@ -85,6 +85,39 @@ def _words(sent):
     return []
 
 
+DRAFT = f"Perhaps {RED_ONCE}? But the remark says"
+CUT = [
+    StyledReply("Qwen, cut off after a draft", "goal", UNREADABLE, DRAFT, ended="length"),
+    StyledReply("Gemini, cut off after a draft", "goal", UNREADABLE, [{"text": DRAFT}],
+                ended="max_tokens"),
+    StyledReply("Llama, cut off in a subgoal", "subgoal", UNREADABLE, PICK, ended="length"),
+    StyledReply("GPT, ended by its limit", "goal", BLUE_TWICE, f"{BLUE_TWICE}\n\n\n",
+                ended="length"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("styled", CUT, ids=lambda styled: styled.style)
+def test_a_reply_that_its_service_cut_off_is_asked_for_again_unless_an_object_ends_it(styled):
+    """A draft in thoughts without a tag, which the limit of tokens breaks off, is no answer."""
+    queries = []
+
+    def answer(query):
+        queries.append(query)
+        return reply_of(styled)
+
+    vlm = VLMQuery(
+        ModelOptions(model="m"), Template("$why"), lambda _: SimpleNamespace(answer=answer)
+    )
+    found = vlm.ask(SOME_QUERY, READERS[styled.question])
+
+    if styled.reading is None:
+        assert found is None
+        assert vlm.usage()["unparsed"] == 1
+        assert "cut off at the limit of tokens" in queries[1].turns[2].parts[0]
+    else:
+        assert same_json(found) == same_json(styled.reading)
+
+
 def test_a_model_asked_again_sees_its_rejected_reply_without_its_thoughts():
     with fake_vlm(["<think>so many words</think>no idea"]) as server:
         VLMQuery(model_options(server), Template("$why")).ask(SOME_QUERY, goal_in)
@@ -147,6 +180,7 @@ def test_a_letter_is_read_where_it_is_given_as_the_answer(reply, letter):
         "Answer: A. Hmm, C",
         "The answer: C would be green, so B",
         "answer: ~~C~~",
+        "answer: C\u0336",
         "C. is wrong",
         "**C** is wrong",
         "C - no, wait.",
@@ -206,7 +240,8 @@ def test_a_json_object_may_have_line_breaks_in_texts_and_words_in_braces_around_
 @pytest.mark.parametrize(
     "text",
     ["</s>" * 20_000 + "x", '{"a":' * 50_000, "[{" * 50_000, "answer" + " " * 200_000,
-     "\n" * 200_000, "answer A " * 20_000, "{" + "a" * 200_000],
+     "\n" * 200_000, "answer A " * 20_000, "{" + "a" * 200_000, "right choice " * 20_000,
+     "answer: A" + "," * 200_000],
 )  # fmt: skip
 def test_long_repetitive_replies_are_read_quickly(text):
     """A quadratic reading would take minutes."""

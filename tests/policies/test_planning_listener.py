@@ -226,6 +226,7 @@ FAULTS_OF_ANY_SERVICE = [
     (Late(30), PolicyTimeoutError, "did not answer within 0.5 s"),
     (Garbage(b"{"), PolicyReplyError, "fake"),
     (Garbage(b'[{"candidates": 1, "choices": 1}]'), PolicyReplyError, "something else"),
+    (Garbage(b"x" * 90, "text/plain"), PolicyReplyError, r"text/plain that begins 'x{80}'"),
 ]
 """Those whose replies each service reports in its own way."""
 FAULTS_OF_OPENAI = [

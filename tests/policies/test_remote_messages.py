@@ -161,6 +161,13 @@ def test_url_options_rename_the_message_keys_of_an_openpi_checkpoint():
         assert list(unpack(server.messages[0])) == ["base", "q", "say"]
 
 
+@pytest.mark.parametrize("query", ["front=a&wrist=a", "state=prompt", "prompt=observation/image"])
+def test_two_entries_of_a_request_with_one_key_are_refused(query):
+    """One would replace the other, and the policy would see less than its records say."""
+    with pytest.raises(InvalidValueError, match="front, wrist, state and prompt must differ"):
+        make_policy(f"openpi://localhost:1?{query}", 0)
+
+
 def test_a_policy_server_may_have_a_path_in_its_url():
     with WireServer() as server:
         place = f"{server.place}/v1/realtime/robot/openpi"
@@ -169,6 +176,15 @@ def test_a_policy_server_may_have_a_path_in_its_url():
         assert (server.path, policy.metadata["server"]) == ("/v1/realtime/robot/openpi", place)
 
         policy.close()
+
+
+def test_a_server_cannot_give_another_address_for_its_own():
+    with WireServer() as server, client_of(server, "openpi") as policy:
+        server.metadata = {"server": "another:1", "execute": 3, "version": "2"}
+        policy.reset(INSTRUCTION, {})
+
+        expected = {"server": server.place, "execute": "all", "version": "2"}
+        assert policy.metadata == expected
 
 
 @pytest.mark.parametrize("place", ["host", "host:0", "host:x", "host:1,", "host:1#a", "ho st:1"])

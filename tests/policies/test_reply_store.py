@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import math
@@ -33,7 +34,12 @@ from roboirg.policies.vlm import vlm_query
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import ModelOptions, ModelQuery, reply_store
 from roboirg.policies.vlm.models.http_model import retry_after_s
-from roboirg.policies.vlm.models.reply_store import REPLIES_FILE, ReplySettings, use_replies
+from roboirg.policies.vlm.models.reply_store import (
+    REPLIES_FILE,
+    ReplyFileError,
+    ReplySettings,
+    use_replies,
+)
 from roboirg.policies.vlm.vlm_query import VLMQuery
 from roboirg.util.media import Clip, Picture
 
@@ -179,6 +185,70 @@ def test_a_reply_with_an_invalid_character_is_stored_and_paid_once(tmp_path):
             )
             assert replies == [r"\ud800 fine"]
             assert (counts["cost_usd"], counts["stored"]) == (COST_OF_A_REPLY, stored)
+
+
+@contextlib.contextmanager
+def changed_store(folder: Path) -> Iterator[sqlite3.Connection]:
+    """A store's file, which the block changes as a stranger might."""
+    settings = ReplySettings(folder)
+    store = reply_store.ReplyStore(settings, "a")
+    store.pause("service", 0.0)
+    store.close()
+    with contextlib.closing(sqlite3.connect(folder / REPLIES_FILE)) as database:
+        yield database
+        database.commit()
+
+
+VIEW_WITHOUT_END = """
+DROP TABLE replies;
+CREATE VIEW replies AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)
+SELECT 'a' AS episode, 0 AS call, 'x' AS sent, 'x' AS text, i AS cost_usd FROM n;
+"""
+
+
+@pytest.mark.parametrize(
+    ("statements", "words"),
+    [
+        (VIEW_WITHOUT_END, "holds views or triggers"),
+        ("DROP TABLE replies; CREATE TABLE replies (a)", "no such column"),
+        ("", "not a database"),
+    ],
+)
+def test_a_file_of_replies_that_cannot_be_read_ends_the_run_and_is_named(
+    tmp_path, statements, words
+):
+    """It would be an error of the policy in every episode, or be read for ever."""
+    with changed_store(tmp_path) as database:
+        database.executescript(statements)
+    if not statements:
+        (tmp_path / REPLIES_FILE).write_bytes(b"none" * 1000)
+
+    with fake_vlm(["one"]) as server, pytest.raises(ReplyFileError, match=words) as caught:
+        ask_in_episode(server, ReplySettings(tmp_path, 9.0), "a", "words", **PRICES)
+
+    assert str(tmp_path / REPLIES_FILE) in str(caught.value)
+    assert not server.requests
+
+
+def test_a_stored_cost_that_is_no_number_is_unknown_and_a_text_that_is_none_is_left_out(tmp_path):
+    with changed_store(tmp_path) as database:
+        database.execute("INSERT INTO replies VALUES ('a', 0, 'x', x'ff', 1, 1, 'free')")
+
+    store = reply_store.ReplyStore(ReplySettings(tmp_path, 9.0), "a")
+    assert not store.replies()
+    with pytest.raises(BudgetError, match="what 1 reply cost is unknown"):
+        store.check_budget(ModelOptions(model="m", **PRICES))
+    store.close()
+
+
+def test_a_turn_years_away_as_by_a_wrong_clock_is_not_waited_for(tmp_path, monkeypatch):
+    with changed_store(tmp_path) as database:
+        database.execute("UPDATE services SET next_at = 1e308")
+    monkeypatch.setattr(reply_store, "time", SimpleNamespace(time=lambda: 5.0, sleep=pytest.fail))
+
+    store = reply_store.ReplyStore(ReplySettings(tmp_path), "a")
+    store.wait_for_turn("service", None)
+    store.close()
 
 
 def test_a_budget_without_prices_is_refused_before_anything_is_asked(tmp_path):
@@ -355,14 +425,14 @@ def test_no_answered_call_is_made_again_after_a_kill(tmp_path, kills):
 
 
 def test_three_processes_that_ask_at_the_same_moment_take_turns(tmp_path, monkeypatch):
-    """At 60 requests a minute they start one second apart; a longer pause counts for all."""
+    """At 20 requests a minute they start three seconds apart; a longer pause counts for all."""
     waits: list[float] = []
     clock = SimpleNamespace(time=lambda: 5.0, sleep=waits.append)
     monkeypatch.setattr(reply_store, "time", clock)
     # Each as in a process of its own.
     stores = [reply_store.ReplyStore(ReplySettings(tmp_path), "episode") for _ in range(3)]
     for store in stores:
-        store.wait_for_turn("service", 60.0)
+        store.wait_for_turn("service", 20.0)
     # What asked for a pause is given the longest one, even if nothing limits its rate.
     for seconds in (9.0, 4.0):
         stores[0].pause("other", seconds)
@@ -371,4 +441,4 @@ def test_three_processes_that_ask_at_the_same_moment_take_turns(tmp_path, monkey
     for store in stores:
         store.close()
 
-    assert waits == [1.0, 2.0, 9.0]
+    assert waits == [3.0, 6.0, 9.0]

@@ -89,6 +89,29 @@ def test_options_of_the_server_or_the_url_leave_out_camera_state_and_video(query
     assert list(shown["images"]) == ["agentview"]
 
 
+@pytest.mark.parametrize(
+    ("params", "left_out"),
+    [
+        (None, set()),
+        ({}, set()),
+        ({"send_state": False}, {"states"}),
+        ({"send_video_history": False}, {"video_history", "wrist_video_history"}),
+    ],
+)
+def test_a_server_is_shown_all_that_it_does_not_refuse(params, left_out):
+    """It may say nothing of what it wants, or only of a part."""
+    with VlaEvalServer() as server:
+        server.hello = {**server.hello, "observation_params": params}
+        with client_of(server, "vla-eval") as client:
+            client.reset(INSTRUCTION, video(2))
+            client.act(moment(0))
+    ((_, shown),) = [payload for payload in server.payloads if payload[0] == "observation"]
+
+    what_it_can_refuse = {"states", "video_history", "wrist_video_history"}
+    assert shown.keys() & what_it_can_refuse == what_it_can_refuse - left_out
+    assert list(shown["images"]) == ["agentview", "wrist"]
+
+
 def test_a_server_with_another_action_space_or_protocol_version_is_refused():
     with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
         server.hello = {**server.hello, "observation_params": {"action_space": "ee_pose"}}
@@ -99,6 +122,9 @@ def test_a_server_with_another_action_space_or_protocol_version_is_refused():
             agreed.reset(INSTRUCTION, video(0))
         server.hello = {**server.hello, "protocol_version": 2}
         with pytest.raises(PolicyReplyError, match="speaks version 2 of vla-eval's protocol"):
+            client.reset(INSTRUCTION, video(0))
+        server.hello = {**server.hello, "protocol_version": np.ones(2)}
+        with pytest.raises(PolicyReplyError, match=r"speaks version \[1\.0, 1\.0\] of vla-eval's"):
             client.reset(INSTRUCTION, video(0))
 
 

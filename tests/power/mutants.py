@@ -6,11 +6,13 @@ Cosmic Ray 8.7 made the faults of mutants.csv from the code of November 2026; of
 places as it has here were drawn with seed 69, and one fault of each place. 47 whose lines were
 rewritten since were drawn again, with seed 72 and outside annotations. Later, those of rewritten
 lines were made by hand in the statements that do the same now, and where there are none, with the
-same operators at places of the room drawn with seed 73. A fault is tried with the test that found
-it last, with its file, then with the tests of its room; with --all, those that none found are
-tried, too. FOLDER gets a copy of the working tree and results.csv, with which a second call goes
-on; at the end stands a table, and each fault that is found no longer, or whose lines the code no
-longer has. Calls for different rooms may run side by side, each in a folder of its own.
+same operators at places of the room drawn with seed 73. The last 40 were drawn with seed 91, eight
+from each of judging, stats, language, analysis and contract, and each is found by a test next to
+its module. A fault is tried with the test that found it last, with its file, then with the tests of
+its room; with --all, those that none found are tried, too. FOLDER gets a copy of the working tree
+and results.csv, with which a second call goes on; at the end stands a table, and each fault that is
+found no longer, or whose lines the code no longer has. Calls for different rooms may run side by
+side, each in a folder of its own.
 """
 
 from __future__ import annotations
@@ -41,6 +43,8 @@ TESTS = {
     "landmarks": ("tests/language",),
     "reader": ("tests/reader", "tests/language", "tests/policies"),
     "delivery": ("tests/test_delivery.py", "tests/language"),
+    "analysis": ("tests/analysis",),
+    "contract": ("tests/policies", "tests/apps/policy_check", "tests/runs"),
 }
 """Where the tests of each room are."""
 LIMIT_S = 240.0
@@ -85,24 +89,43 @@ class Mutant(NamedTuple):
             Whether the code still has its lines; if not, nothing is changed.
         """
         path = tree / "src/roboirg" / self.module
-        text = path.read_text("utf-8") if path.exists() else ""
-        lines, was = text.splitlines(), self.was.splitlines() or [""]
-        places = [at for at in range(len(lines)) if lines[at : at + len(was)] == was]
-        if not places:
+        if not path.exists():
             yield False
             return
-        at = min(places, key=lambda place: abs(place + 1 - int(self.line)))
+        text = path.read_text("utf-8")
+        faulty_text = self._put_into_text(text)
+        if faulty_text is None:
+            yield False
+            return
         try:
-            self._write(path, "\n".join([*lines[:at], self.now, *lines[at + len(was) :]]) + "\n")
+            write_module(path, faulty_text)
             yield True
         finally:
-            self._write(path, text)
+            write_module(path, text)
 
-    @staticmethod
-    def _write(path: Path, text: str) -> None:
-        """Leave no compiled module, which Python would take for a file of equal size and second."""
-        shutil.rmtree(path.parent / "__pycache__", ignore_errors=True)
-        path.write_text(text, encoding="utf-8")
+    def _put_into_text(self, text: str) -> str | None:
+        """Return the text of a module with the fault; None if it has its lines no longer.
+
+        Of several places with these lines it takes the one nearest to where they stood.
+        """
+        lines = text.splitlines()
+        was = self.was.splitlines() or [""]
+        stood_at = int(self.line) - 1
+        places = [at for at in range(len(lines)) if lines[at : at + len(was)] == was]
+        if not places:
+            return None
+        first = min(places, key=lambda at: abs(at - stood_at))
+        after = first + len(was)
+        return "\n".join([*lines[:first], self.now, *lines[after:]]) + "\n"
+
+
+def write_module(path: Path, text: str) -> None:
+    """Write the text of a module.
+
+    No compiled module is left: Python would take it for a file of the same size and second.
+    """
+    shutil.rmtree(path.parent / "__pycache__", ignore_errors=True)
+    path.write_text(text, encoding="utf-8")
 
 
 def first_failure(tree: Path, *tests: str) -> str:
@@ -137,21 +160,29 @@ def found_by(mutant: Mutant, tree: Path) -> str:
     with mutant.put_into(tree) as fits:
         if not fits:
             return GONE
+        tries = [TESTS[mutant.room]]
         file = mutant.found_by.partition("::")[0]
-        tries = [(mutant.found_by,), (file,)] if (tree / file).is_file() else []
-        return next(
-            filter(None, (first_failure(tree, *one) for one in (*tries, TESTS[mutant.room]))), ""
-        )
+        if (tree / file).is_file():
+            tries = [(mutant.found_by,), (file,), *tries]
+        for tests in tries:
+            failure = first_failure(tree, *tests)
+            if failure:
+                return failure
+        return ""
 
 
 def copy(tree: Path) -> Path:
-    """Copy the working tree."""
-    if not tree.exists():
-        listed = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard")
-        names = subprocess.check_output(listed, cwd=ROOT, text=True).split("\0")
-        for name in filter(lambda name: (ROOT / name).is_file(), names):
-            (tree / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(ROOT / name, tree / name)
+    """Copy the working tree to a folder, unless an earlier call has; return the folder."""
+    if tree.exists():
+        return tree
+    list_files = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard")
+    names = subprocess.check_output(list_files, cwd=ROOT, text=True).split("\0")
+    for name in names:
+        source = ROOT / name
+        if source.is_file():  # what was deleted is listed, too
+            target = tree / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(source, target)
     return tree
 
 
@@ -164,18 +195,25 @@ def read(path: Path) -> list[list[str]]:
 def table(mutants: list[Mutant], results: dict[str, str]) -> str:
     """Return a line for each room, and one for each fault that is found no longer."""
     lines = ["room       faults  equivalent  found before  found now"]
-    for room in (*TESTS, "all"):
-        ours = [one for one in mutants if one.number in results and room in (one.room, "all")]
-        same = sum(bool(one.equivalent) for one in ours)
-        before = sum(bool(one.found_by) for one in ours)
-        now = sum(results[one.number] not in ("", GONE) for one in ours)
-        lines.append(f"{room:9} {len(ours):7} {same:11} {before:13} {now:10}")
-    lines += [
-        f"{results[one.number] or 'lost'}: {one.number} {one.module}:{one.line} {one.now.strip()}"
-        for one in mutants
-        if one.found_by and results.get(one.number) in ("", GONE)
-    ]
+    tried = [mutant for mutant in mutants if mutant.number in results]
+    for room in TESTS:
+        of_room = [mutant for mutant in tried if mutant.room == room]
+        lines.append(_line_of_table(room, of_room, results))
+    lines.append(_line_of_table("all", tried, results))
+    for mutant in tried:
+        result = results[mutant.number]
+        if mutant.found_by and result in ("", GONE):
+            place = f"{mutant.module}:{mutant.line}"
+            lines.append(f"{result or 'lost'}: {mutant.number} {place} {mutant.now.strip()}")
     return "\n".join(lines)
+
+
+def _line_of_table(name: str, mutants: list[Mutant], results: dict[str, str]) -> str:
+    """Return how many of some faults no test can find, and how many were and are found."""
+    num_equivalent = sum(bool(mutant.equivalent) for mutant in mutants)
+    num_before = sum(bool(mutant.found_by) for mutant in mutants)
+    num_now = sum(results[mutant.number] not in ("", GONE) for mutant in mutants)
+    return f"{name:9} {len(mutants):7} {num_equivalent:11} {num_before:13} {num_now:10}"
 
 
 def main() -> None:
@@ -192,8 +230,10 @@ def main() -> None:
         stored.write_text("number,found_by\n", encoding="utf-8")
     results = dict(read(stored))
     for mutant in mutants:
+        if mutant.room not in options.rooms or mutant.number in results:
+            continue
         is_tried = mutant.found_by or (options.all and not mutant.equivalent)
-        if mutant.room in options.rooms and mutant.number not in results and is_tried:
+        if is_tried:
             results[mutant.number] = found_by(mutant, tree)
             with stored.open("a", encoding="utf-8", newline="") as file:
                 csv.writer(file).writerow((mutant.number, results[mutant.number]))

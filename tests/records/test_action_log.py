@@ -25,7 +25,10 @@ finite = st.floats(-1e6, 1e6)
 
 @st.composite
 def any_action_logs(draw: st.DrawFn) -> ActionLog:
-    # Nothing may be executed of the last answer.
+    """Draw a log of up to seven answers of a policy, of 1 to 5 executed actions each.
+
+    Nothing may be executed of the last answer. Some logs have numbers in single precision.
+    """
     lengths = draw(st.lists(st.integers(1, 5), max_size=6)) + draw(st.sampled_from([[], [0]]))
     rows = draw(arrays(np.float64, (sum(lengths), 8), elements=finite))
     if draw(st.booleans()):
@@ -38,12 +41,17 @@ def any_action_logs(draw: st.DrawFn) -> ActionLog:
 @settings(max_examples=25)
 @given(log=any_action_logs())
 def test_an_action_log_is_read_back_as_it_was_written(log, tmp_path_factory):
-    """A log has all executed actions, the calls at which they begin, and the end state."""
+    """A log has all executed actions, the calls at which they begin, and the end state.
+
+    Its digest depends on these alone: written twice, a log has the same. Its chunks are the actions
+    of each call.
+    """
     folder = tmp_path_factory.mktemp("run")
     digest = write_actions(log, folder)
     assert write_actions(log, folder) == digest
 
     read = read_actions(folder, digest)
+
     assert (read.space, read.digest) == (log.space, digest)
     assert np.array_equal(read.rows, log.rows)
     assert np.array_equal(read.end_state, log.end_state)
@@ -92,7 +100,7 @@ ARRAYS_OF_A_GOOD_LOG = {
 EMPTY_ZIP = b"PK\x05\x06" + bytes(18)
 
 
-def good_log_except(**changes: np.ndarray) -> bytes:
+def good_log_except(**changes):
     """Return the content of a good log, but for some arrays."""
     file = io.BytesIO()
     np.savez_compressed(file, **ARRAYS_OF_A_GOOD_LOG | changes)  # type: ignore[arg-type]
@@ -102,19 +110,20 @@ def good_log_except(**changes: np.ndarray) -> bytes:
 @pytest.mark.parametrize(
     "content",
     [
-        b"",
-        b"no zip",
-        EMPTY_ZIP,
-        good_log_except(space=np.array("teleport")),
-        good_log_except(rows=np.zeros((4, 7))),
-        good_log_except(rows=np.full((4, 8), np.nan)),
-        good_log_except(requests=np.array([0, 3, 2])),
-        good_log_except(requests=np.array([1, 2])),
-        good_log_except(requests=np.array([0, 9])),
-        good_log_except(rows=np.zeros((400_000, 8))),
+        pytest.param(b"", id="empty"),
+        pytest.param(b"no zip", id="no archive"),
+        pytest.param(EMPTY_ZIP, id="empty archive"),
+        pytest.param(good_log_except(space=np.array("teleport")), id="unknown action space"),
+        pytest.param(good_log_except(rows=np.zeros((4, 7))), id="rows of 7 numbers"),
+        pytest.param(good_log_except(rows=np.full((4, 8), np.nan)), id="no number"),
+        pytest.param(good_log_except(requests=np.array([0, 3, 2])), id="calls out of order"),
+        pytest.param(good_log_except(requests=np.array([1, 2])), id="first call not at 0"),
+        pytest.param(good_log_except(requests=np.array([0, 9])), id="call after the last row"),
+        pytest.param(good_log_except(rows=np.zeros((400_000, 8))), id="too large"),
     ],
 )
 def test_a_file_that_is_no_valid_action_log_is_refused(tmp_path, content):
+    """Of four actions."""
     path = action_path(tmp_path, "0" * 64)
     path.parent.mkdir(parents=True)
     path.write_bytes(content)
@@ -127,7 +136,7 @@ def test_code_pickled_into_an_action_log_is_not_run(tmp_path):
     """The object would make a folder `evil` when it is read."""
 
     class Evil:
-        def __reduce__(self) -> tuple[object, ...]:
+        def __reduce__(self):
             return os.mkdir, (str(tmp_path / "evil"),)
 
     path = action_path(tmp_path, "0" * 64)

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
@@ -62,7 +61,8 @@ print("after")
 """
 
 
-def finished_program(code: str, path: Path) -> subprocess.CompletedProcess[bytes]:
+def finished_program(code, path):
+    """Run Python code in a process of its own with a path as its argument, to its end."""
     return subprocess.run(
         [sys.executable, "-c", code, str(path)],
         capture_output=True,
@@ -72,10 +72,13 @@ def finished_program(code: str, path: Path) -> subprocess.CompletedProcess[bytes
 
 
 def test_all_ways_to_print_end_in_the_log_and_not_on_the_terminal(tmp_path):
-    done = finished_program(PROGRAM_THAT_PRINTS, tmp_path / "logs" / "a.txt")
-    assert (done.returncode, done.stdout, done.stderr) == (0, b"before\nafter\n", b"")
+    """What is printed before and after an episode stays on the terminal."""
+    log = tmp_path / "logs" / "a.txt"
 
-    printed = (tmp_path / "logs" / "a.txt").read_bytes()
+    done = finished_program(PROGRAM_THAT_PRINTS, log)
+
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"before\nafter\n", b"")
+    printed = log.read_bytes()
     for words in (b"by print", b"on stderr", b"by logging", b"by warnings", b"by descriptor",
                   b"by C", b"by a child", b"\xff not text"):  # fmt: skip
         assert words in printed
@@ -94,9 +97,9 @@ def test_a_log_that_would_be_too_long_keeps_its_begin_and_its_end(tmp_path):
 
 
 def test_the_last_words_of_a_killed_process_are_in_its_log(tmp_path):
-    assert (
-        finished_program(PROGRAM_THAT_IS_KILLED, tmp_path / "a.txt").returncode == -signal.SIGKILL
-    )
+    done = finished_program(PROGRAM_THAT_IS_KILLED, tmp_path / "a.txt")
+
+    assert done.returncode == -signal.SIGKILL
     assert (tmp_path / "a.txt").read_text() == "my last words\n"
 
 
@@ -123,15 +126,20 @@ def test_a_log_never_grows_over_its_limit_although_a_million_bytes_are_printed(t
 
 
 def test_an_episode_that_prints_nothing_has_no_log(tmp_path):
-    assert logged_slugs(tmp_path) == frozenset()
-
     with logged_output(log_path(tmp_path, "silent")):
         pass
-    with EpisodeLog(log_path(tmp_path, "loud")) as log:
+
+    assert logged_slugs(tmp_path) == frozenset()
+
+
+def test_an_episode_that_is_played_again_and_prints_nothing_loses_its_old_log(tmp_path):
+    """From the begin of the second attempt on."""
+    path = log_path(tmp_path, "played twice")
+    with EpisodeLog(path) as log:
         os.write(log.descriptor, b"words")
-    assert logged_slugs(tmp_path) == {"loud"}
-    # The same episode is played again and prints nothing: the old log is gone.
-    with EpisodeLog(log_path(tmp_path, "loud")):
+    assert logged_slugs(tmp_path) == {"played twice"}
+
+    with EpisodeLog(path):
         assert logged_slugs(tmp_path) == frozenset()
     assert logged_slugs(tmp_path) == frozenset()
 

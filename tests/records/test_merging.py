@@ -13,33 +13,46 @@ from run_fakes import FakePlay, fake_run, small_plan
 from roboirg.core.errors import InvalidValueError
 from roboirg.records.episode_log import log_path
 from roboirg.records.merging import merge_runs
-from roboirg.records.record import Record
 from roboirg.records.record_codec import StoreError, identity_key
 from roboirg.records.run_files import PLAN_FILE, earlier_plans
 from roboirg.records.store import read_records
 
 
-def played_records(count: int = 4) -> list[Record]:
+def played_records(count=4):
+    """Return records of so many episodes, each in explicit and in direct."""
     return [FakePlay()(job) for job in small_plan(count).jobs()]
 
 
 def test_merging_two_parts_of_a_run_gives_the_whole_without_duplicates(tmp_path):
     """Of 8 records the parts have the first 5 and the last 5, so 2 twice."""
-    whole = tmp_path / "whole"
-    fake_run(whole)
-    records = read_records(whole)
-    parts = [fill(tmp_path / "a", *records[:5]), fill(tmp_path / "b", *records[3:])]
-    merged = merge_runs(parts, tmp_path / "out")
+    records = tuple(played_records())
+    first = fill(tmp_path / "a", *records[:5])
+    last = fill(tmp_path / "b", *records[3:])
+
+    merged = merge_runs([first, last], tmp_path / "out")
 
     assert (merged.added, merged.duplicates, merged.conflicts) == (8, 2, ())
     assert read_records(tmp_path / "out") == records
 
-    again = merge_runs(parts, tmp_path / "out")
-    assert (again.added, again.duplicates) == (0, 10)
 
-    merge_runs([*parts, whole], tmp_path / "out")
-    (plan,) = earlier_plans(tmp_path / "out")  # or nobody could count what is missing
-    assert plan.read_bytes() == (whole / PLAN_FILE).read_bytes()
+def test_merging_again_into_the_same_folder_adds_nothing(tmp_path):
+    part = fill(tmp_path / "a", *played_records())
+    merge_runs([part], tmp_path / "out")
+
+    again = merge_runs([part], tmp_path / "out")
+
+    assert (again.added, again.duplicates) == (0, 8)
+
+
+def test_the_plan_of_a_merged_run_is_kept(tmp_path):
+    """Or nobody could count what is missing."""
+    part = tmp_path / "part"
+    fake_run(part)
+
+    merge_runs([part], tmp_path / "out")
+
+    (plan,) = earlier_plans(tmp_path / "out")
+    assert plan.read_bytes() == (part / PLAN_FILE).read_bytes()
 
 
 WITHOUT_CONNECTION = {"outcome": "error", "error": "connection", "server_version": None}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import msgspec
 import pytest
 from msgspec.structs import replace
@@ -22,46 +20,63 @@ from roboirg.records.store import (
 )
 
 
-def folder_with_lines(folder: Path, *lines: bytes) -> Path:
+def run_with_lines(folder, change):
+    """Play 8 episodes, and change the list of lines in the file of their records."""
+    fake_run(folder)
+    lines = (folder / RECORDS_FILE).read_bytes().splitlines(keepends=True)
+    change(lines)
     (folder / RECORDS_FILE).write_bytes(b"".join(lines))
-    return folder
+
+
+def damage_the_third(lines):
+    lines[2] = lines[2][:40] + b"\x00\xff\n"
 
 
 def test_a_damaged_line_loses_only_its_episode_and_is_reported(tmp_path, caplog):
-    fake_run(tmp_path)
-    lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
-    folder_with_lines(tmp_path, *lines[:2], lines[2][:40] + b"\x00\xff\n", *lines[3:])
+    run_with_lines(tmp_path, damage_the_third)
+
     with RecordStore(tmp_path) as store:
         assert (len(store.stored), store.torn) == (7, b"")
 
     (warning,) = caplog.messages
     assert warning.startswith(f"{tmp_path / RECORDS_FILE} has 1 damaged line, the first is line 3;")
 
-    summary = fake_run(tmp_path)
-    assert summary.played == 1
 
+def test_the_episode_of_a_damaged_line_is_played_again_and_all_records_are_found(tmp_path):
+    """By reading the whole file, and by an index of where in it each record begins."""
+    run_with_lines(tmp_path, damage_the_third)
+
+    summary = fake_run(tmp_path)
+
+    assert summary.played == 1
     records = read_records(tmp_path)
     index = StoredRun(tmp_path, read_summary)
     assert len(records) == 8
-    # Whole records are found behind the damage, too.
     assert tuple(index.records(index.newest)) == records
 
 
-def test_a_last_line_that_was_cut_off_is_reported_and_the_next_run_repairs_it(tmp_path, caplog):
-    """Of 8 records the last was cut after 40 bytes."""
-    fake_run(tmp_path)
-    lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
-    folder_with_lines(tmp_path, *lines[:-1], lines[-1][:40])
+def cut_the_last(lines):
+    lines[-1] = lines[-1][:40]
+
+
+def test_a_last_line_that_was_cut_off_is_reported(tmp_path, caplog):
+    """Of 8 records 7 are left."""
+    run_with_lines(tmp_path, cut_the_last)
+
     run = StoredRun(tmp_path, read_summary)
 
     assert len(run.newest) == 7
-
     (warning,) = caplog.messages
     assert "ends in an unfinished line" in warning
+
+
+def test_the_next_run_repairs_a_last_line_that_was_cut_off(tmp_path):
+    run_with_lines(tmp_path, cut_the_last)
     with pytest.raises(StoreError, match="ends in an unfinished line"):
-        run.file.refuse_damage()
+        StoredRun(tmp_path, read_summary).file.refuse_damage()
 
     fake_run(tmp_path)
+
     StoredRun(tmp_path, read_summary).file.refuse_damage()
 
 
@@ -103,12 +118,23 @@ def test_a_record_without_its_environment_has_the_default_one(tmp_path):
 def test_episodes_are_the_same_only_if_all_options_agree_wherever_policy_and_words_lie():
     """A run skips what it has played; would find an option that this comparison forgets."""
     job = small_plan().jobs()[0]
-    not_counted = {"ref", "wordings_file"}
-    assert len(identity_key(job)) == len(set(Job.__struct_fields__) - not_counted)
-    assert identity_key(job.with_options(stages=(1, 5))) != identity_key(job)
 
-    others = {"demonstration_frames": 4, "actions": "ee_pose", "meshes": "light"}
-    for name, value in others.items():
-        other = replace(job, environment=EnvironmentOptions(**{name: value}))
-        assert identity_key(other) != identity_key(job)
+    assert len(identity_key(job)) == len(Job.__struct_fields__) - len(("ref", "wordings_file"))
     assert identity_key(replace(job, ref=unknown_policy("openpi://elsewhere"))) == identity_key(job)
+
+
+@pytest.mark.parametrize(
+    "option", [{"demonstration_frames": 4}, {"actions": "ee_pose"}, {"meshes": "light"}]
+)
+def test_an_episode_with_another_option_of_the_environment_is_another_one(option):
+    job = small_plan().jobs()[0]
+
+    other = replace(job, environment=EnvironmentOptions(**option))
+
+    assert identity_key(other) != identity_key(job)
+
+
+def test_an_episode_with_another_option_of_its_words_is_another_one():
+    job = small_plan().jobs()[0]
+
+    assert identity_key(job.with_options(stages=(1, 5))) != identity_key(job)

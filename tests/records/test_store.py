@@ -6,10 +6,12 @@ import math
 import os
 import resource
 import tempfile
+from dataclasses import replace as replace_field
 from pathlib import Path
 from unittest.mock import patch
 
 import pytest
+from flat_jobs import with_version
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_records import fill
@@ -18,12 +20,14 @@ from run_fakes import FakePlay, fake_record, fake_run, small_plan
 
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.core.versions import Versions
 from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.server_lock import lock_server
 from roboirg.records.line_file import LOCK_FILE
 from roboirg.records.record import Record
 from roboirg.records.record_codec import StoreError, encode, identity_key
+from roboirg.records.run_files import PLAN_FILE
 from roboirg.records.store import (
     RECORDS_FILE,
     TORN_FILE,
@@ -34,19 +38,23 @@ from roboirg.records.store import (
     read_records,
     read_results,
 )
+from roboirg.runs.plan.stored_plans import write_plan
 from roboirg.runs.run.executor import InProcess
 from roboirg.runs.run.runner import check_run, run_plan
 from roboirg.util.atomic_write import locked, write_atomically
 
 
 @pytest.mark.parametrize("field", Versions._fields[1:])
-def test_a_run_is_refused_if_any_of_its_versions_differs_unless_it_is_unknown(field: str) -> None:
+def test_a_run_is_refused_if_any_of_its_versions_differs_unless_it_is_unknown(field):
     """As those of the language, the environment and the server."""
     first = Versions(**{field: "a"})
-    words = f"^x whose {field.replace('_', ' ')} is a, but now it is b; choose another --out.$"
-    with pytest.raises(StoreError, match=words):
-        check_same("x", first.differences(Versions(**{field: "b"})))
-    assert not first.differences(Versions())
+    other = Versions(**{field: "b"})
+    unknown = Versions()
+
+    sentence = f"^x whose {field.replace('_', ' ')} is a, but now it is b; choose another --out.$"
+    with pytest.raises(StoreError, match=sentence):
+        check_same("x", first.differences(other))
+    assert not first.differences(unknown)
 
 
 @functools.cache
@@ -82,6 +90,24 @@ def test_a_file_of_records_cut_anywhere_loses_only_the_line_that_was_cut(data):
         assert torn == whole[len(kept) : cut]
         if torn:
             assert (folder / TORN_FILE).read_bytes() == torn + b"\n"
+
+
+def test_an_error_before_a_policy_declares_its_version_gets_that_of_its_verdicts(tmp_path):
+    """Else its row has no mark of the error, and a row of unknown version stands next to it."""
+    won, raised, other = eight_records()[:3]
+    ref = replace_field(other.ref, version=UNKNOWN_VERSION, makeup=(("policy", "another"),))
+    error = {"outcome": "error", "error": "policy"}
+    fill(
+        tmp_path,
+        with_version(won, "7"),
+        replace(with_version(raised, UNKNOWN_VERSION), **error),
+        replace(other, ref=ref, **error),
+    )
+
+    versions = [result.policy_version for result in read_results(tmp_path)]
+
+    assert won.policy == raised.policy == other.policy
+    assert versions == ["7", "7", UNKNOWN_VERSION]
 
 
 def test_unfinished_lines_of_several_crashes_are_all_kept_in_a_file_of_their_own(tmp_path):
@@ -122,18 +148,20 @@ def test_a_file_system_without_locks_is_reported_with_the_advice_to_use_a_local_
 
 
 def test_records_of_a_newer_format_are_refused_and_stay_as_they_are(tmp_path):
-    whole = (fill(tmp_path, *eight_records()) / RECORDS_FILE).read_bytes()
-    newer = whole.replace(b'"schema_version":1', b'"schema_version":7', 1)
-    (tmp_path / RECORDS_FILE).write_bytes(newer)
-    with pytest.raises(StoreError, match=r"line 1 has schema version 7, .* reads only version 1;"):
-        RecordStore(tmp_path)
-    assert (tmp_path / RECORDS_FILE).read_bytes() == newer
+    """And the lock of the folder is given back, so that a second attempt says the same."""
+    path = fill(tmp_path, *eight_records()) / RECORDS_FILE
+    newer = path.read_bytes().replace(b'"schema_version":1', b'"schema_version":7', 1)
+    path.write_bytes(newer)
 
-    (tmp_path / RECORDS_FILE).write_bytes(whole)
-    RecordStore(tmp_path).close()  # the lock was given back
-    assert (tmp_path / RECORDS_FILE).read_bytes() == whole
+    for _ in range(2):
+        with pytest.raises(
+            StoreError, match=r"line 1 has schema version 7, .* reads only version 1;"
+        ):
+            RecordStore(tmp_path)
+    assert path.read_bytes() == newer
 
 
+@pytest.mark.parametrize("read", [read_records, read_results, read_index])
 @pytest.mark.parametrize(
     ("line", "sentence"),
     [
@@ -141,11 +169,11 @@ def test_records_of_a_newer_format_are_refused_and_stay_as_they_are(tmp_path):
         (b"[]", "line 1 has schema version None"),
     ],
 )
-def test_a_line_that_is_no_record_is_reported_with_its_number(tmp_path, line, sentence):
+def test_a_line_that_is_no_record_is_reported_with_its_number(tmp_path, read, line, sentence):
     (tmp_path / RECORDS_FILE).write_bytes(line + b"\n")
-    for read in (read_records, read_results, read_index):
-        with pytest.raises(StoreError, match=sentence):
-            read(tmp_path)
+
+    with pytest.raises(StoreError, match=sentence):
+        read(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -212,6 +240,41 @@ def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path, name):
         with pytest.raises(RoboIRGError, match=f"{link} is a symbolic link, and a run writes"):
             begin(tmp_path / "run")
     assert victim.read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "records.torn", "models.sqlite"])
+def test_a_run_changes_no_file_that_has_another_name_elsewhere(tmp_path, name):
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / name).hardlink_to(victim)
+
+    with pytest.raises(RoboIRGError, match=f"{name} has another name elsewhere"):
+        RecordStore(tmp_path / "run")
+    assert victim.read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["records.torn", "logs/a.txt"])
+def test_a_run_does_not_start_where_a_pipe_would_block_it(tmp_path, name):
+    """The unfinished line would be written into it."""
+    path = tmp_path / "run" / name
+    path.parent.mkdir(parents=True)
+    (tmp_path / "run" / RECORDS_FILE).write_text('{"a')
+    os.mkfifo(path)
+
+    with pytest.raises(RoboIRGError, match=f"{name} is neither a file nor a folder"):
+        RecordStore(tmp_path / "run")
+
+
+def test_a_plan_may_be_a_hard_link_as_it_is_replaced(tmp_path):
+    victim = tmp_path / "victim"
+    victim.write_text("{}")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / PLAN_FILE).hardlink_to(victim)
+
+    with RecordStore(tmp_path / "run"):
+        write_plan(small_plan(), tmp_path / "run")
+    assert victim.read_text() == "{}"
 
 
 def test_a_folder_of_videos_on_another_disk_is_refused_at_the_start(tmp_path):

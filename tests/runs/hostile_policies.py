@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Any, ClassVar, NoReturn
+from typing import Any, ClassVar
 
 import numpy as np
 from msgspec.msgpack import Ext, encode
@@ -28,17 +28,17 @@ class Hostile:
     cameras = ()
     version = "1"
 
-    def reset(self, instruction: str, demonstration: Any) -> None:
+    def reset(self, instruction, demonstration):
         self.metadata: dict[str, Any] = {}
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         return -np.ones((24, 8))
 
 
 class Searcher(Hostile):
     """Looks for the goal in every frame and every object."""
 
-    def reset(self, instruction: str, demonstration: Any) -> None:
+    def reset(self, instruction, demonstration):
         types = set()
         texts = set()
         frames: list[Any] = [*sys._current_frames().values()]
@@ -64,7 +64,7 @@ class Searcher(Hostile):
 class Patcher(Hostile):
     """Makes every episode a success."""
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         from roboirg.judging import Judge
         from roboirg.records import record
 
@@ -78,8 +78,8 @@ class Patcher(Hostile):
 class Leaker(Hostile):
     """Leaves a thread that spoils what comes after it."""
 
-    def act(self, observation: Any) -> Any:
-        def spoil() -> None:
+    def act(self, observation):
+        def spoil():
             while True:
                 time.sleep(0.001)
                 np.random.seed(0)  # noqa: NPY002
@@ -92,14 +92,14 @@ class Leaker(Hostile):
 
 
 class Wanderer(Hostile):
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         self.metadata["before"] = os.getcwd()  # noqa: PTH109
         os.chdir("/")
         return super().act(observation)
 
 
 class Closer(Hostile):
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         os.closerange(0, 4096)
         return super().act(observation)
 
@@ -107,7 +107,7 @@ class Closer(Hostile):
 class Babbler(Hostile):
     """Sends something else than a reply, over every socket that it finds."""
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         for descriptor in range(3, 256):
             with contextlib.suppress(OSError):
                 socket.socket(fileno=os.dup(descriptor)).send(b"\0\0\0\x08cos\nsyst")
@@ -115,48 +115,48 @@ class Babbler(Hostile):
 
 
 class Interrupter(Hostile):
-    def act(self, observation: Any) -> NoReturn:
+    def act(self, observation):
         raise KeyboardInterrupt
 
 
 class Unspeakable(Hostile):
-    def act(self, observation: Any) -> NoReturn:
+    def act(self, observation):
         class BrokenError(Exception):
-            def __str__(self) -> str:
+            def __str__(self):
                 raise KeyboardInterrupt
 
         raise BrokenError
 
 
 class Surrogate(Hostile):
-    def act(self, observation: Any) -> NoReturn:
+    def act(self, observation):
         raise ValueError("\ud800" * 3)
 
 
 class SurrogateMetadata(Hostile):
-    def reset(self, instruction: str, demonstration: Any) -> None:
+    def reset(self, instruction, demonstration):
         self.metadata = {"\ud800": "\ud800"}
 
 
 class Debtor(Hostile):
-    def usage(self) -> dict[str, float]:
+    def usage(self):
         return {"cost_usd": -1e300, "calls": 1e308, "input_tokens": 5.0}
 
 
 class Printer(Hostile):
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         for _ in range(131):
             print("x" * 1_000_000)  # noqa: T201
         return super().act(observation)
 
 
 class Wordy(Hostile):
-    def act(self, observation: Any) -> NoReturn:
+    def act(self, observation):
         raise ValueError("x" * 100_000_000)
 
 
 class Renderless(Hostile):
-    def act(self, observation: Any) -> NoReturn:
+    def act(self, observation):
         from roboirg.core.errors import RenderDeviceError
 
         raise RenderDeviceError("No device.")
@@ -167,12 +167,12 @@ class Forger(Hostile):
 
     message: Any = None
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         send(line_of(host_of(sys._getframe())), self.message)
         time.sleep(3600)
 
 
-def host_of(frame: Any) -> Any:
+def host_of(frame):
     """Return the object that carries out the calls of this process."""
     while not hasattr(frame.f_locals.get("self"), "_under_way"):
         frame = frame.f_back
@@ -210,7 +210,7 @@ class LyingArray(Forger):
 class AnswersTwice(Forger):
     """Sends a second outcome, which would be taken for that of the next call."""
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         send(line_of(host_of(sys._getframe())), {"type": "outcome"})
         return -np.ones((12, 8))
 
@@ -220,13 +220,13 @@ class Announcer(Hostile):
 
     data: ClassVar = (2**62).to_bytes(8, "big")
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         line_of(host_of(sys._getframe())).sendall(self.data)
         time.sleep(3600)
 
 
 class Deep(Hostile):
-    def reset(self, instruction: str, demonstration: Any) -> None:
+    def reset(self, instruction, demonstration):
         self.metadata = {}
         for _ in range(300):
             self.metadata = {"deeper": self.metadata}
@@ -235,27 +235,27 @@ class Deep(Hostile):
 class Umlauts(Hostile):
     """Does nothing wrong: its metadata are long only where escapes are counted."""
 
-    def reset(self, instruction: str, demonstration: Any) -> None:
+    def reset(self, instruction, demonstration):
         self.metadata = {"text": "ä" * 60_000}
 
 
 class NamesServer(Hostile):
-    def reset(self, instruction: str, demonstration: Any) -> None:
+    def reset(self, instruction, demonstration):
         self.metadata = {"server": "localhost:1", "version": "2"}
 
 
 class Asker(Hostile):
     """Asks for nothing, as often as it may, and at the end too."""
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         for _ in range(63):
             self.ask()
         return super().act(observation)
 
-    def close(self) -> None:
+    def close(self):
         self.ask()
 
-    def ask(self) -> None:
+    def ask(self):
         line = line_of(host_of(sys._getframe()))
         send(line, {"type": "question"})
         receive_call(line)
@@ -264,7 +264,7 @@ class Asker(Hostile):
 class Pesterer(Asker):
     """Keeps its world busy, which is nobody's time."""
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         while True:
             self.ask()
 
@@ -272,7 +272,7 @@ class Pesterer(Asker):
 class Forker(Hostile):
     """Leaves a process that no group, session or parent leads to, with everything open."""
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         if (child := os.fork()) == 0:
             os.setsid()
             if os.fork() == 0:
@@ -288,7 +288,7 @@ class Forker(Hostile):
 class GuardStopper(Forker):
     """Stops the process that would end what it leaves."""
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         actions = super().act(observation)
         os.kill(os.getppid(), signal.SIGSTOP)
         return actions
@@ -297,7 +297,7 @@ class GuardStopper(Forker):
 class Chain(Hostile):
     """Leaves a process that starts the next one and exits, again and again; they hold a lock."""
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         lock = Path(os.environ["HOSTILE_NOTES"], "lock").open("w")  # noqa: SIM115 - theirs
         fcntl.flock(lock, fcntl.LOCK_EX)
         if os.fork() == 0:
@@ -312,7 +312,7 @@ class Chain(Hostile):
 class OutOfMemory(Forker):
     """Is killed as the kernel kills for memory, and leaves a process whose name is no text."""
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         ctypes.CDLL(None).prctl(
             15, b"\xff) R 1\n(\xfe"
         )  # the name of this process and its children
@@ -321,7 +321,7 @@ class OutOfMemory(Forker):
 
 
 class Aborter(Forker):
-    def act(self, observation: Any) -> Any:
+    def act(self, observation):
         super().act(observation)
         os.abort()
 
@@ -331,12 +331,12 @@ class Turncoat(Hostile):
 
     if any("host_process" in word for word in sys.orig_argv):
 
-        def attach(self, env: Any) -> None:
+        def attach(self, env):
             env.total = 1e9
 
 
 class LateTurncoat(Hostile):
-    def __init__(self) -> None:
+    def __init__(self):
         self.attach = print
 
 

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from roboirg.records.record import Job, Record
 from roboirg.runs.job_instruction import instruct_job
 from roboirg.runs.plan.plan import Plan
 from roboirg.runs.play import rollout
@@ -30,7 +29,7 @@ class FakeWorld:
 
     render_device = "none"
 
-    def __init__(self, job: Job, seconds: float = 0.0) -> None:
+    def __init__(self, job, seconds=0.0):
         self.instruction = instruct_job(job)
         self.secret = WHISPER.format(job.episode)
         self.seconds = seconds
@@ -38,21 +37,21 @@ class FakeWorld:
         self.total = 0.0
         self.executed_actions = 0
 
-    def reset(self) -> tuple[dict[str, Any], dict[str, Any]]:
+    def reset(self):
         video = np.arange(5 * 4 * 4 * 3, dtype=np.uint8).reshape(5, 4, 4, 3)
         demonstration = {"front_rgb": video, "joint_positions": np.zeros((5, 7))}
         info = {"demonstration": demonstration, "demonstration_source": "planned"}
         now = {"status": "ongoing", "heard": []}
         return self.observation(), {**info, **now, "elapsed_steps": 5, "events": []}
 
-    def observation(self) -> dict[str, Any]:
+    def observation(self):
         return {
             "front_rgb": np.full((256, 256, 3), self.steps, np.uint8),
             "joint_positions": np.full(7, self.steps / 10, np.float32),
             "instruction": self.instruction.text,
         }
 
-    def step_chunk(self, rows: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+    def step_chunk(self, rows):
         time.sleep(self.seconds)
         self.steps = min(self.steps + len(rows), LENGTH)
         self.total += float(np.sum(rows))
@@ -65,10 +64,10 @@ class FakeWorld:
 
     attempts = ()
 
-    def end_state(self) -> tuple[np.ndarray, str]:
+    def end_state(self):
         return np.zeros(3), "paper"
 
-    def close(self) -> None:
+    def close(self):
         pass
 
 
@@ -84,7 +83,7 @@ class FakeWorldRunner(EpisodeRunner):
     seconds: float = 0.0
     notes: Path | None = None
 
-    def __call__(self, job: Job) -> Record:
+    def __call__(self, job):
         if self.notes is not None:
             (self.notes / f"worker-{os.getpid()}").touch()
         kept = rollout.make_env
@@ -105,7 +104,7 @@ class PatientRunner(FakeWorldRunner):
 
     wanted: int = 1
 
-    def __call__(self, job: Job) -> Record:
+    def __call__(self, job):
         assert self.notes is not None
         (self.notes / f"worker-{os.getpid()}").touch()
         deadline = time.monotonic() + 300
@@ -122,17 +121,17 @@ class Dice:
     cameras = ("front",)
     version = "1"
 
-    def __init__(self, seed: int = 0) -> None:
+    def __init__(self, seed=0):
         self.seed = seed
         self.metadata = {"seed": seed}
         self.calls = 0
 
-    def reset(self, instruction: str, demonstration: Any) -> None:
+    def reset(self, instruction, demonstration):
         np.random.seed(self.seed)  # noqa: NPY002
         self.instruction = instruction
         self.start = float(demonstration["front_rgb"].sum())
 
-    def act(self, observation: Any) -> np.ndarray:
+    def act(self, observation):
         self.calls += 1
         assert int(observation["front_rgb"][0, 0, 0]) == round(
             10 * float(observation["joint_positions"][0])
@@ -140,14 +139,14 @@ class Dice:
         rows = np.random.standard_normal((4, 8))  # noqa: NPY002
         return rows + self.start * 1e-6
 
-    def usage(self) -> dict[str, float]:
+    def usage(self):
         return {"calls": self.calls}
 
 
 class Resident(Dice):
     """Tells in which process it is."""
 
-    def usage(self) -> dict[str, float]:
+    def usage(self):
         return {"process": os.getpid()}
 
 
@@ -158,14 +157,14 @@ class BatchedDice:
     version = "1"
     made = 0
 
-    def __init__(self) -> None:
+    def __init__(self):
         type(self).made += 1
         self.metadata: dict[str, Any] = {"made": self.made}
 
-    def begin(self, instruction: str, demonstration: Any, seed: int) -> Any:
+    def begin(self, instruction, demonstration, seed):
         return np.random.default_rng(seed)
 
-    def act_batch(self, states: list[Any], observations: list[Any]) -> list[np.ndarray]:
+    def act_batch(self, states, observations):
         time.sleep(0.01)
         note = os.environ.get("ROBOIRG_TEST_SIZES")
         if note:
@@ -179,17 +178,17 @@ class Picky(BatchedDice):
 
     made = 0
 
-    def begin(self, instruction: str, demonstration: Any, seed: int) -> Any:
+    def begin(self, instruction, demonstration, seed):
         return (np.random.default_rng(seed), seed % 3 == 0)
 
-    def act_batch(self, states: list[Any], observations: list[Any]) -> list[np.ndarray]:
+    def act_batch(self, states, observations):
         time.sleep(0.01)
         if any(bad for _, bad in states):
             raise ValueError("one of them is bad")
         return [rng.standard_normal((4, 8)) for rng, _ in states]
 
 
-def fake_world_plan(policy: str, episodes: int = 8, seeds: int = 1, **options: Any) -> Plan:
+def fake_world_plan(policy, episodes=8, seeds=1, **options):
     return Plan(
         policies=(f"{Path(__file__).stem}:{policy}" if policy.isidentifier() else policy,),
         tasks=("PickXtimes",),

@@ -13,7 +13,7 @@ if os.environ.get(BAD_MACHINE):
 class Local:
     """Is never asked."""
 
-    def reset(self, instruction: str, demonstration: object) -> None:
+    def reset(self, instruction, demonstration):
         """Begin."""
 
     def act(self, observation: object) -> list[list[float]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 from page_text import call
@@ -12,7 +11,6 @@ from run_fakes import fake_run
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.records.record_codec import identity_key
 from roboirg.records.store import RECORDS_FILE, read_records
-from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_file import read_plan_file
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.plan.stored_plans import write_plan
@@ -22,57 +20,79 @@ from roboirg.runs.run.runner import run_plan
 ALL_ARMS = "told,other-goal,silent,silent-empty,scrambled,paraphrase:3,again"
 
 
-def plan_with_arms(arms: str = ALL_ARMS, **changes: object) -> Plan:
+def plan_with_arms(arms=ALL_ARMS, **changes):
+    """Return a plan of three episodes of two tasks, each told in several ways, its arms."""
     fields = {"tasks": "PickXtimes,VideoRepick", "settings": "direct", "episodes": "3", **changes}
-    return make_plan(["oracle"], arms=arms, **fields)  # type: ignore[arg-type]
+    return make_plan(["oracle"], arms=arms, **fields)
 
 
-def folder_of_fake_run(plan: Plan, folder: Path) -> Path:
+def folder_of_fake_run(plan, folder):
     folder.mkdir(exist_ok=True)
     write_plan(plan, folder)
     fake_run(folder, plan)
     return folder
 
 
-def test_a_scene_without_a_second_goal_lacks_the_arm_other_goal_and_is_counted_as_left_out():
-    """An arm is a way to tell an episode: as it is, with another goal, in silence, ...
+def test_each_arm_of_an_episode_is_a_job_of_its_own():
+    """An arm is a way to tell an episode: as it is, with another goal, in silence, ..."""
+    jobs = plan_with_arms().jobs()
 
-    VideoRepick has no other goal, nor have scenes of PickXtimes with a single cube.
-    """
-    plan = plan_with_arms()
-    jobs = plan.jobs()
     assert len({identity_key(job) for job in jobs}) == len(jobs)
     assert len({job.slug for job in jobs}) == len(jobs)
 
-    repick = [job.arm for job in jobs if job.task == "VideoRepick" and job.episode == 0]
-    assert "other-goal" not in repick
-    assert set(repick) == set(plan.arms) - {"other-goal"}
-    # Three episodes of VideoRepick, and two of PickXtimes.
-    assert plan.left_out(jobs) == {"other-goal": 5}
-    assert plan_with_arms("told").left_out(plan_with_arms("told").jobs()) == {}
 
-    explicit = plan_with_arms("told,paraphrase:2", settings="explicit")
-    assert explicit.left_out(explicit.jobs()) == {"paraphrase-2": 6}
+def test_a_scene_without_a_second_goal_lacks_the_arm_other_goal_and_is_counted_as_left_out():
+    """VideoRepick has no other goal in three episodes, nor has PickXtimes in two with one cube."""
+    plan = plan_with_arms()
+    jobs = plan.jobs()
+
+    repick = {job.arm for job in jobs if job.task == "VideoRepick" and job.episode == 0}
+
+    assert repick == set(plan.arms) - {"other-goal"}
+    assert plan.left_out(jobs) == {"other-goal": 5}
+
+
+@pytest.mark.parametrize(
+    ("arms", "settings", "left_out"),
+    [
+        ("told", "direct", {}),
+        # Explicit instructions have one paraphrase only: all six episodes lack the second.
+        ("told,paraphrase:2", "explicit", {"paraphrase-2": 6}),
+    ],
+)
+def test_arms_that_an_episode_lacks_are_counted(arms, settings, left_out):
+    plan = plan_with_arms(arms, settings=settings)
+
+    assert plan.left_out(plan.jobs()) == left_out
 
 
 def test_arms_are_read_from_plan_files_and_from_the_command_line(tmp_path):
-    """paraphrase:2 stands for two arms. Unknown arms are refused; left out ones are counted."""
+    """paraphrase:2 stands for two arms; without a word on arms there is *told* alone."""
     path = tmp_path / "arms.yaml"
     path.write_text("policies: oracle\ntasks: StopCube\narms: [told, paraphrase:2, again]\n")
+
     fields = read_plan_file(str(path))
     made = make_plan(fields.pop("policies"), **fields)
 
     assert made.arms == ("told", "paraphrase-1", "paraphrase-2", "again")
     assert make_plan(["oracle"], tasks="StopCube").arms == ("told",)
-    with pytest.raises(UnknownNameError, match="'silend'; known"):
-        plan_with_arms("told,silend")
-    with pytest.raises(InvalidValueError, match="arm"):
-        plan_with_arms(",")
 
+
+@pytest.mark.parametrize(
+    ("arms", "error", "words"),
+    [("told,silend", UnknownNameError, "'silend'; known"), (",", InvalidValueError, "arm")],
+)
+def test_unknown_arms_and_none_at_all_are_refused(arms, error, words):
+    with pytest.raises(error, match=words):
+        plan_with_arms(arms)
+
+
+def test_a_dry_run_prints_how_many_episodes_lack_an_arm(tmp_path):
     printed = call(
         "run", "--policy", "oracle", "--tasks", "VideoRepick", "--arms", "told,other-goal",
         "--episodes", "2", "--settings", "direct", "--out", tmp_path / "x", "--dry-run",
     )  # fmt: skip
+
     assert "other-goal: 2 episodes left out." in printed
 
 

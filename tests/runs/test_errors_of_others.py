@@ -7,7 +7,6 @@ import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import hosting_fakes
 import pytest
@@ -34,17 +33,17 @@ KEYS_THAT_ARE_THERE = {
 
 
 @pytest.fixture
-def record_after_raise_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+def record_after_raise_in(monkeypatch, tmp_path):
     """Return what plays an episode in which something of `throwing` raises: the record, or why."""
     step = hosting_fakes.FakeWorld.step_chunk
 
-    def and_speak(world: Any, rows: Any) -> Any:
+    def and_speak(world, rows):
         *found, info = step(world, rows)
         return *found, {**info, "heard": [{"text": "Go on.", "step": 1}]}
 
     monkeypatch.setattr(hosting_fakes.FakeWorld, "step_chunk", and_speak)
 
-    def play(hook: str, spec: str = THROWING_POLICY, process: str = "shared") -> Any:
+    def play(hook, spec=THROWING_POLICY, process="shared"):
         monkeypatch.setenv("HOOK", hook)
         monkeypatch.delitem(sys.modules, "throwing", raising=False)
         plan = fake_world_plan(spec, 1, policy_process=process)

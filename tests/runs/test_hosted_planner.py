@@ -12,19 +12,19 @@ from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.policies.by_name.finding import make_policy, read_policy
-from roboirg.records.record import Job, Record
+from roboirg.records.record import Job
 from roboirg.runs.hosting.host_pool import HostPool, HostSettings
 from roboirg.runs.hosting.policy_opening import open_policy
 from roboirg.runs.play.rollout import EpisodeRunner
 
 
-def job_of(spec: str) -> Job:
+def job_of(spec):
     return Job(policy=spec, ref=read_policy(spec), task="VideoUnmask", split="test", episode=0,
               environment=EnvironmentOptions(60),
               options=InstructionOptions("explicit"))  # fmt: skip
 
 
-def record_of_episode(spec: str) -> Record:
+def record_of_episode(spec):
     with HostPool(HostSettings()) as pool, pool.connect() as line:
         return EpisodeRunner(Path(), hosts=line).play_once(job_of(spec))[0]
 

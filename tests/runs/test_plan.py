@@ -35,12 +35,20 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.csv_text import csv_lines
 
 
-def test_episodes_are_given_as_a_count_a_list_ranges_or_all():
-    """4 is the first four; 7 with a comma is a list of one. *train* has 100 episodes."""
-    assert parse_episodes("4", "test", ()) == (0, 1, 2, 3)
-    assert parse_episodes("0,3,5-9", "test", ()) == (0, 3, 5, 6, 7, 8, 9)
-    assert parse_episodes("7,", "test", ()) == (7,)
-    assert parse_episodes("all", "train", ()) == tuple(range(100))
+@pytest.mark.parametrize(
+    ("text", "episodes"),
+    [
+        pytest.param("4", (0, 1, 2, 3), id="count"),
+        pytest.param("0,3,5-9", (0, 3, 5, 6, 7, 8, 9), id="list with a range"),
+        pytest.param("7,", (7,), id="list of one"),
+        pytest.param("all", tuple(range(100)), id="all of the split train"),
+    ],
+)
+def test_episodes_are_given_as_a_count_a_list_ranges_or_all(text, episodes):
+    assert parse_episodes(text, "train", ()) == episodes
+
+
+def test_a_number_that_stands_twice_in_a_list_counts_once():
     assert parse_numbers("stage", "1,5,1") == (1, 5)
 
 
@@ -58,21 +66,33 @@ def test_a_text_that_is_no_list_of_episodes_is_refused_in_one_short_sentence(tex
     assert len(str(caught.value)) < 200
 
 
-def test_a_difficulty_selects_the_episodes_that_have_it_in_every_task():
-    """In the split *test* every fourth is hard: 3, 7, ...; in *val* tasks differ in part."""
-    tasks = tuple(all_tasks())
-    hard = parse_episodes("hard", "test", tasks)
-    assert hard == tuple(range(3, 50, 4))
+ALL_TASKS = tuple(all_tasks())
 
-    both = parse_episodes("hard, medium", "test", tasks)
-    assert both == tuple(sorted({*hard, *range(2, 50, 4)}))
-    assert parse_episodes("hard,0,3", "test", tasks) == (*hard, 0)
 
-    # The difficulties of two tasks of this split have another order in part.
-    uneven = parse_episodes("hard", "val", tasks)
-    assert len(uneven) < len(parse_episodes("hard", "val", ("BinFill",)))
+@pytest.mark.parametrize(
+    ("text", "episodes"),
+    [
+        ("hard", tuple(range(3, 50, 4))),
+        ("hard, medium", tuple(sorted([*range(3, 50, 4), *range(2, 50, 4)]))),
+        ("hard,0,3", (*range(3, 50, 4), 0)),
+    ],
+)
+def test_a_difficulty_selects_the_episodes_that_have_it(text, episodes):
+    """In the split *test* every fourth is hard, 3, 7, ..., and those before are medium."""
+    assert parse_episodes(text, "test", ALL_TASKS) == episodes
+
+
+def test_a_difficulty_selects_an_episode_only_if_it_has_it_in_every_task():
+    """In the split *val* tasks have their difficulties in another order in part."""
+    in_all = parse_episodes("hard", "val", ALL_TASKS)
+    in_one = parse_episodes("hard", "val", ("BinFill",))
+
+    assert set(in_all) < set(in_one)
+
+
+def test_a_difficulty_of_the_endless_random_split_is_refused():
     with pytest.raises(InvalidValueError, match="say how many"):
-        parse_episodes("hard", "random", tasks)
+        parse_episodes("hard", "random", ALL_TASKS)
 
 
 @pytest.mark.parametrize(
@@ -92,32 +112,46 @@ def test_a_refused_list_of_numbers_comes_with_what_to_write_instead(parse, given
 
 
 @pytest.mark.parametrize("text", ["all", "ALL", "all,explicit", "direct, All"])
-def test_the_word_all_in_a_list_stands_for_everything_in_any_case(text):
+def test_the_word_all_in_a_list_of_settings_stands_for_everything_in_any_case(text):
     assert make_plan(["random"], settings=text, episodes="1").settings == ("all",)
-    words = text.replace("explicit", "BinFill").replace("direct", "StopCube")
-    assert make_plan(["random"], tasks=words, episodes="1").tasks == tuple(all_tasks())
 
 
-def test_tasks_of_the_real_study_are_played_only_if_named_by_task_or_suite():
+@pytest.mark.parametrize("text", ["all", "ALL", "all,BinFill", "StopCube, All"])
+def test_the_word_all_in_a_list_of_tasks_stands_for_everything_in_any_case(text):
+    assert make_plan(["random"], tasks=text, episodes="1").tasks == ALL_TASKS
+
+
+@pytest.mark.parametrize(
+    ("text", "tasks"),
+    [
+        ("all", ALL_TASKS),
+        ("PickByCount,Real", ("PickByCount", "PutInBox")),
+        ("real, all", (*ALL_TASKS, "PutInBox", "PickByCount")),
+    ],
+)
+def test_tasks_of_the_real_study_are_played_only_if_named_by_task_or_suite(text, tasks):
     """PutInBox and PickByCount are the suite *real*; *all* are the benchmark's tasks alone."""
-    real = ("PutInBox", "PickByCount")
-    assert make_plan(["random"], tasks="PickByCount,Real", episodes="1").tasks == real[::-1]
+    assert make_plan(["random"], tasks=text, episodes="1").tasks == tasks
 
-    every = make_plan(["random"], tasks="real, all", episodes="1").tasks
-    assert every == (*all_tasks(), *real)
+
+def test_an_unknown_suite_is_refused_with_the_nearest_name():
     with pytest.raises(UnknownNameError, match=r"no task 'reall'.*Did you mean 'real'"):
         make_plan(["random"], tasks="all,reall")
 
 
-def test_a_plan_plays_each_episode_in_every_setting_that_can_express_it_explicit_last():
-    """A setting is a way to put an instruction; not every scene can be told in each."""
-    jobs = make_plan(["random"], episodes="6").jobs()
-    for task in all_tasks():
-        for episode in range(6):
-            played = [job.setting for job in jobs if (job.task, job.episode) == (task, episode)]
-            possible = expressible(get_episode(task, "test", episode))
-            told, *implicit = [setting for setting in possible if setting in plain_settings()]
-            assert played == [*implicit, told]  # explicit comes last
+@pytest.mark.parametrize("task", ALL_TASKS)
+def test_a_plan_plays_each_episode_in_every_setting_that_can_express_it_explicit_last(task):
+    """A setting is a way to put an instruction; not every scene can be told in each.
+
+    `expressible` has explicit first.
+    """
+    jobs = make_plan(["random"], tasks=task, episodes="6").jobs()
+
+    for episode in range(6):
+        possible = expressible(get_episode(task, "test", episode))
+        explicit, *implicit = [setting for setting in possible if setting in plain_settings()]
+        played = [job.setting for job in jobs if job.episode == episode]
+        assert played == [*implicit, explicit]
 
 
 def test_options_that_leave_the_words_as_they_are_add_no_episode():
@@ -134,28 +168,33 @@ def test_options_that_leave_the_words_as_they_are_add_no_episode():
 
 def test_an_instruction_in_turns_is_another_episode_unless_it_has_one_utterance():
     """Utterances come at once, as a prompt, or one by one. Explicit ones have only one."""
-    prompt, turns = (
-        make_plan(["random"], delivery=delivery).jobs() for delivery in ("prompt", "turns")
-    )
-    assert len(prompt) == len(turns)
+    prompt = make_plan(["random"], delivery="prompt").jobs()
+    turns = make_plan(["random"], delivery="turns").jobs()
+
     for job, other in zip(prompt, turns, strict=True):
-        same_job = job.setting == "explicit"
-        assert (job == other) == same_job
-        assert (identity_key(job) == identity_key(other)) == same_job
-        assert (job.slug == other.slug) == same_job
-        assert other.options.delivery == ("prompt" if same_job else "turns")
+        is_same = job.setting == "explicit"
+        assert (job == other) == is_same
+        assert (identity_key(job) == identity_key(other)) == is_same
+        assert (job.slug == other.slug) == is_same
+        assert other.options.delivery == ("prompt" if is_same else "turns")
+
+
+@pytest.mark.parametrize("text", ["every", "direct, Every", "all,every"])
+def test_the_word_every_stands_for_all_settings_and_for_the_harder_ones(text):
+    assert make_plan(["random"], settings=text).settings == ("every",)
 
 
 def test_settings_every_adds_the_harder_settings_that_all_leaves_out():
-    """*direct-rival* is harder: a second thing fits the words but for one property."""
-    assert make_plan(["random"], settings="all,direct-rival").settings == ("all", "direct-rival")
-    for text in ("every", "direct, Every", "all,every"):
-        plan = make_plan(["random"], tasks="StopCube,BinFill", settings=text, episodes="0-3")
-        assert plan.settings == ("every",)
-    for job in plan.jobs():
-        assert job.setting in expressible(get_episode(job.task, "test", job.episode))
+    """*direct-rival* is harder: a second thing fits the words but for one property.
 
-    told = {job.setting for job in plan.jobs()}
+    Of these tasks, StopCube and BinFill, none has spatial instructions.
+    """
+    plan = make_plan(["random"], tasks="StopCube,BinFill", settings="every", episodes="0-3")
+
+    told = set()
+    for job in plan.jobs():
+        told.add(job.setting)
+        assert job.setting in expressible(get_episode(job.task, "test", job.episode))
     assert told > set(plain_settings()) - {"spatial"}
     assert "direct-rival" in told
 
@@ -174,14 +213,14 @@ def test_a_setting_in_turns_is_added_to_its_usual_delivery():
         make_plan(["random"], in_turns="explicit", **options)
 
 
-def test_an_episode_that_lacks_what_a_setting_needs_is_left_out_and_none_at_all_is_refused():
+def test_an_episode_that_lacks_what_a_setting_needs_is_left_out():
     """*direct-rival* needs a second thing that nearly fits the words."""
     options = {"tasks": "BinFill", "settings": "explicit,direct-rival", "episodes": "0-7"}
+
     jobs = make_plan(["random"], **options).checked().jobs()
 
-    told = [job.episode for job in jobs if job.setting == "direct-rival"]
-
-    assert 0 < len(told) < 8
+    with_rival = [job.episode for job in jobs if job.setting == "direct-rival"]
+    assert 0 < len(with_rival) < 8
     assert [job.episode for job in jobs if job.setting == "explicit"] == list(range(8))
     with pytest.raises(InvalidValueError, match="nothing to play: grounded cannot"):
         make_plan(["random"], tasks="PickXtimes", settings="grounded", episodes="1").checked()
@@ -226,21 +265,21 @@ def test_both_forms_are_the_two_that_there_are():
 
 
 def test_episodes_are_played_in_the_given_order_with_explicit_words_last_in_each_scene():
-    """So that no policy hears a scene's goal in plain words before it had to work it out."""
+    """So that no policy hears a scene's goal in plain words before it had to work it out.
+
+    Plain are explicit words, and the *resolved* form, in which references are spelled out. False
+    is before True in what is compared: random before oracle, VideoUnmask before BinFill, episode 3
+    before 0.
+    """
     jobs = make_plan(
         ["random", "oracle"], tasks="VideoUnmask,BinFill", episodes="3,0", policy_seeds="2,0",
         forms="resolved,implicit",
     ).jobs()  # fmt: skip
-    order = [
-        (
-            job.policy == "oracle",
-            job.task == "BinFill",
-            job.episode == 0,
-            job.setting == "explicit" or job.form == "resolved",
-        )
-        for job in jobs
-    ]
 
+    order = []
+    for job in jobs:
+        is_plain = job.setting == "explicit" or job.form == "resolved"
+        order.append((job.policy == "oracle", job.task == "BinFill", job.episode == 0, is_plain))
     assert order == sorted(order)
     assert len({job.slug for job in jobs}) == len(jobs)
 
@@ -343,24 +382,37 @@ def test_commas_separate_policies_but_not_the_servers_of_one_policy():
         parse_policies([])
 
 
-def test_name_equals_spec_gives_a_policy_a_name_that_must_be_its_alone():
+def test_name_equals_spec_gives_a_policy_a_name():
     address = "mme-vla://localhost:8001?history=no"
+
     plan = make_plan([f"pi0.5={address}", "oracle"], tasks="StopCube", episodes="1")
 
     assert [(policy.name, policy.spec) for policy in plan.policies] == [
         ("pi0.5", address), ("oracle", "oracle"),
     ]  # fmt: skip
     assert plan.jobs()[0].policy == "pi0.5"
-    with pytest.raises(InvalidValueError, match="Two policies are named 'a': oracle and random"):
-        make_plan(["a=oracle", "a=random"])
-    with pytest.raises(UnknownNameError, match="Did you mean 'listener'"):
-        make_plan(["mine=listner"])
 
 
-def test_a_policy_name_that_a_shell_or_a_spreadsheet_would_execute_is_refused():
-    for policy in ("-x=oracle", "=cmd|' /C calc'!A0"):
-        with pytest.raises(InvalidValueError, match="name"):
-            make_plan(policy, tasks="PickXtimes", episodes="1")
+@pytest.mark.parametrize(
+    ("policies", "error", "words"),
+    [
+        (
+            ["a=oracle", "a=random"],
+            InvalidValueError,
+            "Two policies are named 'a': oracle and random",
+        ),
+        (["mine=listner"], UnknownNameError, "Did you mean 'listener'"),
+    ],
+)
+def test_a_name_given_twice_or_to_an_unknown_policy_is_refused(policies, error, words):
+    with pytest.raises(error, match=words):
+        make_plan(policies)
+
+
+@pytest.mark.parametrize("policy", ["-x=oracle", "=cmd|' /C calc'!A0"])
+def test_a_policy_name_that_a_shell_or_a_spreadsheet_would_execute_is_refused(policy):
+    with pytest.raises(InvalidValueError, match="name"):
+        make_plan(policy, tasks="PickXtimes", episodes="1")
 
 
 @pytest.mark.parametrize(
@@ -391,10 +443,16 @@ def test_a_policy_name_that_only_resembles_a_number_is_allowed_and_read_back_fro
 @pytest.mark.parametrize("content", ["{", "words", "[]"])
 def test_a_broken_plan_file_in_a_run_is_reported_and_counts_as_no_plan(content, tmp_path, caplog):
     (tmp_path / PLAN_FILE).write_text(content)
-    assert (read_plan(tmp_path), read_plan(tmp_path / "nowhere")) == (None, None)
+
+    assert read_plan(tmp_path) is None
     assert caplog.messages == [
         f"{tmp_path / PLAN_FILE} is not a readable plan, so its missing episodes are not counted."
     ]
+
+
+def test_a_run_that_has_no_plan_file_is_not_reported(tmp_path, caplog):
+    assert read_plan(tmp_path) is None
+    assert caplog.messages == []
 
 
 def test_a_setting_named_next_to_all_is_added_for_the_tasks_that_have_it():

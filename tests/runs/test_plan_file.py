@@ -12,7 +12,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import STAGE_SETS
 from roboirg.language.settings import all_settings
-from roboirg.runs.plan.plan_file import named_plans, read_plan_file
+from roboirg.runs.plan.plan_file import named_plans, plan_text, read_plan_file
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.plan.plan_sections import WorkerNeeds
 from roboirg.runs.plan.stored_plans import write_plan
@@ -186,6 +186,16 @@ def test_a_plan_is_the_same_after_it_was_written_and_read_again(tmp_path, option
         again = make_plan(found.pop("policies"), **found)
         assert again == plan
         assert again.fingerprint == plan.fingerprint
+
+
+@pytest.mark.parametrize("episodes", ["3,", "3", "0-2,7", "easy"])
+def test_the_text_of_a_plan_means_the_same_episodes(tmp_path, episodes):
+    """Of episode 3 alone, of the first three, of a range with one more, and of a difficulty."""
+    plan = make_plan(["random"], tasks="PickXtimes", episodes=episodes)
+
+    read = read_plan_file(path_of_plan_file(tmp_path, plan_text(plan)))
+
+    assert make_plan(**read) == plan
 
 
 def test_a_machine_takes_as_many_workers_as_its_label_and_scarcest_resource_allow():

@@ -13,7 +13,6 @@ from roboirg.language.scenarios import wording_store
 from roboirg.language.scenarios.identity import words_of
 from roboirg.records.record_codec import identity_key
 from roboirg.runs.job_instruction import PreparedJob, instruct_job, other_versions
-from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_file import read_plan_file
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.plan.stored_plans import read_plan, write_plan
@@ -31,19 +30,19 @@ FILE_WITH_A_TEMPLATE = (
 
 
 @pytest.fixture
-def wording_file(tmp_path: Path) -> Path:
+def wording_file(tmp_path):
     path = tmp_path / "test.toml"
     path.write_text(FILE_OF_SENTENCES)
     return path
 
 
 @pytest.fixture
-def no_file_is_open(monkeypatch: pytest.MonkeyPatch) -> None:
+def no_file_is_open(monkeypatch):
     """A process that has opened no file yet, like a worker's."""
     monkeypatch.setattr(wording_store, "_OPEN", {})
 
 
-def plan_in_words_of(path: Path, **options: object) -> Plan:
+def plan_in_words_of(path, **options):
     chosen = read_plan_file("robomme") | {"tasks": "PickXtimes", "episodes": "2"}
     return make_plan(["random"], **(chosen | {"wordings": str(path)} | options))
 

@@ -12,9 +12,10 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import hosting_fakes
@@ -30,11 +31,23 @@ from roboirg.policies.by_name.finding import read_policy
 from roboirg.records.record import Job
 from roboirg.records.store import read_records
 from roboirg.runs.episode_errors import EpisodeError, EpisodeLostError
-from roboirg.runs.hosting import host_pool
+from roboirg.runs.hosting import host_pool, policy_line
 from roboirg.runs.hosting.host_pool import HostPool, HostSettings
 from roboirg.runs.hosting.hosted_policy import HostedPolicy
-from roboirg.runs.hosting.messages import Call, HostRequest, Loss, ask, receive_call, send
+from roboirg.runs.hosting.messages import (
+    Begun,
+    Call,
+    HostRequest,
+    Loss,
+    Outcome,
+    Question,
+    ask,
+    receive_call,
+    receive_request,
+    send,
+)
 from roboirg.runs.hosting.policy_child import PolicyChild
+from roboirg.runs.hosting.policy_line import PolicyLine
 from roboirg.runs.hosting.policy_opening import open_policy
 from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_sections import Hosting
@@ -51,16 +64,16 @@ THREE_POLICIES = tuple(f"hosting_fakes:{name}" for name in ("Dice", "BatchedDice
 
 
 @pytest.fixture
-def host_pool_of_test() -> Iterator[HostPool]:
+def host_pool_of_test():
     with HostPool(HostSettings()) as opened:
         yield opened
 
 
 @pytest.fixture
-def write_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
+def write_policy(tmp_path, monkeypatch):
     """Return what writes a module of a name with a class ``It``, and returns its spec."""
 
-    def write(name: str, text: str) -> str:
+    def write(name, text):
         (tmp_path / f"{name}.py").write_text(
             "import os, pathlib, sys, time\nimport hostile_policies\nimport numpy as np\n" + text
         )
@@ -71,7 +84,7 @@ def write_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
 
 
 @pytest.fixture
-def begun_policy(host_pool_of_test: HostPool, write_policy: Write) -> Host:
+def begun_policy(host_pool_of_test, write_policy):
     """Return what writes a policy and begins an episode of it in a process of its own."""
     return lambda name, text: HostedPolicy(
         host_pool_of_test.connect(), read_policy(write_policy(name, text)), 0
@@ -193,7 +206,7 @@ class It:
     class Video(dict[str, Any]):
         drawn: list[str]
 
-        def __getitem__(self, field: str) -> Any:
+        def __getitem__(self, field):
             self.drawn.append(field)
             return super().__getitem__(field)
 
@@ -219,7 +232,7 @@ class It:
 
 
 @pytest.fixture(scope="module")
-def records_without_a_host(tmp_path_factory: pytest.TempPathFactory) -> dict[Job, dict[str, Any]]:
+def records_without_a_host(tmp_path_factory):
     """Records of worlds that share no host: the policies are in their process."""
     plan = changed(fake_world_plan("Dice", policy_process="shared"), policies=THREE_POLICIES)
     return records_by_job(plan, tmp_path_factory.mktemp("alone"), InProcess())
@@ -445,7 +458,7 @@ def test_a_policys_process_serves_others_after_a_world_died_or_was_interrupted(
     """Would find an interrupt that is forgotten, and a worker whose calls are not answered."""
 
     class Video(dict[str, Any]):
-        def __getitem__(self, field: str) -> Any:
+        def __getitem__(self, field):
             raise KeyboardInterrupt
 
     hosts = host_pool_of_test.connect()
@@ -543,7 +556,7 @@ class It(hostile_policies.Hostile):
     world = begun_policy("viewer", text)
 
     class Video(dict[str, Any]):
-        def __getitem__(self, field: str) -> Any:
+        def __getitem__(self, field):
             child_of(host_pool_of_test).check(10.0)  # of a world that waits
             return super().__getitem__(field)
 
@@ -552,6 +565,30 @@ class It(hostile_policies.Hostile):
     assert world.metadata == {"sum": 96}
 
     world.close()
+
+
+def test_the_time_that_the_world_takes_to_draw_is_not_that_of_the_policy(monkeypatch):
+    """A call of at most a second asks for a picture, which takes a thousand seconds."""
+    seconds = [0.0]
+    monkeypatch.setattr(policy_line, "time", SimpleNamespace(monotonic=lambda: seconds[0]))
+    world, supervisor = socket.socketpair()
+    with world, supervisor:
+        line = PolicyLine(world, read_policy("random"), limit_s=1.0)
+        _, process = receive_request(supervisor)
+        assert process is not None
+        supervisor.shutdown(socket.SHUT_RDWR)  # an error is not looked into
+        with process, contextlib.closing(line):
+            for message in (Begun(), Question(("front_rgb",)), Outcome(message="done")):
+                send(process, message)
+
+            def draw(question: Question) -> Call:
+                seconds[0] += 1000.0
+                return Call("answer", value=question.fields)
+
+            outcome = line.call(Call("act"), draw)
+
+            assert outcome.message == "done"
+            assert [receive_call(process).method for _ in range(2)] == ["act", "answer"]
 
 
 def test_a_frozen_process_is_noticed_although_it_had_sent_many_answers_in_advance(

@@ -45,7 +45,7 @@ def policy_of_version_7(spec: str) -> PolicyRef:
 
 
 @pytest.fixture(scope="module")
-def two_records() -> TwoRecords:
+def two_records():
     first, second, *_ = map(FakePlay(), small_plan(2).jobs())
     return first, second
 
@@ -144,7 +144,7 @@ PAIRS_OF_EQUAL_POLICIES = [
 
 
 @pytest.fixture(scope="module")
-def checkpoints(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def checkpoints(tmp_path_factory):
     places = {name: tmp_path_factory.mktemp(name) for name in ("first", "second")}
     for place in places.values():
         for name, content in CHECKPOINT_FILES.items():

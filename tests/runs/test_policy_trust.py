@@ -11,7 +11,6 @@ import sys
 import tempfile
 import time
 from collections import deque
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from roboirg.cli.options import add_working_directory
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.records.episode_log import logged_slugs
-from roboirg.records.record import Job, Record
+from roboirg.records.record import Record
 from roboirg.records.record_codec import StoreError, encode, read_record
 from roboirg.records.store import read_records
 from roboirg.runs.episode_errors import EpisodeError, Terminated
@@ -262,7 +261,7 @@ def unnamed(records):
 
 
 @pytest.fixture(scope="module")
-def honest_policy_in_an_episode() -> Iterator[HostedPolicy]:
+def honest_policy_in_an_episode():
     """An honest policy in the middle of an episode."""
     with HostPool(HostSettings()) as pool:
         policy = HostedPolicy(pool.connect(), read_policy(HONEST_POLICY), 3)
@@ -331,7 +330,7 @@ def test_a_policys_module_and_its_neighbors_are_imported_only_in_the_policys_pro
         assert (record.error, record.policy_metadata) == (None, {"first": True})
 
 
-def memory_of(pid: int, needle: bytes) -> bool:
+def memory_of(pid, needle):
     """Return whether the readable memory of a process holds some bytes."""
     with Path(f"/proc/{pid}/mem").open("rb", 0) as memory:
         for line in Path(f"/proc/{pid}/maps").read_text().splitlines():
@@ -371,7 +370,7 @@ def test_a_policy_name_that_cannot_be_written_as_utf8_is_refused():
 class CallsFailuresSuccess(FakeWorldRunner):
     """Calls a failure a success, as a policy could that patches the judge in its own process."""
 
-    def __call__(self, job: Job) -> Record:
+    def __call__(self, job):
         record = FakePlay()(job)
         return replace(record, outcome="success", cause="picked the wrong cube")
 

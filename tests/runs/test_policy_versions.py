@@ -5,7 +5,6 @@ from __future__ import annotations
 import linecache
 import os
 import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -44,7 +43,7 @@ NUMBER_BEHIND_TEXT = {
 
 
 @pytest.fixture
-def write_policy_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def write_policy_module(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "checkpointed", raising=False)
     monkeypatch.setenv("CKPT", "7")
@@ -56,7 +55,7 @@ def write_policy_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     return write_policy
 
 
-def code(**parts: str) -> str:
+def code(**parts):
     return CODE_OF_A_POLICY.format(**{"on_class": "", "made": "pass", "reset": "pass", **parts})
 
 
@@ -67,7 +66,7 @@ def policy_opened_here(**parts: str) -> PolicyRef:
     return open_policy(policy_of(namespace["It"]))
 
 
-def play_one_episode(folder: Path) -> None:
+def play_one_episode(folder):
     plan = fake_world_plan("mine=checkpointed:It", 1)
     plan = plan.model_copy(update={"policies": tuple(map(open_policy, plan.policies))})
     run_plan(plan, folder, fake_world_runner(plan, folder), InProcess())
@@ -213,12 +212,12 @@ def test_the_version_of_a_class_in_this_process_is_read_anew_for_each_run(monkey
     """Would find the version of a checkpoint that was loaded for an earlier run."""
 
     class Batched:
-        def __init__(self) -> None:
+        def __init__(self):
             self.version = os.environ["CKPT"]
 
-        def begin(self, instruction: str, demonstration: object) -> None: ...
+        def begin(self, instruction, demonstration): ...
 
-        def act_batch(self, states: object, observations: object) -> None: ...
+        def act_batch(self, states, observations): ...
 
     for checkpoint in ("7", "8"):
         monkeypatch.setenv("CKPT", checkpoint)

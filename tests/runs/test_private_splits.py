@@ -38,7 +38,7 @@ OTHER = "another salt that nobody guesses"
 
 
 @pytest.fixture(autouse=True)
-def _no_salt(monkeypatch: pytest.MonkeyPatch) -> None:
+def _no_salt(monkeypatch):
     monkeypatch.setenv(SALT_VARIABLE, "")  # so that what a test sets is undone
 
 
@@ -99,24 +99,30 @@ def test_a_private_episode_takes_the_first_seed_for_which_a_scene_can_be_made():
     assert rejected > 0
 
 
-def test_a_private_split_is_refused_without_its_salt_or_with_another():
+@pytest.mark.parametrize("salt", ["", OTHER])
+def test_a_private_split_is_refused_without_its_salt_or_with_another(salt):
     split = use_salt(SALT)
-    for other in ("", OTHER):
-        os.environ[SALT_VARIABLE] = other
-        with pytest.raises(MissingSaltError, match=SALT_VARIABLE):
-            get_episode("PickXtimes", split, 0)
-        with pytest.raises(MissingSaltError, match=split):
-            make_plan(["oracle"], split=split, episodes="1")
+    os.environ[SALT_VARIABLE] = salt
+
+    with pytest.raises(MissingSaltError, match=SALT_VARIABLE):
+        get_episode("PickXtimes", split, 0)
+    with pytest.raises(MissingSaltError, match=split):
+        make_plan(["oracle"], split=split, episodes="1")
 
 
-def test_a_short_salt_is_refused_without_being_printed_and_a_known_one_makes_random_private():
+def test_a_short_salt_is_refused_without_being_printed():
     with pytest.raises(InvalidValueError, match="at least 12") as found:
         use_salt("short")
+
     assert "short" not in str(found.value)
     assert known_salt() is None
+
+
+def test_a_known_salt_makes_the_random_split_private_and_no_other():
     assert drawn_split("random") == "random"
 
     split = use_salt(SALT)
+
     assert drawn_split("random") == split
     assert drawn_split("test") == "test"
 
@@ -127,7 +133,7 @@ def test_a_private_split_is_not_played_by_policies_that_share_the_worlds_process
         make_plan(["oracle"], split=split, episodes="1", policy_process="shared")
 
 
-def all_bytes_written_in(folder: Path) -> bytes:
+def all_bytes_written_in(folder):
     """Return all that is written below a folder, with what is packed in archives."""
     found = []
     for path in sorted(folder.rglob("*")):

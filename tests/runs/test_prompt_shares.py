@@ -18,7 +18,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.planners.systems import all_systems
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
-from roboirg.records.record import IDENTITY, Job
+from roboirg.records.record import IDENTITY
 from roboirg.records.record_codec import encode, read_record
 from roboirg.runs.job_instruction import PreparedJob, instruct_job
 from roboirg.runs.plan.plan_file import read_plan_file
@@ -39,7 +39,7 @@ LIMIT_OF_64_TOKENS = PromptLimit(64, 0, most_tokens, "some.model")
 LONG_INSTRUCTION = {"setting": "contextual", "distractors": 16}
 
 
-def job_with(**fields: object) -> Job:
+def job_with(**fields):
     usual = {"policy": "random", "task": "PickXtimes", "split": "test", "episode": 0}
     return job_of(**{**usual, "setting": "direct", **fields})
 
@@ -132,10 +132,16 @@ def test_a_share_of_cut_prompts_is_a_range_if_some_are_unknown(counts, text):
     assert share_text(Counter(counts)) == text  # type: ignore[arg-type]
 
 
-def test_utterances_of_the_same_step_are_sent_as_one_message():
-    """By step; None is never. In the second case "a" comes in the reset, "d" after the end."""
-    assert sent_messages("abc", (0, 0, 0)) == (("a", "b", "c"),)
-    assert sent_messages("abcd", (0, 16, 16, None)) == (("a",), ("b", "c"))
+@pytest.mark.parametrize(
+    ("utterances", "steps", "messages"),
+    [
+        ("abc", (0, 0, 0), (("a", "b", "c"),)),
+        ("abcd", (0, 16, 16, None), (("a",), ("b", "c"))),
+    ],
+)
+def test_utterances_of_the_same_step_are_sent_as_one_message(utterances, steps, messages):
+    """By step; None is never: in the second case "d" was due after the end of the episode."""
+    assert sent_messages(utterances, steps) == messages
 
 
 def test_an_instruction_too_long_as_one_prompt_fits_if_it_comes_in_turns():
@@ -189,27 +195,40 @@ def test_utterances_that_were_never_sent_count_neither_as_read_nor_as_lost():
     assert len(record.prompt.reached) == len(record.instruction)
 
 
+SERVER_WITH_64_TOKENS = read_policy("openpi://localhost:1?prompt_tokens=64&connect=1")
+"""Nobody listens there."""
+
+
 def test_long_prompts_refuse_ends_an_episode_before_it_costs_anything(tmp_path):
-    """In turns the same words are short enough, so it begins, and fails to connect."""
-    spec = "openpi://localhost:1?prompt_tokens=64&connect=1"  # nobody listens there
-    for delivery in ("prompt", "turns"):
-        record = EpisodeRunner(tmp_path, refuse_long=True)(
-            job_with(**LONG_INSTRUCTION, ref=read_policy(spec), delivery=delivery)
-        )
-        if delivery == "prompt":
-            assert (record.outcome, record.error, record.steps) == ("error", "prompt", 0)
-            said = r"prompt: the instruction needs \d+ to \d+ tokens, .* model reads 64; "
-            assert re.match(said, record.cause)
-            assert record.attribution is None
-            assert record.prompt_verdict == "cut"
-            assert "env_reset" not in record.timings
-        else:
-            assert record.error != "prompt"
+    job = job_with(**LONG_INSTRUCTION, ref=SERVER_WITH_64_TOKENS)
+
+    record = EpisodeRunner(tmp_path, refuse_long=True)(job)
+
+    assert (record.outcome, record.error, record.steps) == ("error", "prompt", 0)
+    said = r"prompt: the instruction needs \d+ to \d+ tokens, .* model reads 64; "
+    assert re.match(said, record.cause)
+    assert record.attribution is None
+    assert record.prompt_verdict == "cut"
+    assert "env_reset" not in record.timings
 
 
-def test_a_prompt_that_may_or_may_not_be_cut_is_not_refused():
-    for verdict in ("heard", "unknown"):
-        check_prompt(audit_job(job_with(), LIMIT_OF_64_TOKENS)[0], verdict)
+def test_long_prompts_refuse_lets_an_instruction_begin_that_is_short_enough_in_turns(tmp_path):
+    """It gets as far as the server, to which it cannot connect."""
+    job = job_with(**LONG_INSTRUCTION, ref=SERVER_WITH_64_TOKENS, delivery="turns")
+
+    record = EpisodeRunner(tmp_path, refuse_long=True)(job)
+
+    assert record.error == "connection"
+
+
+@pytest.mark.parametrize("verdict", ["heard", "unknown"])
+def test_a_prompt_that_may_or_may_not_be_cut_is_not_refused(verdict):
+    audit, _ = audit_job(job_with(), LIMIT_OF_64_TOKENS)
+
+    check_prompt(audit, verdict)
+
+
+def test_long_prompts_are_sent_or_refused_and_nothing_else():
     with pytest.raises(InvalidValueError, match="must be 'send' or 'refuse'"):
         make_plan(["random"], long_prompts="cut")
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import socket
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import hosting_fakes
 import pytest
@@ -27,6 +25,7 @@ from roboirg.policies.by_name.finding import read_policy
 from roboirg.records.store import read_records
 from roboirg.runs.hosting.host_pool import HostSettings
 from roboirg.runs.hosting.hosted_policy import HostedPolicy
+from roboirg.runs.run import ray_machines
 from roboirg.runs.run.executor import InProcess, LocalProcesses
 from roboirg.runs.run.ray_cluster import RayCluster
 from roboirg.runs.run.ray_machines import MachineAgent, MachineVersions
@@ -40,14 +39,14 @@ PLAN_OF_TWO_ARMS = small_plan(5).model_copy(update={"arms": ("told", "silent")})
 
 
 @pytest.fixture(scope="module")
-def records_of_one_process(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, object]]:
+def records_of_one_process(tmp_path_factory):
     folder = tmp_path_factory.mktemp("here")
     run_plan(PLAN_OF_TWO_ARMS, folder, FakePlayer(folder), InProcess())
     return all_comparable(folder)
 
 
 @pytest.fixture
-def cluster() -> Iterator[Any]:
+def cluster():
     from ray.cluster_utils import Cluster
 
     nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
@@ -64,7 +63,7 @@ def test_a_cluster_that_loses_a_machine_half_way_gives_the_same_records_as_one_p
     ray.init(address=cluster.address, log_to_driver=False)
     killed = threading.Event()
 
-    def kill() -> None:
+    def kill():
         # Until each of the three machines has one of the endless episodes in hand.
         while line_count(tmp_path) < 8 or len(players := worker_pids(tmp_path, "waiting")) < 3:
             time.sleep(0.05)
@@ -138,6 +137,43 @@ def test_a_cluster_that_cannot_be_joined_is_reported_in_one_sentence(tmp_path):
 def test_a_cluster_with_no_worker_is_refused():
     with pytest.raises(InvalidValueError, match="workers is 0"):
         RayCluster(0)
+
+
+def test_a_silent_client_keeps_no_other_from_the_policy_processes_of_a_machine(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(ray_machines, "KEY_S", 3600.0)
+    hosts = MachineAgent(tmp_path / "agent", HostSettings())
+    address = hosts.check(MachineVersions(())).hosts
+
+    try:
+        with socket.socket(socket.AF_UNIX) as silent:
+            silent.connect(address.path)
+            with address.connect() as line:
+                HostedPolicy(line, read_policy("hosting_fakes:Dice"), 0).close()
+    finally:
+        hosts.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "owner", "ended"),
+    [("{}.pid", 0, True), ("{}.pid", 1, False), ("-{}.pid", 0, False)],
+)
+def test_an_agent_ends_only_processes_that_its_own_user_has_noted(
+    tmp_path, monkeypatch, name, owner, ended
+):
+    """``-1.pid`` would stand for all processes of the user."""
+    folder = tmp_path / "agent"
+    folder.mkdir()
+    (folder / name.format(123456)).touch()
+    killed = []
+    monkeypatch.setattr(ray_machines.os, "kill", lambda pid, _signal: killed.append(pid))
+    user = folder.lstat().st_uid + owner
+    monkeypatch.setattr(ray_machines.os, "getuid", lambda: user)
+
+    MachineAgent(folder, None)
+
+    assert killed == ([123456] if ended else [])
 
 
 def test_only_a_client_with_the_key_reaches_the_policy_processes_of_a_machine(tmp_path):

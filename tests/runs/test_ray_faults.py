@@ -8,7 +8,7 @@ import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -34,7 +34,7 @@ PLAN_OF_16_EPISODES = changed(small_plan(8), tries=3)
 
 
 @pytest.fixture
-def cluster(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+def cluster(monkeypatch):
     from ray.cluster_utils import Cluster
 
     monkeypatch.syspath_prepend(Path(ray_fakes.__file__).parent)
@@ -57,7 +57,7 @@ def act_after_records(
 ) -> threading.Thread:
     """Act in a thread as soon as that many records are stored; never, if the run ends before."""
 
-    def run() -> None:
+    def run():
         while line_count(folder) < count:
             if run_ended is not None and run_ended():
                 return
@@ -107,7 +107,7 @@ def test_a_worker_or_machine_that_freezes_is_ended_and_its_episode_played_elsewh
     cluster.add_node(num_cpus=1)
     frozen: list[int] = []
 
-    def freeze() -> None:
+    def freeze():
         frozen.append(process_ids_of_actors(cluster, actor)[0])
         # Not before: Ray may take longer to start an actor.
         monkeypatch.setattr(ray_pool, "SILENCE_S", 20.0)
@@ -202,7 +202,7 @@ def test_a_run_that_loses_the_head_of_its_cluster_ends_in_one_sentence_and_keeps
     monkeypatch.setattr(ray_head, "HEAD_LOST_S", 5.0)
     gcs = cluster.head_node.all_processes["gcs_server"][0].process.pid
 
-    def kill() -> None:
+    def kill():
         # A call under way for the machines would wait until Ray ends this process.
         monkeypatch.setattr(ray_pool, "LOOK_S", 3600.0)
         # The one that is under way has ended when two more episodes are stored.

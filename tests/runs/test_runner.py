@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import operator
 import signal
 import subprocess
 import sys
@@ -33,7 +32,6 @@ from roboirg.core.errors import InvalidValueError, RenderDeviceError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.policies.by_name.finding import read_policy
-from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import StoreError
 from roboirg.records.run_files import earlier_plans
 from roboirg.records.store import (
@@ -72,7 +70,7 @@ def finish_run(folder: Path) -> RunSummary:
 
 
 @pytest.fixture(scope="module")
-def records_of_an_uninterrupted_run(tmp_path_factory: pytest.TempPathFactory) -> Comparable:
+def records_of_an_uninterrupted_run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("uninterrupted")
     fake_run(folder, small_plan(8))
     return all_comparable(folder)
@@ -231,13 +229,18 @@ def test_a_run_warns_once_of_a_task_on_which_the_policy_was_not_trained(tmp_path
     assert [warning.args[0] for warning in ears.warn.call_args_list] == warned
 
 
-def test_the_number_of_workers_chooses_the_executor(monkeypatch):
-    assert isinstance(choose_executor(None), LocalProcesses)
-
+@pytest.mark.parametrize(
+    ("workers", "executor"),
+    [(None, LocalProcesses(5)), (0, InProcess()), (3, LocalProcesses(3))],
+)
+def test_the_number_of_workers_chooses_the_executor(monkeypatch, workers, executor):
+    """If it is not given, a variable of the environment says it."""
     monkeypatch.setenv("ROBOIRG_WORKERS", "5")
-    assert choose_executor(None) == LocalProcesses(5)
-    assert choose_executor(0) == InProcess()
-    assert choose_executor(3) == LocalProcesses(3)
+
+    assert choose_executor(workers) == executor
+
+
+def test_a_negative_number_of_workers_is_refused():
     with pytest.raises(InvalidValueError, match="workers is -1"):
         choose_executor(-1)
 
@@ -253,7 +256,7 @@ def test_the_number_of_workers_chooses_the_executor(monkeypatch):
 def test_a_record_that_a_worker_of_another_version_made_is_not_stored(tmp_path, field, value, what):
     plan = small_plan(1).checked()
 
-    def elsewhere(job: Job) -> Record:
+    def elsewhere(job):
         return replace(FakePlay()(job), **{field: value})
 
     with pytest.raises(StoreError, match=f"whose {what} version is {value}, .* was not stored"):
@@ -261,26 +264,32 @@ def test_a_record_that_a_worker_of_another_version_made_is_not_stored(tmp_path, 
     assert not (tmp_path / RECORDS_FILE).read_bytes()
 
 
+@pytest.mark.parametrize(
+    ("name", "is_code", "decides_verdicts"),
+    [
+        ("cli/a.py", True, False),
+        ("language/words.toml", True, True),
+        ("core/version.py", True, False),
+        ("tasks/__pycache__/a.pyc", False, False),
+    ],
+)
 def test_a_changed_file_changes_the_fingerprint_of_the_code_and_that_of_verdicts_if_it_matters(
-    tmp_path, monkeypatch
+    tmp_path, monkeypatch, name, is_code, decides_verdicts
 ):
-    """A record has both. Tables cannot change a verdict, words can; caches are no code."""
-    folder = tmp_path / "roboirg"
-    monkeypatch.setattr(episode_record, "__file__", str(folder / "a" / "b" / "module.py"))
-    folder.mkdir()
-    found = [episode_record.code_fingerprints.__wrapped__()]
-    for name, changes in (
-        ("cli/a.py", (True, False)),
-        ("language/words.toml", (True, True)),
-        ("language/words.toml", (True, True)),
-        ("core/version.py", (True, False)),
-        ("tasks/__pycache__/a.pyc", (False, False)),
-    ):
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_text(str(len(found)))
-        found.append(episode_record.code_fingerprints.__wrapped__())
-        before, now = found[-2:]
-        assert tuple(map(operator.ne, before, now)) == changes
+    """A record has both. Commands cannot change a verdict, words can; caches are no code."""
+    monkeypatch.setattr(
+        episode_record, "__file__", str(tmp_path / "roboirg" / "a" / "b" / "module.py")
+    )
+    path = tmp_path / "roboirg" / name
+    path.parent.mkdir(parents=True)
+
+    path.write_text("before")
+    code, verdict_code = episode_record.code_fingerprints.__wrapped__()
+    path.write_text("after")
+    new_code, new_verdict_code = episode_record.code_fingerprints.__wrapped__()
+
+    assert (new_code != code) == is_code
+    assert (new_verdict_code != verdict_code) == decides_verdicts
 
 
 @pytest.mark.parametrize(("error", "place"), [("infrastructure", 1), ("environment", -1)])
@@ -290,7 +299,7 @@ def test_an_episode_that_lost_its_process_is_repeated_at_once_and_one_with_an_er
     """The first episode fails: it is played again as the second one (1), or as the last (-1)."""
     played: list[str] = []
 
-    def play(job: Job) -> Record:
+    def play(job):
         played.append(job.slug)
         record = FakePlay()(job)
         if len(played) > 1:
@@ -303,16 +312,32 @@ def test_an_episode_that_lost_its_process_is_repeated_at_once_and_one_with_an_er
     assert len(played) == len(small_plan(4).jobs()) + 1
 
 
-def test_a_machine_with_another_package_or_policy_version_is_refused_by_name():
-    """A policy whose version is unknown here is not compared."""
+def test_a_machine_with_another_package_version_is_refused():
+    from roboirg.runs.run.ray_machines import MachineVersions
+
+    here = MachineVersions((read_policy("random"),))
+    version = here.installed.package_version
+
+    there = dataclasses.replace(here, installed=here.installed._replace(package_version="9"))
+
+    assert here.difference(there) == f"the package version is 9 there and {version} here"
+
+
+def test_a_machine_with_another_version_of_a_policy_is_refused_by_its_name():
+    from roboirg.runs.run.ray_machines import MachineVersions
+
+    random = read_policy("random")
+    here = MachineVersions((random,))
+    there = MachineVersions((dataclasses.replace(random, version="old"),))
+
+    assert here.difference(there).startswith("the policy version of random is old there")
+
+
+def test_policies_of_an_unknown_version_are_not_compared_between_machines():
     from roboirg.runs.run.ray_machines import MachineVersions
 
     random = read_policy("random")
     here = MachineVersions((unknown_policy("x"), random))
-    assert here.difference(MachineVersions((read_policy("oracle"), random))) is None
-    there = dataclasses.replace(here, installed=here.installed._replace(package_version="9"))
-    own = here.installed.package_version
-    assert here.difference(there) == f"the package version is 9 there and {own} here"
-    older = dataclasses.replace(random, version="old")
-    other = dataclasses.replace(here, policies=(here.policies[0], older))
-    assert str(here.difference(other)).startswith("the policy version of random is old there")
+    there = MachineVersions((read_policy("oracle"), random))
+
+    assert here.difference(there) is None

@@ -32,7 +32,7 @@ from roboirg.runs.run.runner import UNREACHABLE_AFTER, run_plan
 from roboirg.runs.run.workers import Worker
 
 
-def sleeps_for_an_hour(job: Job) -> Record:
+def sleeps_for_an_hour(job):
     time.sleep(3600)
     raise AssertionError(job)
 
@@ -50,7 +50,7 @@ def test_an_episode_that_takes_too_long_is_ended_and_named(tmp_path):
     assert record.duration_s >= 0.5
 
 
-def crashes_in_native_code(job: Job) -> Record:
+def crashes_in_native_code(job):
     ctypes.string_at(0)
     raise AssertionError(job)
 
@@ -99,10 +99,10 @@ def test_drawing_or_physics_that_hangs_is_ended_and_the_episode_played_by_anothe
 class CannotBeUnpickled:
     """Cannot be received by another process."""
 
-    def __call__(self, job: Job) -> Record:
+    def __call__(self, job):
         raise AssertionError(job)
 
-    def __reduce__(self) -> tuple[object, ...]:
+    def __reduce__(self):
         return os._exit, (3,)
 
 
@@ -206,10 +206,10 @@ def test_an_exception_is_an_error_of_the_policy_the_environment_or_the_connectio
 class WithoutConnection:
     """Every episode of one policy ends without a connection."""
 
-    def __init__(self, policy: str) -> None:
+    def __init__(self, policy):
         self.policy = policy
 
-    def __call__(self, job: Job) -> Record:
+    def __call__(self, job):
         record = FakePlay()(job)
         if job.policy != self.policy:
             return record
@@ -232,7 +232,7 @@ def test_a_policy_with_every_other_connection_refused_is_not_given_up(tmp_path):
     """A server that drops every other connection is slow, not gone."""
     turns = itertools.cycle((WithoutConnection("random"), FakePlay()))
 
-    def play(job: Job) -> Record:
+    def play(job):
         return next(turns)(job)
 
     summary = run_plan(small_plan(UNREACHABLE_AFTER), tmp_path, play, InProcess())

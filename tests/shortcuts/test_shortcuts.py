@@ -482,7 +482,7 @@ def test_the_caption_of_a_table_names_the_adjustment_of_its_intervals():
         (("--plan", plan_file(forms="implied")), "implied"),
         (("--split", "tset"), "tset"),
         (("--tasks", "StopCube", "--settings", "spatial"), "no spatial setting in StopCube"),
-        (("--split", "none"), "no spatial setting in StopCube"),
+        (("--split", "none"), "nothing to score"),
         (("--seeds", "-1"), "seeds is -1; it must be a whole number from 0"),
         (("--learned", "--split", "val"), "choose --split test"),
         (("--plan", plan_file(distractors=0)), "distractors"),

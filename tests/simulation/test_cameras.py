@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from roboirg.core.observations import CAMERAS, PICTURE_SIZE
-from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.simulation.world import World
 from roboirg.tasks.splits.splits import get_episode
@@ -15,14 +14,14 @@ pytestmark = pytest.mark.sim
 
 
 @pytest.fixture(scope="module")
-def world() -> World:
+def world():
     world = World(get_episode("PickXtimes", "test", 2).scene)
     world.step(HOME_ACTION)
     return world
 
 
 @pytest.fixture(scope="module")
-def cameras(world) -> Cameras:
+def cameras(world):
     return world.cameras
 
 

@@ -31,11 +31,11 @@ DOWN = Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
 
 
 @pytest.fixture(scope="module")
-def planner() -> MotionPlanner:
+def planner():
     return MotionPlanner(World(get_episode("PickXtimes", "test", 0).scene, visible=False).robot)
 
 
-def random_goals(count: int):
+def random_goals(count):
     rng = np.random.default_rng(1)
     for _ in range(count):
         position = rng.uniform([-0.3, -0.25, 0.0], [0.15, 0.25, 0.3])

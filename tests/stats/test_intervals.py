@@ -17,6 +17,7 @@ from roboirg.stats.intervals import (
     interval_of_values,
     mean_interval,
     ratio_interval,
+    share_interval,
 )
 
 
@@ -158,3 +159,50 @@ def test_every_interval_holds_its_mean_has_a_length_and_stays_between_the_bounds
 def test_intervals_of_rate_gap_and_retention_hold_the_truth_at_the_edge(design, rates, correlation):
     """In 93 of 100 simulations; resamples covered a gap of 2 % against 4 % in 85."""
     assert min(coverage(design, rates, correlation, 300).values()) >= 0.93
+
+
+def three_rates(*, rewritten: int, said: int, explicit: int, episodes: int = 40) -> TaskRates:
+    """A task in which each of three solves the first so many episodes, with one seed."""
+    numbers = np.arange(episodes)
+    rows = np.ones((episodes, 6), dtype=np.int64)
+    for column, solved in ((0, rewritten), (2, said), (4, explicit)):
+        rows[:, column] = numbers < solved
+    return TaskRates.of(rows)
+
+
+@pytest.mark.parametrize(
+    ("rewritten", "share"), [(10, 0.0), (20, 0.5), (30, 1.0), (0, -0.5)], ids=str
+)
+def test_the_interval_of_a_share_holds_the_share_as_measured(rewritten, share):
+    """From 10 to 30 of 40 episodes there are 20 to gain."""
+    interval = share_interval([three_rates(rewritten=rewritten, said=10, explicit=30)])
+
+    assert interval.low < share < interval.high
+
+
+def test_there_is_no_share_of_a_gap_that_may_be_none():
+    assert share_interval([three_rates(rewritten=20, said=20, explicit=21)]) is None
+    assert share_interval([three_rates(rewritten=20, said=21, explicit=20)]) is None
+
+
+def test_more_episodes_give_a_shorter_interval_of_a_share():
+    few = share_interval([three_rates(rewritten=20, said=10, explicit=30)])
+    many = share_interval([three_rates(rewritten=200, said=100, explicit=300, episodes=400)])
+
+    assert many.high - many.low < (few.high - few.low) / 2
+
+
+def test_the_interval_of_a_share_holds_the_true_one_in_most_simulated_runs():
+    """60 % as said, 72 % rewritten, 90 % explicit: 40 % of the gap; episodes differ in ease."""
+    rng = np.random.default_rng(3)
+    held = 0
+    for _ in range(150):
+        ease = rng.random((50, 1)) * 0.5 + rng.random((50, 3)) * 0.5
+        # The chance that a mean of two uniform numbers is below these limits.
+        limits = 1 - np.sqrt(2 * (1 - np.array([0.72, 0.6, 0.9]))) / 2
+        rows = np.ones((50, 6), dtype=np.int64)
+        rows[:, 0::2] = ease < limits
+        interval = share_interval([TaskRates.of(rows)])
+        held += interval is not None and interval.low <= 0.4 <= interval.high
+
+    assert held >= 0.9 * 150

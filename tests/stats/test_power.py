@@ -69,6 +69,12 @@ def test_the_number_of_episodes_given_for_a_gap_finds_it_in_80_percent_and_half_
     assert mcnemar_power(max(1, needed // 2), gap, discordance) < 0.8
 
 
+@pytest.mark.parametrize("gap", [1.0, -1.0])
+def test_six_episodes_find_that_one_policy_solves_all_and_the_other_none(gap):
+    """Five cannot, whichever of the two it is."""
+    assert episodes_needed(gap, 1.0) == 6
+
+
 def test_the_smallest_gap_that_50_episodes_can_find_is_exact_to_a_thousandth():
     """*Find* is at least 80 % power. Too few episodes find none, and no number a gap of 0."""
     gap = smallest_gap(50, 0.3)

@@ -58,7 +58,8 @@ class DeclaredCommand(TyperCommand):
         """Call the function of the command with the declared options that were typed.
 
         They are no arguments of the function, so they are moved from the context's ``params`` to
-        its ``obj``; ``--tasks all`` becomes ``{"tasks": "all"}``.
+        its ``obj``: ``--tasks all`` becomes ``{"tasks": "all"}``. Options that were not typed are
+        dropped.
         """
         ctx.obj = {}
         for parameter in self._made:

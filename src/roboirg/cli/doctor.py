@@ -110,7 +110,7 @@ def run_checks(render_s: int = 0) -> list[Check]:
 
 
 def report(checks: Sequence[Check]) -> str:
-    """Return a line for each check, with a remedy below every failure."""
+    """Return a line for each check, with a remedy below every failure, and last how many failed."""
     width = max((len(check.name) for check in checks), default=0)
     lines: list[str] = []
     failures = 0
@@ -135,6 +135,7 @@ def run_doctor(render_s: int = 0) -> int:
 
 
 def _check_python() -> Check:
+    """Check that this Python is new enough."""
     wanted = ".".join(map(str, OLDEST_PYTHON))
     return Check(
         "Python",
@@ -145,7 +146,10 @@ def _check_python() -> Check:
 
 
 def _check_packages() -> Iterator[Check]:
-    """Check this package, and each package that it, or one of its extras, needs."""
+    """Check this package, and each package that it, or one of its extras, needs.
+
+    What only other extras need is not looked at. Versions are compared, nothing is imported.
+    """
     try:
         requirements = metadata.requires(DISTRIBUTION) or []
     except metadata.PackageNotFoundError:
@@ -173,7 +177,7 @@ def _is_needed(requirement: Requirement) -> bool:
 
 
 def _check_package(name: str, specifier: SpecifierSet) -> Check:
-    """Check that a package is installed in a version that will do."""
+    """Check that a package is installed in a version that `specifier`, such as ``>=2``, allows."""
     remedy = f"pip install '{name}{specifier}'"
     try:
         version = metadata.version(name)
@@ -203,6 +207,7 @@ def _try(name: str, find: Callable[[], str], without: str = "") -> Check:
         find: returns what was found, empty if it is switched off; raises if it is missing or set to
             a wrong value.
         without: what happens without it, such as that runs are slower; empty if all runs need it.
+            Then what is missing is a failure, else a remark.
     """
     can_do_without = bool(without)
     try:
@@ -231,7 +236,7 @@ def _check_rendering(render_s: int = 0) -> tuple[Check, Check]:
     """Return two checks of the renderer: that there is a device, and that it draws.
 
     A child process draws, as a driver may crash or hang. It prints the device in its first line,
-    and in the next ones what it drew.
+    and in the next ones what it drew; see `_draw_test_frame`.
 
     Args:
         render_s: seconds for which to go on drawing.
@@ -239,12 +244,13 @@ def _check_rendering(render_s: int = 0) -> tuple[Check, Check]:
     # "-u" for no buffer, because a line may be the last one before a crash.
     draw = ("-u", "-m", "roboirg.cli.doctor", "--frame", str(render_s))
     child = _run_python(*draw, limit_s=2 * (FRAME_TIMEOUT + render_s))
-    device, *drawn = child.output.splitlines() or [""]
+    lines = child.output.splitlines() or [""]
+    device = lines.pop(0)
     remedy = f"{to_unset(DEVICE_VARIABLE, *DRIVER_VARIABLES)}{_RENDER_REMEDY}"
 
     found = "not tried: no device"
     if device:
-        steps = drawn[-1:]
+        steps = lines[-1:]  # the last thing that was drawn, if anything was
         if not child.is_ok:
             steps.append(child.fault)
         found = ", then ".join(steps)
@@ -259,6 +265,7 @@ def _run_python(*arguments: str, limit_s: int = FRAME_TIMEOUT) -> _Child:
     """Run Python with some arguments in a child process; return its output and its fault.
 
     The fault says in words why it did not end well: too slow, a signal, or its last line of stderr.
+    Nothing is raised.
     """
     try:
         child = subprocess.run(  # noqa: S603 - constant words in our own interpreter
@@ -285,7 +292,7 @@ def _run_python(*arguments: str, limit_s: int = FRAME_TIMEOUT) -> _Child:
 
 
 def _check_memory() -> Check:
-    """Check the memory of this machine, or what a container may use of it."""
+    """Check the memory of this machine, or what a container may use of it: enough for a worker."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     limit_file = Path("/sys/fs/cgroup/memory.max")  # a container's own limit
     if limit_file.is_file():
@@ -308,7 +315,10 @@ def _write_to(folder: str) -> str:
 
 
 def _name_proxies() -> str:
-    """Name the proxies of addresses outside; models use them, and the fetch of model files."""
+    """Return the proxies of addresses outside, in words, or ``"none"``.
+
+    Models use them, and so does the fetch of model files.
+    """
     used = {proxy_of(f"{scheme}://example.org").words for scheme in ("http", "https")}
     return ", ".join(sorted(used)).strip(" ,") or "none"
 
@@ -345,7 +355,10 @@ def _draw_test_frame(render_s: int) -> None:
 
 
 def _go_on_drawing(world: World, seconds: int) -> None:
-    """Draw a world that moves for some seconds; print after each how many pictures were drawn."""
+    """Draw a world that moves for some seconds; print after each how many pictures were drawn.
+
+    The kernel ends this process if a single picture takes longer than `FRAME_TIMEOUT`.
+    """
     from roboirg.core.observations import CAMERAS
     from roboirg.simulation.physics_settings import HOME_ACTION
 
@@ -363,7 +376,10 @@ def _go_on_drawing(world: World, seconds: int) -> None:
 
 
 def _main() -> int:
-    """Run the doctor, or with ``--frame SECONDS`` its child that draws; return the exit code."""
+    """Run the doctor, or with ``--frame SECONDS`` its child that draws; return the exit code.
+
+    0 if all is well, else 1.
+    """
     if "--frame" not in sys.argv[1:]:
         return run_doctor()
     seconds = sys.argv[2:] or ["0"]

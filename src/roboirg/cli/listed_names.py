@@ -24,4 +24,5 @@ class ListingCommand(TyperCommand):
 
 
 def _names(found: re.Match[str]) -> str:
+    """Return the names for a match of `_LIST`, with commas: those that its function returns."""
     return ", ".join(pkgutil.resolve_name(found[1])())

@@ -11,9 +11,13 @@ def known_tasks(given: object, wordings: str | None = None) -> tuple[str, ...]:
     """Return the names of the tasks that were typed or that a plan names, such as ``all``.
 
     Args:
-        given: names or groups of tasks.
+        given: names of tasks or suites: a text with commas, or a list.
         wordings: identity of a wording file, which has sentences that others wrote. If it is given,
-            ``all`` means only the tasks for which it has sentences.
+            ``all`` means only the tasks for which it has sentences. None, or a pool of ours,
+            changes nothing.
+
+    Raises:
+        InvalidValueError: there is no such task or suite.
     """
     from roboirg.core.word_pools import outside_words
     from roboirg.language.scenarios.wording_store import find_wordings
@@ -45,7 +49,18 @@ def known_settings(given: object, tasks: Sequence[str]) -> tuple[str, ...]:
 
 
 def known_names(kind: str, given: object, known: Sequence[Name]) -> tuple[Name, ...]:
-    """Return the names that were typed, separated by commas; ``all`` means all that are known."""
+    """Return the names that were typed, separated by commas; ``all`` means all that are known.
+
+    ``"floor", "chance, oracle"`` -> ``("chance", "oracle")``.
+
+    Args:
+        kind: what they name, for errors.
+        given: text as typed, or a list of a plan.
+        known: every valid name.
+
+    Raises:
+        UnknownNameError: a name is none of them.
+    """
     from roboirg.runs.plan.option_parsing import means_all, parse_names
 
     if means_all(given):

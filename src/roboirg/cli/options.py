@@ -61,6 +61,14 @@ class PlanWords:
         section: str = "",
         own: Sequence[str] = (),
     ) -> None:
+        """Read the plan's file, if one is named; `fields` is what stands in it, else empty.
+
+        Args:
+            context: of the command, which knows what was typed.
+            plan: name of a plan or its file.
+            section: key of the part of the file that belongs to this command alone.
+            own: keys that this part may have.
+        """
         from roboirg.runs.plan.plan_file import read_plan_file
 
         self._context = context
@@ -69,7 +77,12 @@ class PlanWords:
         self.fields = {} if plan is None else read_plan_file(plan, section)
 
     def given(self, name: str, value: str) -> Any:  # noqa: ANN401 - as in the file
-        """Return the value of an option of the command; if it was not typed, as in the plan."""
+        """Return the value of an option of the command; if it was not typed, as in the plan.
+
+        Args:
+            name: of the option, and of the plan's field.
+            value: of the option, its default if it was not typed.
+        """
         source = self._context.get_parameter_source(name)
         is_typed = source is not None and source.name != "DEFAULT"
         return value if is_typed else self.fields.get(name, value)

@@ -117,7 +117,13 @@ class _Reporter:
 def _time_left(work: _Work, now: float, done: int, total: int) -> str:
     """Return the time left at the rate so far, such as ``5 min left``; empty if it is not known.
 
-    What was done before the first report, `work.first`, does not count.
+    What was done before the first report, `work.first`, does not count, as it took no time here.
+
+    Args:
+        work: when it began, and how much was done then.
+        now: time on the same clock, s.
+        done: how much is done.
+        total: how much there is.
     """
     if done in (total, work.first):
         return ""

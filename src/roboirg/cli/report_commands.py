@@ -99,7 +99,7 @@ def report(
 
 
 def _serve(page: Path, port: int) -> None:
-    """Serve the page of a run with its videos on this machine."""
+    """Serve the page of a run with its videos on this machine until Ctrl-C."""
     from roboirg.analysis.page.page_server import run_server
     from roboirg.util.web.request_origin import LOOPBACK
 
@@ -202,7 +202,12 @@ def tables(
 
 
 def _print_tables(tables: Sequence[Table], format: str) -> None:  # noqa: A002
-    """Print tables: in colors, as one document for a program, or one after the other."""
+    """Print tables: in colors, as one document for a program, or one after the other.
+
+    Args:
+        tables: to print.
+        format: ``terminal``, or the name of a format of files, such as ``csv``.
+    """
     from rich.console import Console
 
     from roboirg.analysis.tables.rendering import get_format
@@ -349,7 +354,15 @@ class _TableChoice(NamedTuple):
 
 
 def _breakdown_tables(data: RunData, by: str) -> list[Table]:
-    """Make the tables of gaps by kind of words that the runs have results for."""
+    """Return the tables of gaps by kind of words that the runs have results for.
+
+    Args:
+        data: of the runs.
+        by: names of breakdowns, such as ``"pattern,slots"``, or ``"all"``.
+
+    Raises:
+        InvalidValueError: there are none.
+    """
     from roboirg.analysis.tables.diagnostic_tables import make_breakdown_table
 
     made: list[Table] = []
@@ -365,7 +378,7 @@ def _breakdown_tables(data: RunData, by: str) -> list[Table]:
 
 
 def _breakdowns(by: str | None) -> tuple[Breakdown, ...]:
-    """Return the breakdowns with the names in a text such as ``pattern,stage``; none without it."""
+    """Return the breakdowns with the names in a text such as ``pattern,slots``; none for None."""
     from roboirg.analysis.measures.breakdowns import BREAKDOWNS
 
     if by is None:

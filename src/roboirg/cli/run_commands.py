@@ -118,7 +118,16 @@ def run(
 
 
 def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummary:
-    """Play a plan with a progress bar; exits the process when it is interrupted."""
+    """Play a plan with a progress bar, and return what came of it.
+
+    Ends this process when it is interrupted; finished episodes are stored by then.
+
+    Args:
+        plan: what to play.
+        out: folder of the run.
+        executor: plays the episodes.
+        retry: whether to play again what is stored as an error.
+    """
     from roboirg.runs.episode_errors import Terminated
     from roboirg.runs.run.progress import ConsoleReporter
     from roboirg.runs.run.runner import episode_runner, run_plan
@@ -139,7 +148,10 @@ def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummar
 
 
 def print_tables_of(source: Source) -> None:
-    """Print the tables of a run, what is mixed in it, and its unsuccessful episodes."""
+    """Print the tables of a run, what is mixed in it, and its unsuccessful episodes.
+
+    The tables go to stdout, warnings of mixed versions to stderr.
+    """
     from rich.console import Console
 
     from roboirg.analysis.results.reading import read_frame
@@ -168,7 +180,10 @@ def warn_of_mixtures(*frames: Frame) -> None:
 
 
 def report_problems(summary: RunSummary, folder: Path) -> None:
-    """Print errors and missing episodes of a run on stderr; exits with 2 if there are any."""
+    """Print errors and missing episodes of a run on stderr; exit with 2 if there are any.
+
+    Videos that could not be written are printed, too, but are no reason to exit.
+    """
     if summary.video_errors:
         typer.echo(
             f"{len(summary.video_errors):,} of {counted(summary.played, 'video')} could not be "
@@ -200,8 +215,11 @@ def _plan(name: str | None, typed: dict[str, Any], usual: Sequence[str]) -> Plan
 
     Args:
         name: of the plan or its file; None for a plan of typed options alone.
-        typed: options by name.
+        typed: options by name; typed ones count before those of the file.
         usual: the policies of a plan that names none; empty to refuse such a plan.
+
+    Raises:
+        InvalidValueError: there is no policy, or an option is wrong.
     """
     from roboirg.runs.plan.plan_fields import FLAT
     from roboirg.runs.plan.plan_file import read_plan_file
@@ -224,7 +242,13 @@ def _plan(name: str | None, typed: dict[str, Any], usual: Sequence[str]) -> Plan
 
 
 def _executor(plan: Plan, name: str, workers: int | None) -> Executor:
-    """Return what plays the episodes of a plan: processes of this machine, or a Ray cluster."""
+    """Return what plays the episodes of a plan: processes of this machine, or a Ray cluster.
+
+    Args:
+        plan: with the time limit of an episode, and what a cluster needs.
+        name: ``local`` or ``ray``.
+        workers: number of workers; None for as many as suit the machine or cluster.
+    """
     check_names("executor", [name], EXECUTORS)
     if name == "ray":
         from roboirg.runs.run.ray_cluster import RayCluster
@@ -243,8 +267,7 @@ def _print_counts(plan: Plan, folder: Path | None) -> None:
 
     Args:
         plan: what would be played.
-        folder: of the run, which may not exist yet; None if none is named, so that nothing is
-            stored.
+        folder: of the run, which may not exist yet; None if it was not named.
     """
     from rich.console import Console
 
@@ -354,8 +377,8 @@ def _print_prompt_shares(
 ) -> None:
     """Print how many instructions are too long for the policies that declare a limit of tokens.
 
-    Policies that declare no limit are named below the table, but for the built-in ones, which
-    read every instruction.
+    A row for each such policy, a column for each of `settings`. Policies that declare no limit are
+    named below the table, but for the built-in ones, which read every instruction.
     """
     from roboirg.core.policy_ref import BUILT_IN
     from roboirg.runs.play.prompt_shares import prompt_shares, share_text

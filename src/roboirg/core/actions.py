@@ -101,9 +101,10 @@ ACTION_SPACES: Mapping[str, ActionSpace] = {
 
 
 def choice_action(label: str, point: tuple[float, float] | None = None) -> CheckedActions:
-    """Return the action of a choice: its letter, and row and column of the point if it has one.
+    """Return the action of a choice: its letter as a number, then row and column of its point.
 
-    ``"b", (120, 80)`` -> 1, 120, 80; ``"b"`` -> 1, -1, -1.
+    ``"b", (120, 80)`` -> ``[1, 120, 80]``; ``"b"``, which needs no point -> ``[1, -1, -1]``. Raises
+    InvalidActionError if the label is no single letter.
     """
     if len(label) != 1 or not label.isascii() or not label.isalpha():
         raise InvalidActionError(f"Choice {label!r} is not a letter.")
@@ -114,13 +115,18 @@ def choice_action(label: str, point: tuple[float, float] | None = None) -> Check
 
 
 def find_action_space(name: object) -> ActionSpace:
-    """Return the action space of that name."""
+    """Return the action space of that name; raises UnknownNameError if there is none."""
     check_names("action space", [name], ACTION_SPACES)
     return ACTION_SPACES[str(name)]
 
 
 def check_action(action: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> CheckedActions:
-    """Return the action as finite numbers of the space's size."""
+    """Return one action as an array of the space's size, ``(8,)`` for joint angles, in float64.
+
+    Raises:
+        InvalidActionError: it has another shape, or a value is not a finite number. Limits of the
+            space are not checked.
+    """
     numbers = _numbers(action, space)
     if numbers.shape != (space.size,):
         raise InvalidActionError(
@@ -131,7 +137,13 @@ def check_action(action: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> Checked
 
 
 def check_chunk(actions: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> CheckedActions:
-    """Return a policy's answer as a chunk (n, size), n >= 1; one action is a chunk of one."""
+    """Return a policy's answer as a chunk (n, size), n >= 1; one action is a chunk of one.
+
+    Shape ``(8,)`` -> ``(1, 8)``; ``(5, 8)`` stays.
+
+    Raises:
+        InvalidActionError: it has another shape, or a value is not a finite number.
+    """
     numbers = _numbers(actions, space)
     chunk = numbers[None] if numbers.ndim == 1 else numbers  # one action becomes one row
     if chunk.ndim != 2 or chunk.shape[1] != space.size or len(chunk) == 0:  # noqa: PLR2004
@@ -143,20 +155,17 @@ def check_chunk(actions: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> Checked
 
 
 def _numbers(action: ArrayLike, space: ActionSpace) -> CheckedActions:
-    """Return what a policy gave as an array of float64, of any shape.
+    """Return what a policy gave as an array of float64; `check_chunk` and others check its shape.
 
-    Takes lists, and arrays of NumPy, PyTorch and JAX.
+    Takes lists, and arrays of NumPy, PyTorch and JAX. Texts, flags, complex numbers, rows of
+    different lengths and masked values are refused.
 
     Raises:
         InvalidActionError: it is no array of real numbers.
     """
     got = type(action).__name__
     if hasattr(action, "detach"):
-        # A tensor of PyTorch; NumPy takes none in bfloat16, with a gradient, or on a GPU.
-        tensor = action.detach().cpu()
-        if tensor.is_floating_point():
-            tensor = tensor.double()
-        action = tensor.numpy()
+        action = _as_numpy(action)
     try:
         numbers = np.asarray(action)
     except ValueError:
@@ -176,6 +185,15 @@ def _numbers(action: ArrayLike, space: ActionSpace) -> CheckedActions:
             f"An action ({space.name}): expected an array of {space.size} real numbers, got {got}."
         )
     return numbers.astype(np.float64)
+
+
+def _as_numpy(tensor: Any) -> NDArray[Any]:  # noqa: ANN401 - PyTorch need not be installed
+    """Return a tensor of PyTorch as an array; NumPy takes none in bfloat16, or on a GPU, itself."""
+    detached = tensor.detach().cpu()  # without its gradient
+    if detached.is_floating_point():
+        detached = detached.double()
+    array: NDArray[Any] = detached.numpy()
+    return array
 
 
 def _check_values(values: NDArray[np.object_], *, is_real: bool) -> None:

@@ -43,10 +43,10 @@ def paraphrase_number(arm: str) -> int | None:
 
 
 def check_arm(arm: str) -> None:
-    """Check that there is such an arm; a paraphrase needs its number.
+    """Check the name of a control arm: ``"silent"``, or with its number ``"paraphrase-1"``.
 
     Raises:
-        UnknownNameError: there is none.
+        UnknownNameError: there is no such arm.
     """
     is_known = arm in ARMS and arm != PARAPHRASE
     number = paraphrase_number(arm)
@@ -58,10 +58,10 @@ def check_arm(arm: str) -> None:
 
 
 def parse_arm(text: str) -> tuple[str, ...]:
-    """Return the arms of a name as typed.
+    """Return the names of the control arms that a user's text stands for.
 
-    ``silent`` -> itself; ``paraphrase:2`` -> ``paraphrase-1`` and ``paraphrase-2``; without a
-    number, `PARAPHRASES` of them.
+    ``"silent"`` -> ``("silent",)``; ``"paraphrase:2"`` -> ``("paraphrase-1", "paraphrase-2")``;
+    without a number, `PARAPHRASES` of them.
 
     Raises:
         UnknownNameError: there is no such arm.

@@ -38,8 +38,8 @@ class Choice(NamedTuple):
 def check_choices(actions: CheckedActions, choices: Sequence[Choice]) -> None:
     """Check that actions (n, 3) choose one of a task's choices, with a point where it needs one.
 
-    An action is the number of a choice, then row and column of the point; see
-    `roboirg.core.actions.CHOICE`.
+    An action is the number of a choice (0 is a), then row and column of the point, or -1, -1; see
+    `roboirg.core.actions.CHOICE`. With two choices, ``[2, -1, -1]`` is an error.
 
     Raises:
         InvalidActionError: one does not; the message names the choices.

@@ -94,12 +94,15 @@ class Rule(NamedTuple):
 
 
 def absent(fact: Fact) -> FactCount:
-    """Return the condition that a fact does not hold."""
+    """Return the condition that a fact does not hold: that at most 0 of one fact hold."""
     return FactCount((fact,), least=0, most=0)
 
 
 def facts_of(condition: Condition | Rule) -> tuple[Fact, ...]:
-    """Return all facts in a condition."""
+    """Return all facts that a condition, or the condition of a rule, mentions.
+
+    One that only counts control steps (`Elapsed`) mentions none.
+    """
     match condition:
         case Fact():
             return (condition,)

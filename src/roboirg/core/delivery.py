@@ -38,7 +38,8 @@ class HeardUtterance(NamedTuple):
 def utterance_steps(count: int, delivery: str) -> tuple[int, ...]:
     """Return the control step of the policy's turn at which each of `count` utterances is said.
 
-    In turns, three are said at 0, 20 and 40, and five at 0, 10, 20, 30 and 40.
+    With the delivery ``prompt`` all are said at 0. With ``turns``, three are said at 0, 20 and 40,
+    and five, which must fit into the same time, at 0, 10, 20, 30 and 40.
     """
     if delivery != TURNS or count < 2:  # noqa: PLR2004 - one utterance has no other to wait for
         return (0,) * count
@@ -53,13 +54,16 @@ def utterance_steps(count: int, delivery: str) -> tuple[int, ...]:
 class SpokenInstruction:
     """The utterances of one episode and which of them the policy has heard.
 
+    Utterances are heard in order, and each once; `hear` is called with steps that never decrease.
+
     Attributes:
         heard: what the policy has heard, in order.
-        prompt: the words heard last. An observation that comes after several utterances brings
-            all of them.
+        prompt: the words heard last. An observation that comes after several utterances brings all
+            of them.
     """
 
     def __init__(self, turns: Sequence[str], delivery: str) -> None:
+        """Schedule the utterances; hear what is said at step 0."""
         steps = utterance_steps(len(turns), delivery)
         self._schedule = tuple(zip(steps, turns, strict=True))
         self.heard: list[HeardUtterance] = []
@@ -74,7 +78,7 @@ class SpokenInstruction:
     def hear(self, step: int) -> None:
         """Hear what has been said up to a control step; call at every observation.
 
-        `prompt` becomes what is new; it stays if nothing is.
+        `prompt` becomes the new utterances, joined; it stays as it is if nothing new was said.
         """
         unheard = self._schedule[len(self.heard) :]
         new_texts = [text for said_at, text in unheard if said_at <= step]
@@ -83,6 +87,9 @@ class SpokenInstruction:
             self.prompt = " ".join(new_texts)
 
     def said_at(self, step: int) -> str:
-        """Return the words said last at a control step, whether the policy observed it or not."""
+        """Return the words said last at or before a control step, heard or not.
+
+        Utterances that are said at the same step are joined. Nothing changes.
+        """
         last = max(said_at for said_at, _ in self._schedule if said_at <= step)
         return " ".join(text for said_at, text in self._schedule if said_at == last)

@@ -92,10 +92,12 @@ ENVIRONMENT_OPTIONS = tuple(option.name for option in fields(EnvironmentOptions)
 
 
 def check_demonstration_frames(value: object) -> DemonstrationFrames:
-    """Return a value as a choice of frames of the video.
+    """Return a value as a choice of frames of the video, or raise an error.
+
+    ``"all"``, ``"none"``, or n >= 1 for every n-th frame.
 
     Raises:
-        InvalidValueError: it is neither ``"all"`` nor ``"none"`` nor a whole number from 1 on.
+        InvalidValueError: it is none of these.
     """
     if value in ("all", "none"):
         return value

@@ -68,15 +68,19 @@ _SLOT_WORDS: Mapping[str, Callable[[Any], str]] = {
 
 
 def values_in(content: SlotValue) -> tuple[str | int, ...]:
-    """Return the values of a slot, one or several; what was read from a file has lists."""
+    """Return the values of a slot, a named part of a goal, as a tuple: ``"red"`` -> ``("red",)``.
+
+    A slot holds one value or several; what was read from a file has lists instead of tuples.
+    """
     return tuple(content) if isinstance(content, tuple | list) else (content,)
 
 
 def describe_goal(goal: Mapping[str, Any]) -> str:
     """Return a goal, or what a model takes for one, in words.
 
-    ``{"color": "red", "repeats": 3}`` -> ``red, 3 times``; ``{"colors": ["red", "blue"], "counts":
-    [2, 1]}`` -> ``2 red, 1 blue``. Counted colors come last.
+    ``{"color": "red", "repeats": 3}`` -> ``"red, 3 times"``; ``{"colors": ["red", "blue"],
+    "counts": [2, 1]}`` -> ``"2 red, 1 blue"``. Counted colors come last. Never fails: values of a
+    model that fit no slot are shown as they are.
     """
     values = {slot: values_in(content) for slot, content in goal.items()}
     amounts: list[str] = []
@@ -160,7 +164,7 @@ class Scene:
         return tuple(motion for motion in self.motions if isinstance(motion, kind))
 
     def hidden_in(self, container: str) -> SceneObject | None:
-        """Return the cube under the named container, or None if that container is empty."""
+        """Return the cube under the named container, or None if there is none."""
         for item in self.objects:
             if item.inside == container:
                 return item
@@ -212,7 +216,7 @@ class Goal:
         return tuple(zip(self.texts("colors"), self.numbers("counts"), strict=True))
 
     def _value(self, slot: str, kind: type[Value]) -> Value:
-        """Return the value of a slot, which must be of a kind."""
+        """Return the value of a slot; raises TypeError if it is not of type `kind`."""
         value = self[slot]
         if not isinstance(value, kind):
             raise TypeError(f"slot {slot!r} holds {value!r}, which is no {kind.__name__}")
@@ -310,7 +314,7 @@ class Stage:
     in_video: bool = True
 
     def forbidding(self, *forbidden: Fact | Rule) -> Stage:
-        """Return the stage in which these fail the episode as well."""
+        """Return a copy of the stage in which these facts and rules fail the episode as well."""
         return replace(self, forbids=(*self.forbids, *forbidden))
 
 

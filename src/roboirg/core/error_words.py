@@ -39,8 +39,10 @@ class _Step(NamedTuple):
 def one_line(error: BaseException) -> str:
     """Return an exception as one line: its kind, its message, and file and line of the user's code.
 
-    ``ValueError: no such joint (lab/walk.py, line 12)``. It is the same in every process. To a key
-    that an observation or a demonstration lacks, it adds those that are there.
+    ``ValueError: no such joint (lab/walk.py, line 12)``. Never raises, and gives the same text in
+    every process: memory addresses are left out. To a key that an observation or a demonstration
+    lacks, it adds those that are there. At most `MAX_CAUSE_LENGTH` characters; the place is kept
+    whole as far as possible, the message is cut.
     """
     try:
         text = str(error)
@@ -71,9 +73,10 @@ def is_of_others(error: BaseException) -> bool:
 
 
 def _last_step(error: BaseException) -> _Step | None:
-    """Return the last step in code of users; without any, the last in the package we called first.
+    """Return the last step of a traceback that is in the code of users, to name its file and line.
 
-    Steps in our own code and in Python's do not count; None if there are no others.
+    Without any, it is the last step in the package that we called first. Steps in our own code and
+    in Python's do not count; None if there are no others.
     """
     steps_outside = []
     for frame, line in traceback.walk_tb(error.__traceback__):
@@ -95,19 +98,22 @@ def _package(frame: FrameType) -> str:
 
 
 def _is_python(file: str) -> bool:
-    """Return whether a file comes with Python, or is none."""
+    """Return whether a file comes with Python, or is none, such as ``<string>``."""
     stdlib = sysconfig.get_path("stdlib")
     return file.startswith(("<frozen", "<string", stdlib)) and not _LIBRARY.search(file)
 
 
 def _is_users(frame: FrameType) -> bool:
-    """Return whether a file is not of a library, or its package adds something to ours."""
+    """Return whether code is a user's: of no library, or of a package that extends ours."""
     return not _LIBRARY.search(frame.f_code.co_filename) or _package(frame) in _extensions()
 
 
 @functools.cache
 def _extensions() -> frozenset[str]:
-    """Return the installed packages that add something to ours, by entry points."""
+    """Return the names of installed packages that have entry points in a group ``roboirg.…``.
+
+    Looked up once; cached for the life of the process.
+    """
     find = importlib.metadata.entry_points
     packages = set()
     for group in find().groups:
@@ -119,7 +125,8 @@ def _extensions() -> frozenset[str]:
 def _from_import_path(file: str) -> str:
     """Return the path of a file from where it was imported, which other machines share.
 
-    With ``/home/me`` on the import path, ``/home/me/lab/walk.py`` is ``lab/walk.py``.
+    With ``/home/me`` on the import path, ``/home/me/lab/walk.py`` is ``lab/walk.py``. Of several
+    folders that contain it, the innermost counts; without any, the path stays as it is.
     """
     longest = ""
     for folder in sys.path:
@@ -130,9 +137,10 @@ def _from_import_path(file: str) -> str:
 
 
 def _keys_there(error: BaseException, frame: FrameType) -> str:
-    """Return the keys of an observation or a demonstration in a frame that lacks an error's key.
+    """Return words with the keys that exist, for a KeyError of an observation or a demonstration.
 
-    For ``observation["front"]``: *; the observation has front_rgb, gripper, …*; empty for others.
+    For ``observation["front"]``: ``"; the observation has front_rgb, gripper, …"``. Looks among the
+    local variables of the frame that raised the error; empty if there is no such mapping.
     """
     if not isinstance(error, KeyError):
         return ""

@@ -46,6 +46,10 @@ class UnknownNameError(InvalidValueError):
     """
 
     def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
+        """Make the message: all known names, and the nearest one as a suggestion, if any is near.
+
+        ``There is no task 'PickXtime'; known: PickXtimes, …. Did you mean 'PickXtimes'?``
+        """
         names = list(known)
         import difflib  # here, because only a mistake needs it
 
@@ -61,10 +65,15 @@ class UnknownNameError(InvalidValueError):
 
 
 def check_names(kind: str, names: Iterable[object], known: Iterable[str]) -> None:
-    """Raise if one of the names is unknown.
+    """Raise if one of the names is unknown; return nothing otherwise.
+
+    Args:
+        kind: what they name, for the message: ``"camera"``.
+        names: those to check.
+        known: every valid name.
 
     Raises:
-        UnknownNameError: likewise; the message suggests the nearest.
+        UnknownNameError: the first unknown one; the message suggests the nearest.
     """
     every = list(known)
     for name in names:
@@ -73,10 +82,10 @@ def check_names(kind: str, names: Iterable[object], known: Iterable[str]) -> Non
 
 
 def known_name(kind: str, name: str, known: Sequence[Name]) -> Name:
-    """Return a name if it is known.
+    """Return a name if it is known, typed as one of `known`.
 
     Raises:
-        UnknownNameError: it is not.
+        UnknownNameError: it is not; `kind` says in the message what it should name.
     """
     check_names(kind, [name], known)
     return known[known.index(name)]

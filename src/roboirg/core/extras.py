@@ -37,10 +37,11 @@ def extra_needed(sentence: str, extra: str) -> Iterator[None]:
 
 
 def install_command(extra: str) -> str:
-    """Return the command that adds an extra to this installation of the package.
+    """Return the shell command that adds an extra, such as ``"report"``, to this installation.
 
-    It names what the package was installed from: ``.[report]`` in a checkout, ``name[report] @
-    git+https://…`` from a repository, ``name[report]`` from an index.
+    It names what the package was installed from: ``pip install -e '.[report]'`` in a checkout,
+    ``pip install 'roboirgbench[report] @ git+https://…'`` from a repository, ``pip install
+    'roboirgbench[report]'`` from an index.
     """
     if (_CHECKOUT / "pyproject.toml").is_file():
         folder = "." if Path.cwd() == _CHECKOUT else _CHECKOUT
@@ -65,7 +66,11 @@ def _pip() -> str:
 
 
 def _origin() -> str | None:
-    """Return the address that pip noted when it did not install from an index (PEP 610)."""
+    """Return the address that pip noted when it did not install from an index (PEP 610).
+
+    ``git+https://…@1a2b3c``, or a file's URL; None for an index, or if the package is not
+    installed.
+    """
     import json
     from importlib import metadata
 

@@ -286,7 +286,7 @@ FACT_TRAITS: Mapping[FactKind, FactTraits] = MappingProxyType(_TRAITS)
 
 
 def register_fact_kind(kind: FactKind, traits: FactTraits) -> None:
-    """Add a kind of fact. Adding the same one again changes nothing.
+    """Add a kind of fact, which `fact_traits` then knows; adding the same one twice does no harm.
 
     Raises:
         InvalidValueError: the kind exists with other traits.
@@ -298,22 +298,27 @@ def register_fact_kind(kind: FactKind, traits: FactTraits) -> None:
 
 
 def fact_traits(kind: FactKind) -> FactTraits:
-    """Return the traits of a kind.
+    """Return the traits of a kind of fact: what it means, and how it is said and shown.
 
-    A kind that is not registered, as in a record of a task that is not installed, is a state
-    called by its name.
+    A kind that is not registered, as in a record of a task that is not installed, is a state called
+    by its name: ``"upside_down"`` -> *upside down cube_red*.
     """
     traits = FACT_TRAITS.get(kind)
     if traits is not None:
         return traits
     words = kind.replace("_", " ")
+    # `past` is a pattern, in which braces of a stranger's record would name fields.
+    pattern = words.replace("{", "{{").replace("}", "}}")
     return FactTraits(
-        role=FactRole.STATE, subjects=(), holds_while="", past=f"{words} {{subject}}", state=words
+        role=FactRole.STATE, subjects=(), holds_while="", past=f"{pattern} {{subject}}", state=words
     )
 
 
 def raised_kind(object_kind: str) -> FactKind | None:
-    """Return the kind of fact that says that an object of a kind is in the hand and up."""
+    """Return the kind of fact that says that an object of a kind is in the hand and up.
+
+    ``"cube"`` -> ``"picked"``, ``"container"`` -> ``"lifted"``, ``"button"`` -> None.
+    """
     for kind, traits in FACT_TRAITS.items():
         if traits.role is FactRole.RAISE and object_kind in traits.subjects:
             return kind

@@ -49,10 +49,16 @@ Cause = Annotated[str, msgspec.Meta(max_length=MOST_CAUSE_LETTERS)]
 
 
 def check_whole(name: str, value: object, least: int = 1, most: int = MOST_COUNT) -> int:
-    """Return a value if it is a whole number between two bounds; True and False are none.
+    """Return a value if it is a whole number from `least` to `most`; True and False are none.
+
+    Args:
+        name: of the value, with which the message begins.
+        value: any object; 2.0 and ``"2"`` are refused, too.
+        least: smallest allowed number.
+        most: largest allowed number.
 
     Raises:
-        InvalidValueError: it is not; the sentence begins with its name.
+        InvalidValueError: it is not.
     """
     if type(value) is int and least <= value <= most:
         return value
@@ -79,7 +85,11 @@ def described(text: str) -> dict[str, str]:
 
 
 def as_name(text: str) -> str:
-    """Return the text of a stranger as a name: what a name may not hold is written as escapes."""
+    """Return any text from outside as a name, which may hold no characters that control a terminal.
+
+    They are written as escapes: an escape character becomes the four letters ``x1b`` behind a
+    backslash. Long texts are cut.
+    """
     shown = re.sub(f"[{CONTROLS}]", _escape, text)
     return clip_text(shown, MOST_NAME_LETTERS)
 

@@ -34,11 +34,12 @@ class Rectangle:
         return Rectangle(self.x, self.y, self.half_x + by, self.half_y + by, self.yaw)
 
     def to_local(self, x: float, y: float) -> tuple[float, float]:
-        """Return a world point in the rectangle's frame: from its center, x along its yaw."""
+        """Return a world point in the rectangle's frame (m): from its center, x along its yaw."""
         cos = math.cos(self.yaw)
         sin = math.sin(self.yaw)
         dx = x - self.x
         dy = y - self.y
+        # Turned back by the yaw.
         return cos * dx + sin * dy, cos * dy - sin * dx
 
 
@@ -74,7 +75,10 @@ class Region(NamedTuple):
     half_y: float
 
     def draw(self, rng: np.random.Generator, inset: float = 0.0) -> tuple[float, float]:
-        """Draw a uniform point of the region, shrunk by `inset` on each side."""
+        """Draw a uniform point (x, y) of the region, shrunk by `inset` meters on each side.
+
+        Both random numbers are drawn at once, x first; the order decides which scene a seed gives.
+        """
         share_x, share_y = rng.random(2).tolist()
         x = self.x + (2.0 * share_x - 1.0) * (self.half_x - inset)
         y = self.y + (2.0 * share_y - 1.0) * (self.half_y - inset)
@@ -82,10 +86,12 @@ class Region(NamedTuple):
 
 
 def overlap(first: Footprint, second: Obstacle) -> bool:
-    """Return whether a footprint touches or overlaps an obstacle: a case for each pair of shapes.
+    """Return whether a footprint on the table touches or overlaps an obstacle.
 
-    As in RoboMME, a line next to a rectangle counts as clear of it only if their projections on a
-    side of the rectangle or on the line are apart: not those across the line.
+    There is a case for each pair of shapes; the order of the cases does not matter but for the
+    last, which exchanges the two. As in RoboMME, a line next to a rectangle counts as clear of it
+    only if their projections on a side of the rectangle or on the line are apart: not those across
+    the line.
     """
     if isinstance(second, Line):
         thin = Rectangle(second.x, second.y, second.half, 0.0, second.yaw)
@@ -113,10 +119,11 @@ def distance_to(rectangle: Rectangle, x: float, y: float) -> float:
 
 
 def _separations(first: Rectangle, second: Rectangle) -> tuple[bool, bool]:
-    """Return for either axis of `first`, x and y, whether it separates the two.
+    """Return whether the x axis, and whether the y axis, of `first` separates two rectangles.
 
-    An axis separates them if their shadows on it do not touch. Two rectangles are apart if one of
-    the four axes of both separates them (separating-axis test).
+    An axis separates them if their projections (shadows) on it do not touch. Two rectangles are
+    apart if one of the four axes of both separates them (separating-axis test): call it both ways
+    round.
     """
     center_x, center_y = first.to_local(second.x, second.y)
     cos = abs(math.cos(second.yaw - first.yaw))
@@ -136,7 +143,13 @@ def place(
 ) -> Placement | None:
     """Return the first of at most 256 draws whose clearance is free of all obstacles.
 
-    The clearance is the area that a candidate needs. None if every draw hits an obstacle.
+    Args:
+        draw: returns a random candidate.
+        clearance: returns the area that a candidate needs.
+        obstacles: what the area must not touch.
+
+    Returns:
+        The candidate; None if every draw hits an obstacle.
     """
     for _ in range(MAX_DRAWS):
         candidate = draw()

@@ -30,9 +30,10 @@ _spellings: set[re.Pattern[str]] = set()
 
 
 def remember_key(key: str | None) -> None:
-    """Remember a key or a password, so that `without_keys` removes it; None is none.
+    """Remember a key or a password, so that `without_keys` removes it from texts from now on.
 
-    Of ``Bearer KEY`` the last word is one, too.
+    None and texts under eight letters are no keys. Of ``"Bearer KEY"`` the last word alone is one,
+    too.
     """
     if key is None or not key.strip():
         return
@@ -48,10 +49,11 @@ def remember_key(key: str | None) -> None:
 
 
 def _letter_pattern(letter: str) -> str:
-    """Return the pattern of a letter as it is, or as software encodes or escapes it.
+    """Return a regular expression for a letter as it is, or as software encodes or escapes it.
 
-    Several backslashes are one letter, as each may be escaped again. No pattern can match in two
-    ways, which would take for ever.
+    ``"&"`` also matches ``%26``, ``&amp;``, ``&#38;`` and, escaped in JSON, ``u0026`` after a
+    backslash. Several backslashes are one letter, as each may be escaped again. Atomic groups
+    ``(?>…)`` keep a pattern from matching in two ways, which could take for ever.
     """
     if letter[0] == "\\":
         count = len(letter)
@@ -71,11 +73,11 @@ def _letter_pattern(letter: str) -> str:
 
 
 def _base64_patterns(secret: bytes) -> list[str]:
-    """Return patterns of the letters of Base64 that a secret decides, wherever in a text it begins.
+    """Return regular expressions for a secret in Base64, wherever in a longer text it begins.
 
     Base64 writes three bytes (24 bits) as four letters of 6 bits, so there are three places to
     begin. Letters that hold bits of the bytes next to the secret, too, are not decided by it, and
-    are left out. ``key`` -> ``a2V5`` at the first place, ``tle`` at the second, ``rZX`` at the
+    are left out. ``b"key"`` -> ``a2V5`` at the first place, ``tle`` at the second, ``rZX`` at the
     third.
     """
     patterns: list[str] = []
@@ -93,9 +95,10 @@ def _base64_patterns(secret: bytes) -> list[str]:
 
 
 def without_keys(text: str) -> str:
-    """Return a text with an asterisk for each letter of a key.
+    """Return a text with an asterisk for each letter of a key that `remember_key` was given.
 
-    The longest first: a key may be part of another one, whose rest would stay.
+    The longest key first: a shorter one may be part of it, and its rest would stay. The text keeps
+    its length.
     """
     longest_first = sorted(_spellings, key=lambda spelling: len(spelling.pattern), reverse=True)
     for spelling in longest_first:

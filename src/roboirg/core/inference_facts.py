@@ -56,9 +56,10 @@ class InferenceFacts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
 
 def inference_facts(policy: object) -> InferenceFacts:
-    """Return the facts of this process and of the networks that a policy holds.
+    """Return what this process computes with, and number types and devices of a policy's networks.
 
-    A policy whose networks are elsewhere, as in another process, has the facts as ``inference``.
+    ``libraries={"torch": "2.4.0"}, dtypes=("bfloat16",), devices=("cuda:0",)``. A policy whose
+    networks are in another process has the facts of that as its attribute ``inference``.
     """
     known = getattr(policy, "inference", None)
     if isinstance(known, InferenceFacts):
@@ -83,7 +84,10 @@ def _word(value: object) -> str:
 
 
 def _libraries() -> dict[str, str]:
-    """Return the versions of the libraries that this process has imported."""
+    """Return the versions of the libraries that this process has imported.
+
+    ``{"torch": "2.4.0", "numpy": "2.1.0"}``; nothing is imported to find out.
+    """
     versions = {}
     for name in LIBRARIES:
         if _MODULES.get(name, name) in sys.modules:
@@ -95,8 +99,9 @@ def _libraries() -> dict[str, str]:
 def _parameters(policy: object) -> Iterator[Any]:
     """Yield the parameters of PyTorch networks among the attributes of an object, and of theirs.
 
-    Searches level by level: the object, what it holds, what these hold, and so on; each object
-    once, as they may hold each other.
+    Searches level by level: the object, what it holds, what these hold, and so on, `_DEPTH` levels;
+    each object once, as they may hold each other. What a network holds is not searched: its
+    parameters include those of its parts.
     """
     torch = sys.modules.get("torch")  # a process that has not imported it has no networks
     network_class = getattr(getattr(torch, "nn", None), "Module", None)

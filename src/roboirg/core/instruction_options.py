@@ -96,7 +96,11 @@ OPTION_NAMES = tuple(option.name for option in fields(InstructionOptions))
 
 
 def as_fields(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return keyword arguments of options as fields, whose stages are a tuple."""
+    """Return keyword arguments of options as fields, whose stages are a tuple.
+
+    ``{"stages": [1, 5]}`` -> ``{"stages": (1, 5)}``, and ``{"stages": 5}`` -> ``{"stages": (5,)}``.
+    Others stay; the mapping that is given does not change.
+    """
     values = dict(given)
     if "stages" in values:
         stages = values["stages"]

@@ -23,7 +23,7 @@ without a demonstration."""
 
 
 def check_cameras(cameras: object) -> tuple[str, ...]:
-    """Return a value as names of cameras.
+    """Return a value as a tuple of names of cameras: ``["front"]`` -> ``("front",)``.
 
     Raises:
         InvalidValueError: it is no tuple or list, or names a camera twice.

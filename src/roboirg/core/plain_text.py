@@ -40,7 +40,11 @@ def is_encodable(text: str) -> bool:
 
 
 def counted(count: int, noun: str, plural: str | None = None) -> str:
-    """Return a count with its noun: ``1 episode``, ``2,550 episodes``, ``0 tries``."""
+    """Return a count with its noun: ``(1, "episode")`` -> ``"1 episode"``.
+
+    ``(2550, "episode")`` -> ``"2,550 episodes"``. `plural` is for nouns that take no *s*: ``(0,
+    "try", "tries")`` -> ``"0 tries"``.
+    """
     if count == 1:
         return f"{count} {noun}"
     return f"{count:,} {plural or f'{noun}s'}"
@@ -50,5 +54,5 @@ _SINGULAR_VERBS = {"are": "is", "were": "was", "have": "has", "do": "does"}
 
 
 def verb_for(count: int, plural: str) -> str:
-    """Return a verb that agrees with a count: ``is`` for 1 and ``are``, else ``are``."""
+    """Return a verb that agrees with a count: ``(1, "are")`` -> ``"is"``; for others `plural`."""
     return _SINGULAR_VERBS[plural] if count == 1 else plural

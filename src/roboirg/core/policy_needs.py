@@ -28,16 +28,17 @@ _MISSING = object()
 
 
 def merge_cameras(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the cameras that either needs."""
+    """Return the cameras that either of two needs, in the order of `CAMERAS`."""
     return tuple(camera for camera in CAMERAS if camera in (*one, *other))
 
 
 def merge_demonstration_frames(
     one: DemonstrationFrames, other: DemonstrationFrames
 ) -> DemonstrationFrames:
-    """Return the frames of the video that contain those that each needs.
+    """Return the frames of the video that contain those that each of two needs.
 
-    Every 4th and every 6th -> every 2nd; none and every 4th -> every 4th; every 2nd and 3rd -> all.
+    A number n stands for every n-th frame. 4 and 6 -> 2; ``"none"`` and 4 -> 4; 2 and 3 ->
+    ``"all"``.
     """
     strides = [1 if frames == "all" else int(frames) for frames in (one, other) if frames != "none"]
     if not strides:
@@ -47,7 +48,10 @@ def merge_demonstration_frames(
 
 
 def merge_observe_every(one: int | None, other: int | None) -> int | None:
-    """Return the control steps between observations that contain those that each needs."""
+    """Return the control steps between observations that contain those that each of two needs.
+
+    The greatest common divisor: 4 and 6 -> 2. None is no need: None and 4 -> 4, None twice -> None.
+    """
     periods = [period for period in (one, other) if period is not None]
     return math.gcd(*periods) if periods else None
 
@@ -55,7 +59,11 @@ def merge_observe_every(one: int | None, other: int | None) -> int | None:
 def merge_trained_tasks(
     one: tuple[str, ...] | None, other: tuple[str, ...] | None
 ) -> tuple[str, ...] | None:
-    """Return the tasks that both were trained on; None names none and leaves out none."""
+    """Return the tasks that both of two were trained on, in the order of the first.
+
+    None declares nothing, so it restricts nothing: None and ``("PickXtimes",)`` ->
+    ``("PickXtimes",)``.
+    """
     if one is None:
         return other
     if other is None:
@@ -167,6 +175,10 @@ class PolicyNeeds:
     )
 
     def __post_init__(self) -> None:
+        """Replace each value by its final form, as its rule `check` returns it.
+
+        A need that nobody has declared, None by default, is not checked.
+        """
         for need in fields(self):
             value = getattr(self, need.name)
             is_undeclared = value is None and need.default is None
@@ -196,7 +208,10 @@ class PolicyNeeds:
 
     @classmethod
     def of_planner(cls, planner: object) -> Self:
-        """Return what a planner declares; by default, it needs no pictures."""
+        """Return what a planner, which names subgoals, declares; by default, it needs no pictures.
+
+        Only needs that have a rule for merging are read; see `need_rules`.
+        """
         values: dict[str, Any] = {"cameras": (), "demonstration_frames": "none"}
         values |= _declared(planner, _names(cls, "merge"))
         return cls(**values)
@@ -213,7 +228,10 @@ class PolicyNeeds:
 
     @property
     def declared(self) -> dict[str, Any]:
-        """The needs without those that are None, as JSON values: tuples become lists."""
+        """The needs without those that are None, as JSON values: tuples become lists.
+
+        The way back is ``PolicyNeeds(**declared)``: the checks of the fields accept lists.
+        """
         declared = {}
         for need in fields(self):
             value = getattr(self, need.name)
@@ -222,7 +240,7 @@ class PolicyNeeds:
         return declared
 
     def merge(self, planner: PolicyNeeds) -> Self:
-        """Return the needs of this policy together with those of its planner.
+        """Return the needs of this policy together with those of the planner that guides it.
 
         Needs that planners do not have, such as the action space, stay this policy's.
         """
@@ -251,7 +269,8 @@ ENV_NEEDS = _names(PolicyNeeds, "env")
 def _declared(policy: object, names: Iterable[str]) -> dict[str, Any]:
     """Return the attributes of those names that a policy, or a class of policies, has.
 
-    A policy with ``cameras = ("front",)`` and nothing else -> ``{"cameras": ("front",)}``.
+    A policy with ``cameras = ("front",)`` and nothing else -> ``{"cameras": ("front",)}``. Values
+    are not checked here.
     """
     is_class = inspect.isclass(policy)
     declared = {}

@@ -18,6 +18,8 @@ HANDS = "hands"
 """Option of a planner: what follows its subgoals, a policy or one of the next two."""
 RESOLVE = "resolve"
 """Kind of a policy behind a rewriter of what was said."""
+BEHIND = "behind"
+"""In the makeup of such a policy, the name of what hears the rewritten words."""
 SCRIPTED = "scripted"
 ELSEWHERE = "elsewhere"
 """Hands next to the world; and none, as a planner's own process has none."""
@@ -93,7 +95,11 @@ class PolicyRef:
 
     @property
     def hosted_part(self) -> PolicyRef:
-        """What runs in the process of its own: all of it, or its planner without hands."""
+        """What runs in the process of its own: all of it, or its planner without hands.
+
+        For a planner whose scripted hands are in the simulator's process, option `HANDS` becomes
+        `ELSEWHERE`, so that the other process makes none.
+        """
         if self.place != "split":
             return self
         options = {**dict(self.options), HANDS: ELSEWHERE}

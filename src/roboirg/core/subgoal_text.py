@@ -24,7 +24,8 @@ _STEPS = re.compile(r" for (\d{1,4}) steps?$")
 def split_steps(words: str) -> tuple[str, int | None]:
     """Return words without the number of control steps at their end, and that number.
 
-    ``hold still for 20 steps`` becomes ``hold still`` and 20.
+    ``"hold still for 20 steps"`` -> ``("hold still", 20)``; ``"hold still"`` -> ``("hold still",
+    None)``.
     """
     found = _STEPS.search(words)
     if found is None:
@@ -33,9 +34,9 @@ def split_steps(words: str) -> tuple[str, int | None]:
 
 
 def split_point(subgoal: str) -> tuple[str, Point | None]:
-    """Return the words of a subgoal without points, and its first point.
+    """Return the words of a subgoal without points, and its first point (row, column) or None.
 
-    ``pick up the cube at <120, 80>`` becomes ``pick up the cube`` and (120, 80).
+    ``"pick up the cube at <120, 80>"`` -> ``("pick up the cube", (120, 80))``.
     """
     found = _POINT.search(subgoal)
     if found is None:

@@ -82,7 +82,9 @@ class Request(NamedTuple):
 def read_subgoal(subgoal: str) -> Request | None:
     """Return what a subgoal asks for; None if it has no form of the grammar.
 
-    *Pick up the red cube at <120, 80>.* -> ``pick_cube`` of a red cube, at row 120, column 80.
+    ``"Pick up the red cube at <120, 80>."`` -> ``Request("pick_cube", thing="cube", color="red",
+    point=(120, 80))``. Capitals, spaces and a final period do not matter. Each form is compared
+    with the whole text, in the order of `_FORMS`; the first that fits counts.
     """
     plain = " ".join(subgoal.lower().split()).rstrip(".")
     words, point = split_point(plain)

@@ -60,8 +60,8 @@ class Versions(NamedTuple):
     def differences(self, other: Versions) -> list[Mismatch]:
         """Return all in which two differ, in the order of the fields.
 
-        Environment versions 1 and 2 -> ``Mismatch("environment version", 1, 2)``. What one of the
-        two does not know is no difference.
+        Environment versions 1 and 2 -> ``[Mismatch("environment version", 1, 2)]``. What one of the
+        two does not know (None) is no difference.
         """
         if self == other:
             return []
@@ -70,11 +70,17 @@ class Versions(NamedTuple):
             if field != "makeup":
                 what = field.replace("_", " ")
                 pairs.append(Mismatch(what, getattr(self, field), getattr(other, field)))
+        # None stands for what one of the two does not know.
         return [pair for pair in pairs if pair.first != pair.second and None not in pair]
 
 
 def _makeup_pairs(first: dict[str, str], second: dict[str, str]) -> list[Mismatch]:
-    """Return what makes two policies, and their options if the same makes both, equal or not."""
+    """Return what makes each of two policies, then each option with both values, equal or not.
+
+    ``{"policy": "oracle", "noise": "2"}`` and ``{"policy": "oracle"}`` -> ``policy`` with *oracle*
+    twice, ``option noise`` with *2* and *at its default*. If different things make them, their
+    options are not compared. Both dictionaries lose their entry `POLICY`.
+    """
     maker = Mismatch(POLICY, first.pop(POLICY, None), second.pop(POLICY, None))
     if maker.first != maker.second:
         return [maker]  # the options of another policy are others, too

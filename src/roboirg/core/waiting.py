@@ -43,7 +43,8 @@ _queued = [0.0]
 def waiting(what: str, *, is_queue: bool = False) -> Iterator[None]:
     """Report what this process waits for while the block runs, in words to follow "waiting for".
 
-    `is_queue`: it waits for its turn, which is not the policy's own time.
+    With `is_queue`, it waits for its turn, which is not the policy's own time, and the seconds are
+    added to those of `queued_seconds`. Waits may be nested; the innermost is reported.
     """
     wait = Wait(what, is_queue, time.monotonic())
     _waits.append(wait)

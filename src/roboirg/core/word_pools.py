@@ -19,7 +19,8 @@ TRAINING_SPLITS = ("train", "val")
 def pool_of(split: str, wordings: str | None = None) -> PoolName:
     """Return the pool from which the words for an episode of a split are taken.
 
-    A pool that was chosen; the identity of a wording file, or None, leaves it to the split.
+    `wordings` is a pool that was chosen, which wins; or the identity of a wording file or None,
+    which leave it to the split: train and val -> ``"train"``, any other -> ``"test"``.
     """
     for pool in POOLS:
         if wordings == pool:

@@ -36,7 +36,7 @@ __all__ = [
 def episodes_of(
     tasks: Sequence[str], split: Split, count: int | None = None
 ) -> tuple[Episode, ...]:
-    """Return the first episodes of each task in a split.
+    """Return the first episodes of each task in a split: all of the first task, then of the second.
 
     Args:
         tasks: names of tasks.
@@ -60,7 +60,7 @@ def spoken(
     settings: Sequence[str],
     pool: str,
 ) -> Iterator[tuple[Episode, str]]:
-    """Yield the implicit instructions of episodes, each with its episode.
+    """Yield the implicit instructions of episodes, as texts, each with its episode.
 
     Args:
         episodes: the episodes.

@@ -96,7 +96,8 @@ def labeled_views(episode: Episode, later: int) -> tuple[LabeledView, ...]:
 def _view(world: World, episode: Episode) -> LabeledView:
     """Return the front picture of a world, with class, center and position of each visible object.
 
-    Centers are (column, row) in pixels, positions (x, y) in meters.
+    Centers are (column, row) in pixels, positions (x, y) in meters. Objects of which fewer than
+    `MIN_PIXELS` pixels are visible are left out.
     """
     names: list[str] = []
     centers = []
@@ -117,7 +118,7 @@ def _view(world: World, episode: Episode) -> LabeledView:
 
 
 def class_of(item: SceneObject) -> str:
-    """Return the class of an object that a picture can show: its kind and color."""
+    """Return the class of an object that a picture can show, its kind and color: ``"cube red"``."""
     kind = item.kind.removeprefix("hidden_")
     return f"{kind} {item.color}" if item.color else kind
 
@@ -134,6 +135,9 @@ def shown_to_policy(episode: Episode, every: int) -> tuple[Pixels, Sequence[Pixe
     Args:
         episode: the episode.
         every: control steps between two frames.
+
+    Returns:
+        Pictures (256, 256, 3), RGB; no frames if the episode has no video.
     """
     env = RoboIRGEnv(episode, cameras=(FRONT,), demonstration_frames=every)
     try:
@@ -148,13 +152,13 @@ def shown_to_policy(episode: Episode, every: int) -> tuple[Pixels, Sequence[Pixe
 
 
 def points_of(positions: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Return where the front picture shows positions, as of a pinhole camera.
+    """Return where the front picture shows positions, as a pinhole camera; `places_of` reverses it.
 
     Args:
-        positions: x, y and z (..., 3), m.
+        positions: x, y and z (..., 3), world frame, m.
 
     Returns:
-        Column and row (..., 2), pixels.
+        Column and row (..., 2), pixels; they may lie outside of the picture.
     """
     matrix = front_camera_matrix()
     rotation = matrix[:3, :3]
@@ -260,7 +264,8 @@ def record_expert(
     """Let the expert play an episode in waypoints; return where things were, and its decisions.
 
     If a disturbance leads to where the arm cannot go on, the episode is recorded undisturbed. Of a
-    scene in which not even the video can be planned, only key and status are returned.
+    scene in which not even the video can be planned, only key and status (``"unplanned"``) are
+    returned, and arrays are empty.
 
     Args:
         episode: the episode.
@@ -332,9 +337,17 @@ def _column(rows: Sequence[_Look | _Decision], name: str, dtype: type) -> NDArra
 
 
 class _LookRecorder(EpisodeLoop):
-    """Plays one episode and notes looks and decisions."""
+    """Plays one episode and notes looks and decisions; call `record` once.
+
+    A *look* is what the camera sees at one control step, a *decision* a waypoint of the expert.
+    """
 
     def __init__(self, env: RoboIRGEnv, policy: WaypointExpert, drawn: range) -> None:
+        """Begin with nothing noted; looks and decisions grow while the episode is played.
+
+        Control steps are counted apart for the video and for the policy's turn. `drawn` has the
+        numbers of the looks of which a picture is drawn.
+        """
         super().__init__(env, policy)
         self._expert = policy
         self._drawn = drawn
@@ -347,7 +360,7 @@ class _LookRecorder(EpisodeLoop):
         self._has_begun = False
 
     def record(self) -> ExpertRecording:
-        """Play the episode, and return what was noted."""
+        """Play the episode, and return all looks and decisions as arrays."""
         self.env.set_frame_hook(self._after_step)
         info = self.play()
         looks = self._looks
@@ -371,7 +384,10 @@ class _LookRecorder(EpisodeLoop):
         )
 
     def act(self, observation: dict[str, Any]) -> ArrayLike:
-        """Return the expert's action; note its decision, and the look that it belongs to."""
+        """Return the expert's action; note its decision, and the look that it belongs to.
+
+        A decision belongs to the newest look; without one at this very step, one is added first.
+        """
         action = super().act(observation)
         if not self._has_looked():
             self._look(is_video=False)
@@ -389,7 +405,11 @@ class _LookRecorder(EpisodeLoop):
         return not newest.is_video and newest.steps == self._steps
 
     def _after_step(self, env: RoboIRGEnv, is_demonstration: bool) -> None:
-        """Look after every `LOOK_EVERY`-th step; video and policy's turn are counted apart."""
+        """Look after every `LOOK_EVERY`-th step; video and policy's turn are counted apart.
+
+        The environment calls this after every control step. In the video, the first step is looked
+        at.
+        """
         del env
         if is_demonstration:
             if self._video_steps % LOOK_EVERY == 0:
@@ -408,8 +428,8 @@ class _LookRecorder(EpisodeLoop):
     def _look(self, *, is_video: bool) -> None:
         """Note where everything is now, and what the camera sees of it: one *look*.
 
-        Of the looks in `drawn` the picture is drawn too. Then an object counts as visible only if
-        enough pixels show it; else what the robot hides counts as visible.
+        Of the looks whose number is in `drawn` the picture is drawn too. Then an object counts as
+        visible only if enough pixels show it; else what the robot hides counts as visible.
         """
         session = self.env.session
         world = session.world
@@ -436,7 +456,10 @@ class _LookRecorder(EpisodeLoop):
 
 
 def _tool_of(world: World) -> tuple[float, ...]:
-    """Return the tool's pose and the opening of a finger; angles are from -pi to pi."""
+    """Return the tool's x, y, z (m) and angles x-y-z (rad, -pi to pi), and a finger's opening.
+
+    The opening is in meters, 0 to 0.04: seven numbers in all.
+    """
     robot = world.robot
     return (*robot.tool_pose.p, *euler_angles(robot.tool_pose), float(robot.finger_positions[0]))
 
@@ -444,7 +467,8 @@ def _tool_of(world: World) -> tuple[float, ...]:
 def visible_of(world: World, bodies: Sequence[Body]) -> list[bool]:
     """Return for each body whether the front camera can see it if the robot hides nothing.
 
-    It cannot see what is absent, sites, and cubes below a container that stands on the table.
+    It cannot see what is absent, sites, and cubes below a container that stands on the table. In
+    the order of `bodies`.
     """
     absent = world.absent
     present = [body for body in bodies if body.item.name not in absent]

@@ -66,7 +66,10 @@ class ActionLog:
         return digest.hexdigest()
 
     def chunks(self) -> list[CheckedActions]:
-        """Return the actions (n, size) of each answer of the policy, in order; none without any."""
+        """Return the actions (n, size) of each answer of the policy, in order; none without any.
+
+        Rows 0 to 4, answers that begin with rows 0 and 3 -> three rows, then two.
+        """
         if not len(self.requests):
             return []
         return np.split(self.rows, self.requests[1:])
@@ -120,7 +123,10 @@ def read_actions(folder: Path, digest: str) -> ActionLog:
 
 
 def _pack(log: ActionLog) -> bytes:
-    """Return the content of a compressed NumPy file (.npz) with the actions of an episode."""
+    """Return the content of a compressed NumPy file (.npz) with the actions of an episode.
+
+    `_unpack` is the reverse; no number changes.
+    """
     file = io.BytesIO()
     # Column by column: the numbers of one joint resemble each other, so they take less space.
     rows = np.asfortranarray(log.rows)
@@ -143,7 +149,8 @@ def _shortest(numbers: NDArray[np.float64]) -> NDArray[np.floating]:
 def _unpack(content: bytes) -> ActionLog:
     """Return the actions in the content of a NumPy file (.npz), the reverse of `_pack`.
 
-    The file may be a stranger's, so size, types and values are checked.
+    The file may be a stranger's, so size, types and values are checked; numbers become float64
+    again.
 
     Raises:
         ValueError: an array has another type, or the answers do not fit the rows.
@@ -175,6 +182,8 @@ def _unpack(content: bytes) -> ActionLog:
 
 def _check_requests(requests: NDArray[np.int32], row_count: int) -> None:
     """Raise if the rows with which the policy's answers begin are not 0 and then ever larger.
+
+    ``[0, 3]`` of five rows is right, ``[1, 3]`` and ``[0, 3, 3]`` are not.
 
     Args:
         requests: index of the first row of each answer, (k,).

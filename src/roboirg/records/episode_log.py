@@ -41,7 +41,10 @@ def log_path(folder: Path, slug: str) -> Path:
 
 
 def logged_slugs(folder: Path) -> frozenset[str]:
-    """Return the names (slugs) of a run's episodes that have a log that is not empty."""
+    """Return the names (slugs) of a run's episodes that have a log that is not empty.
+
+    Read at once from the folder, as asking for each episode would be slow.
+    """
     slugs = set()
     with contextlib.suppress(FileNotFoundError), os.scandir(folder / LOG_FOLDER) as entries:
         for entry in entries:
@@ -68,6 +71,7 @@ class EpisodeLog:
     """
 
     def __init__(self, path: Path, limit: int = MAX_LOG_BYTES) -> None:
+        """Replace the file by an empty one; `__enter__` starts the thread that keeps it short."""
         self.path = path
         self._limit = limit
         self._finished = threading.Event()
@@ -80,7 +84,7 @@ class EpisodeLog:
         self._thread = threading.Thread(target=self._watch, name="episode log", daemon=True)
 
     def trim(self) -> None:
-        """Shorten the file if it is too long: its begin and end stay, with a note between them."""
+        """Shorten the file if it is too long: beginning and end stay, with a note between them."""
         size = os.fstat(self.descriptor).st_size
         if size <= self._limit:
             return
@@ -100,7 +104,10 @@ class EpisodeLog:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Trim the file, remove keys of services from it, and delete it if it is empty."""
+        """Trim the file, remove keys of services from it, and delete it if it is empty.
+
+        Then the file is closed. Errors of the disk are ignored: a log must not end a run.
+        """
         self._finished.set()
         self._thread.join()
         # A policy may have closed the descriptor; its log must not end the run.
@@ -127,7 +134,8 @@ def logged_output(path: Path, limit: int = MAX_LOG_BYTES) -> Iterator[None]:
     """Write to a file what this process and its new children print while the block runs.
 
     Covers `print`, `logging`, warnings, and native code: the descriptors of stdout and stderr lead
-    to the file. They are those of the whole process, so only one log can be open this way.
+    to the file. They are those of the whole process, so only one log can be open this way. At the
+    end everything is undone in reverse order, after Python has written what it still holds.
 
     Args:
         path: of the file; an earlier one is replaced.
@@ -160,6 +168,7 @@ def _flush() -> None:
 
 
 def _set_line_buffering(stream: io.TextIOWrapper, wanted: bool) -> None:
+    """Let a stream be written line by line, or in blocks; nothing if it is closed."""
     with contextlib.suppress(ValueError):  # closed
         stream.reconfigure(line_buffering=wanted)
 

@@ -53,6 +53,7 @@ class LineFile:
     """
 
     def __init__(self, path: Path) -> None:
+        """Note the path; nothing is read before `parse`."""
         self._path = path
         self.place = LinePlace(0, 0, 0)
         self.torn = b""
@@ -63,7 +64,9 @@ class LineFile:
         """Yield what `parse_line` makes of each line; nothing if there is no file.
 
         Damaged lines are skipped; a warning at the end names the first. An unfinished last line,
-        which a process may be writing, is kept in `torn`.
+        which a process may be writing, is kept in `torn`. While a result is yielded, `place` says
+        where its line is; `torn`, `damaged` and `damage` are known when the last one has been
+        taken.
 
         Args:
             parse_line: gets the bytes of a line without its newline, the path, and the number of
@@ -159,6 +162,10 @@ class AppendFile:
     def __init__(
         self, folder: Path, name: str, torn_name: str, read: Callable[[LineFile], None]
     ) -> None:
+        """Lock the folder, read the lines, and open the file for appending, in this order.
+
+        If anything fails, what was opened is closed again, and the lock with it.
+        """
         self.path = folder / name
         self._folder = folder
         self._torn_path = folder / torn_name
@@ -183,7 +190,7 @@ class AppendFile:
         """Append lines to the file, given without newlines; when this returns, all are on disk.
 
         If one cannot be written, the file is cut to its earlier size: all lines are written or
-        none.
+        none. An interrupt (Ctrl-C) leaves those that are written.
 
         Raises:
             StoreError: they cannot be written, or `lines` raises it; the file is unchanged.
@@ -211,7 +218,9 @@ class AppendFile:
             StoreError: another process holds the lock; its number is in the file.
         """
         if not take_lock(self._lock, self._folder / LOCK_FILE):
-            owner = os.pread(self._lock, 32, 0).decode("ascii", "replace").strip() or "unknown"
+            owner = os.pread(self._lock, 32, 0).decode("ascii", "replace").strip()
+            if not owner.isdecimal():
+                owner = "unknown"
             raise StoreError(
                 f"{self._folder} is being written by another run (process {owner}); "
                 f"wait for it, stop it, or choose another --out."

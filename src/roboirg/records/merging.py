@@ -98,11 +98,11 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
 
     If several runs have the same episode, the first verdict (success or failure) is kept; a verdict
     replaces an error. Records are checked and copied one by one; the memory holds only their
-    summaries.
+    summaries. All runs are checked before the first is copied.
 
     Args:
-        folders: output folders of the runs; they are not changed.
-        out: destination; may already hold records.
+        folders: output folders of the runs, the first with precedence; they are not changed.
+        out: destination; may already hold records, which come before all others.
 
     Raises:
         InvalidValueError: `out` is one of the runs.
@@ -158,9 +158,10 @@ class _Expected(NamedTuple):
 def _check_versions(runs: Iterable[tuple[Path, Iterable[Summary]]]) -> None:
     """Raise if results cannot be in one run, because they were made with different versions.
 
-    The versions of environment and language must be equal in all results, that of words in those of
-    a task and pool of words, others in those of a policy or a scene. What shares versions is called
-    their owner here; each owner's versions are compared with the first that were found.
+    The versions of environment and language must be equal in all results; that of words in those of
+    a task and pool of words; those of a policy in its results; a scene's seed in those of its
+    episode. What shares versions is called their owner here; each owner's versions are compared
+    with the first that were found.
 
     Args:
         runs: folders, and the results in them.

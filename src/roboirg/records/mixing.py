@@ -97,9 +97,9 @@ _OF_POLICY = (
 def mixtures(results: Collection[Summary]) -> list[str]:
     """Return a warning for each property in which results differ that are compared or averaged.
 
-    For example ``Mixed splits: test, val. They are kept apart and cannot be compared.`` Some
-    properties, such as the split, should be the same in all results, others, such as a policy's
-    version, only in those of one policy.
+    ``["Mixed splits: test, val. They are kept apart and cannot be compared."]``; empty if nothing
+    is mixed. Some properties, such as the split, should be the same in all results, others, such as
+    a policy's version, only in those of one policy.
     """
     sentences = [*differing(results, FAIRNESS), *differing(results, _COMMON)]
     if any(result.verdict_code is None for result in results):
@@ -119,7 +119,9 @@ def differing(
 
     Args:
         results: in which the properties should be the same.
-        traits: the properties; one with an owner only has to be the same in results of one owner.
+        traits: the properties; one with an `owner` only has to be the same in results of one owner,
+            such as the words in results of one task and pool. A value whose text is None fits all
+            others.
         of_whom: stands behind the property in a sentence, such as `` of mine``.
     """
     for trait in traits:

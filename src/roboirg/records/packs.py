@@ -15,7 +15,7 @@ import zipfile
 from collections.abc import Collection, Iterator
 from pathlib import Path, PurePosixPath
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, NonNegativeInt
 
 from roboirg.core.plain_text import printable
 from roboirg.records.action_log import ACTION_FOLDER, UNREADABLE_ARCHIVE
@@ -38,6 +38,8 @@ PACKED_FOLDERS = (ACTION_FOLDER, *MEDIA_FOLDERS)
 """What a pack may hold in addition to records and plans."""
 MOST_PACKED_BYTES = 20 << 30
 """Most bytes that are unpacked of a pack."""
+_FORMAT = 1
+"""Version of packs, which changes when an older roboirg could not read them."""
 _MAX_MANIFEST_BYTES = 64 << 20
 _MOST_SHOWN = 200
 """Characters of a name or a complaint in an error."""
@@ -58,9 +60,9 @@ class PackManifest(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    format: int = 1
+    format: int = _FORMAT
     package_version: str
-    records: int
+    records: NonNegativeInt
     policies: tuple[str, ...]
     files: dict[str, str]
 
@@ -107,21 +109,27 @@ def _manifest(archive: zipfile.ZipFile, path: Path) -> PackManifest:
         path: of the pack, for the error.
 
     Raises:
-        StoreError: there is none, or it cannot be read.
+        StoreError: there is none, it cannot be read, or the pack is of another format.
     """
     try:
         if archive.getinfo(MANIFEST).file_size > _MAX_MANIFEST_BYTES:
             raise ValueError("it is too large")
-        return PackManifest.model_validate_json(archive.read(MANIFEST))
+        manifest = PackManifest.model_validate_json(archive.read(MANIFEST))
     except (KeyError, ValueError) as error:
         raise StoreError(f"{path} is not a packed run: its {MANIFEST} cannot be read.") from error
+    if manifest.format != _FORMAT:
+        raise StoreError(
+            f"{path} is a pack of format {manifest.format}; this roboirg reads format {_FORMAT}."
+        )
+    return manifest
 
 
 def _unpack(archive: zipfile.ZipFile, path: Path, folder: Path, folders: Collection[str]) -> None:
     """Unpack the wanted files of a pack, which may be a stranger's, so it is checked first.
 
     It must hold exactly the files of its manifest, only files of a run, and of wanted ones not too
-    many bytes.
+    many bytes. Names are checked before anything is written under them, contents while they
+    are written.
 
     Args:
         archive: the pack.

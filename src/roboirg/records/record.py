@@ -109,6 +109,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
 
     @property
     def setting(self) -> str:
+        """The setting of the instruction, such as ``direct``."""
         return self.options.setting
 
     @property
@@ -485,6 +486,8 @@ class Record(Summary, kw_only=True, forbid_unknown_fields=True):  # type: ignore
 
     def record_status(self, status: str, cause: str | None) -> bool:
         """Set outcome and cause from the status of the environment; return whether it was final.
+
+        ``"timeout"`` is a failure; ``"ongoing"`` changes nothing and returns False.
 
         Args:
             status: as the environment reports it.

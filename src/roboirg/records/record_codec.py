@@ -60,7 +60,11 @@ class _SharingDecoder(Generic[Stored]):
         self._decode = msgspec.json.Decoder(line).decode
 
     def decode(self, line: bytes) -> Stored:
-        """Return the record in a line of JSON; raises like the decoders of msgspec."""
+        """Return the record in a line of JSON; raises like the decoders of msgspec.
+
+        Reads the line with the shared fields left undecoded, and decodes each of their texts once.
+        If that fails, the plain decoder reads the line, whose error names what is wrong.
+        """
         try:
             fields = msgspec.structs.asdict(self._decode(line))
             for name in _SHARED:
@@ -141,7 +145,7 @@ def _read(decoder: _SharingDecoder[Stored], line: bytes, path: Path, number: int
 def _schema_error(
     line: bytes, path: Path, number: int, error: msgspec.ValidationError
 ) -> StoreError:
-    """Return the error to raise for a line that is JSON, but no record that can be read.
+    """Return (not raise) the error for a line that is JSON, but no record that can be read.
 
     It names the schema version of the line if that is another one, else the field that is wrong.
 

@@ -64,12 +64,24 @@ def run_file(folder: Path, name: str) -> Path:
 
 
 def refuse_links(folder: Path) -> None:
-    """Raise if there is a symbolic link below a run's folder, as a run would write through it.
+    """Raise if something below a run's folder would let a run write elsewhere, or wait for ever.
+
+    Plans are replaced and never written to, so they may share their content with other files.
 
     Raises:
-        ForeignPathError: there is one. The folder itself may be a link.
+        ForeignPathError: there is a symbolic link, a pipe or a device, or a file in the folder has
+            another name, too (a hard link). The folder itself may be a link.
     """
+    for path in folder.iterdir():
+        is_written = path.is_file() and path.name != PLAN_FILE
+        if is_written and path.stat().st_nlink > 1:
+            raise ForeignPathError(
+                f"{path} has another name elsewhere (a hard link), where a run would change it, "
+                "too; put a copy in its place."
+            )
     for path in folder.rglob("*"):
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise ForeignPathError(f"{path} is neither a file nor a folder; remove it.")
         if path.is_symlink():
             raise ForeignPathError(
                 f"{path} is a symbolic link, and a run writes nothing through links; put a file or "

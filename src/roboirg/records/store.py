@@ -12,6 +12,7 @@ that lines are in the order of the plan (they are in the order in which episodes
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Collection, Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +20,7 @@ from typing import Generic, Self, TypeVar
 
 import msgspec
 
+from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.core.versions import Mismatch
 from roboirg.records.line_file import AppendFile, LineFile, LinePlace, warn_once
 from roboirg.records.record import Record, Summary
@@ -58,6 +60,7 @@ class RecordStore:
     """
 
     def __init__(self, folder: Path) -> None:
+        """Open the folder's file for appending, and read what it holds."""
         self.folder = folder
         self.path = folder / RECORDS_FILE
         self.stored: dict[RecordKey, Summary] = {}
@@ -76,7 +79,7 @@ class RecordStore:
     def extend(self, lines: Iterable[bytes]) -> None:
         """Append records, each a line of JSON without its newline; all are stored or none.
 
-        When this returns, they are on disk.
+        When this returns, they are on disk. Until then `stored` does not change.
 
         Raises:
             StoreError: a record cannot be written, a line is not one, or a policy or its server is
@@ -182,6 +185,10 @@ class StoredRun(Generic[Stored]):
     """
 
     def __init__(self, folder: Path, parse_line: Callable[[bytes, Path, int], Stored]) -> None:
+        """Read all lines; of each identity keep what the newest one gave, and where that is.
+
+        In `newest`, a record that was written again has the place of its first line.
+        """
         self._path = folder / RECORDS_FILE
         self.file = LineFile(self._path)
         placed: dict[RecordKey, tuple[Stored, LinePlace]] = {}
@@ -195,7 +202,7 @@ class StoredRun(Generic[Stored]):
                 f"There are no records in {folder}; give the --out folder of a `roboirg run`."
             )
         results, self._places_in_order = zip(*placed.values(), strict=True)
-        self.newest: tuple[Stored, ...] = _with_server_versions(results)
+        self.newest: tuple[Stored, ...] = _with_versions(results)
 
     @cached_property
     def _places(self) -> dict[RecordKey, LinePlace]:
@@ -204,7 +211,11 @@ class StoredRun(Generic[Stored]):
         return dict(zip(keys, self._places_in_order, strict=True))
 
     def lines(self, wanted: Iterable[Stored]) -> Iterator[bytes]:
-        """Yield the lines of some records from the file, as bytes without newlines."""
+        """Yield the lines of some records from the file, as bytes without newlines.
+
+        They come in the order of `wanted`, all of which must be among `newest`. Their places in the
+        file stay true, as it is only appended to.
+        """
         with self._path.open("rb", buffering=_BUFFER) as file:
             for result in wanted:
                 place = self._places[identity_key(result)]
@@ -252,19 +263,27 @@ def check_same(
         raise StoreError(f"{what} whose {name} is {first}, but {where} it is {second}; {end}.")
 
 
-def _with_server_versions(results: Collection[Stored]) -> tuple[Stored, ...]:
-    """Return the results, with the version of the policy's server filled in where errors lack it.
+def _with_versions(results: Collection[Stored]) -> tuple[Stored, ...]:
+    """Return the results, with the versions of policy and server filled in where errors lack them.
 
-    An error may come before the server reports its version; then it gets that of the policy's last
-    success or failure, if there is one.
+    An error may come before a policy declares its version, or its server reports one; then it gets
+    that of the policy's last success or failure, if there is one, and so stays in its row.
     """
     verdicts = _last_verdicts(results)
     completed = []
     for result in results:
-        lacks_version = result.outcome == "error" and result.server_version is None
-        if lacks_version and result.policy in verdicts:
-            version = verdicts[result.policy].server_version
-            completed.append(msgspec.structs.replace(result, server_version=version))
+        verdict = verdicts.get(result.policy)
+        if result.outcome == "error" and verdict is not None:
+            completed.append(_completed(result, verdict))
         else:
             completed.append(result)
     return tuple(completed)
+
+
+def _completed(error: Stored, verdict: Stored) -> Stored:
+    """Return an error with what it lacks of the versions that a verdict of the same policy has."""
+    ref = error.ref
+    if ref.version == UNKNOWN_VERSION and ref.makeup == verdict.ref.makeup:
+        ref = dataclasses.replace(ref, version=verdict.ref.version)
+    server_version = error.server_version or verdict.server_version
+    return msgspec.structs.replace(error, ref=ref, server_version=server_version)

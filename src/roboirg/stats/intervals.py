@@ -224,6 +224,50 @@ def ratio_interval(tasks: Sequence[TaskRates]) -> Interval | None:
     return Interval(low / (1 - low), high / (1 - high))
 
 
+def share_interval(tasks: Sequence[TaskRates]) -> Interval | None:
+    """Return the 95 % score interval of the share of a gap that something closes.
+
+    Of the rates first, second and third it is (first - second) / (third - second): a gap from 60 to
+    80 % that becomes one from 75 to 80 % is closed by three quarters. The interval holds the shares
+    s for which the interval of first - (1 - s) second - s third has 0.
+
+    Args:
+        tasks: for each task the three rates.
+
+    Returns:
+        None with too few episodes, or if the interval of the gap, third - second, does not lie
+        above 0: then any share would do.
+    """
+    part = 1 / len(tasks)
+    critical = critical_value()
+    gap = mean_interval([task.combined(0, -part, part) for task in tasks])
+    if gap is None or gap.low <= 0:
+        return None
+
+    def difference(share: float) -> list[Stratum]:
+        return [task.combined(part, part * (share - 1), -part * share) for task in tasks]
+
+    def above(share: float) -> float:
+        return -_upper_end(difference(share), critical)
+
+    def below(share: float) -> float:
+        return -_upper_end([stratum.mirrored() for stratum in difference(share)], critical)
+
+    of_none = sum(stratum.mean for stratum in difference(0))
+    of_all = sum(stratum.mean for stratum in difference(1))
+    estimate = of_none / (of_none - of_all)
+    return Interval(_end(below, estimate, -1.0), _end(above, estimate, 1.0))
+
+
+def _end(function: Callable[[float], float], inside: float, step: float) -> float:
+    """Return where a function is 0, on the side of `step` from a place where it is negative."""
+    for _ in range(_MOST_DOUBLINGS):
+        if function(inside + step) >= 0:
+            return _root(function, inside, inside + step)
+        step *= 2
+    return math.copysign(math.inf, step)
+
+
 def _has_too_few(strata: Sequence[Stratum]) -> bool:
     episodes = sum(stratum.episodes for stratum in strata)
     return episodes <= len(strata) + _ROUNDING

@@ -37,26 +37,40 @@ LEFT_OUT = ("PickHighlight", "MoveCube", "InsertPeg", "PatternLock", "RouteStick
 
 @functools.cache
 def all_tasks(suites: tuple[str, ...] = BENCHMARK_SUITES) -> Mapping[str, Task]:
-    """Return the tasks of some suites by name, ordered by code; by default the benchmark's."""
+    """Return the tasks of some suites by name, ordered by code; by default the benchmark's.
+
+    A task's `code` is its fixed number. ``all_tasks(("real",))`` -> ``{"PutInBox": Task(…),
+    "PickByCount": Task(…)}``.
+    """
     chosen = (task for task in _registry() if task.suite in suites)
     return {task.name: task for task in sorted(chosen, key=lambda task: task.code)}
 
 
 @functools.cache
 def all_suites() -> tuple[str, ...]:
-    """Return the names of all suites: the benchmark's, ``real``, then those of other packages."""
+    """Return the names of all suites: the benchmark's, ``real``, then those of other packages.
+
+    Each name once; for example ``("counting", "permanence", "reference", "real", "my-suite")``.
+    """
     return tuple(dict.fromkeys((*SUITES, *(task.suite for task in _registry()))))
 
 
 def every_task() -> Mapping[str, Task]:
-    """Return every task by name: the benchmark's, the real robot's, then those of packages."""
+    """Return every task by name: the benchmark's, the real robot's, then those of packages.
+
+    Within each of these three groups, tasks are ordered by their `code`.
+    """
     # The suites of packages are ordered by code together.
     of_packages = tuple(suite for suite in all_suites() if suite not in SUITES)
     return {**all_tasks(SUITES), **all_tasks(of_packages)}
 
 
 def get_task(name: str) -> Task:
-    """Return the task of that name."""
+    """Return the task of that name, spelled exactly so, such as ``"PickXtimes"``.
+
+    Raises:
+        InvalidValueError: there is no such task; the message suggests one with a similar name.
+    """
     try:
         return every_task()[name]
     except KeyError:
@@ -64,12 +78,15 @@ def get_task(name: str) -> Task:
 
 
 def find_tasks(words: Iterable[str]) -> tuple[str, ...]:
-    """Return the tasks meant by names of tasks, of suites, or ``all`` for the benchmark.
+    """Return the names of tasks for names of tasks or suites, or ``all`` for the benchmark.
 
     ``["real", "BinFill"]`` -> ``("PutInBox", "PickByCount", "BinFill")``.
 
     Returns:
-        Their names, each once: those of ``all`` first, the others in the order of the words.
+        Names of tasks, each once: those of ``all`` first, the others in the order of the words.
+
+    Raises:
+        InvalidValueError: a word names neither a task nor a suite.
     """
     words = list(words)
     for_all = [word for word in words if word.lower() == ALL]
@@ -81,19 +98,30 @@ def find_tasks(words: Iterable[str]) -> tuple[str, ...]:
 
 
 def goals_of(episode: Episode) -> tuple[Goal, ...]:
-    """Return all goals that the episode's scene allows."""
+    """Return all goals that the episode's scene allows, its own goal among them.
+
+    A PickXtimes scene with a red and a blue cube: *red once* to *red five times*, then the same of
+    blue.
+    """
     return get_task(episode.task).goals(episode.scene)
 
 
 def with_goal(episode: Episode, goal: Goal) -> Episode:
-    """Return the episode with another goal of its scene, and the stages to it."""
+    """Return the episode with another goal of the same scene, and with the stages that lead to it.
+
+    The episode that is given stays as it is; scene, seed and number are kept.
+    """
     stages = get_task(episode.task).stages(episode.scene, goal)
     return replace(episode, goal=goal, stages=stages)
 
 
 @functools.cache
 def _registry() -> tuple[Task, ...]:
-    """Return our tasks and those of installed packages, which must not enter our suites."""
+    """Return all tasks: ours, then those of installed packages, which must not enter our suites.
+
+    Raises:
+        InvalidValueError: a package puts its task into a suite of this package.
+    """
     ours = discover_in_modules(__name__, "TASK", Task)
     tasks = with_entries(ours, "TASK", Task, ENTRY_POINTS).values()
     for task in tasks:
@@ -122,9 +150,10 @@ def _expand(word: str) -> tuple[str, ...]:
 
 
 def _unknown_task(name: str, known: Iterable[str]) -> InvalidValueError:
-    """Return the error about a name that is none of the known ones.
+    """Return (not raise) the error about a name that is none of the known ones.
 
-    One of RoboMME that is left out, such as MoveCube, gets the reason; any other a suggestion.
+    A task of RoboMME that is left out on purpose, such as MoveCube, gets the reason; any other name
+    gets a suggestion from `known`.
     """
     others = [task for task in LEFT_OUT if task.lower() != name.lower()]
     if len(others) < len(LEFT_OUT):

@@ -69,7 +69,9 @@ APPEAR_STEPS = 50
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, bin and cubes of one to three colors, and a count for one or more of them.
 
-    The order of the draws decides which scene a seed gives; so it is in every function here.
+    The order of the draws decides which scene a seed gives, here and in every function that takes
+    `rng`: reordering them changes all episodes. Raises SceneRejectedError if something finds no
+    room.
     """
     is_late = bool(rng.integers(2))  # whether only one cube of each color is there at first
     button = draw_button(rng, BUTTON_REGION)
@@ -90,7 +92,8 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
 def _draw_wanted(rng: np.random.Generator, difficulty: Difficulty) -> dict[Color, int]:
     """Draw the colors that are present, and for each the goal's number of cubes, perhaps 0.
 
-    ``{"blue": 2, "red": 1, "green": 0}``: each cube of the goal gets one of the first colors.
+    ``{"blue": 2, "red": 1, "green": 0}``: three colors are present; the goal's three cubes fell on
+    the first two. Keys are in random order, which later draws use.
     """
     present = shuffled(rng, COLORS)[: COLORS_PRESENT[difficulty]]
     color_count = draw_number(rng, GOAL_COLORS[difficulty])
@@ -108,7 +111,8 @@ def _draw_cube_colors(
     """Draw a color for each cube on the table, in the order in which they are placed.
 
     First as many as the goal wants, and at least one of each present color; then the others, of any
-    present color.
+    present color; then all are shuffled. ``{"blue": 2, "red": 0}``, four cubes in all -> ``["red",
+    "blue", "red", "blue"]``, for example.
     """
     present = list(wanted)
     colors: list[Color] = []
@@ -134,12 +138,18 @@ def _numbered(colors: list[Color]) -> list[CubePlan]:
 
 
 def _named(wanted: Mapping[Color, int]) -> list[Color]:
-    """Return the colors of which cubes are wanted, in the order of goals."""
+    """Return the colors of which cubes are wanted, in the order in which goals list colors.
+
+    ``{"blue": 2, "green": 0, "red": 1}`` -> ``["red", "blue"]``.
+    """
     return [color for color in GOAL_ORDER if wanted.get(color)]
 
 
 def _goal(wanted: Mapping[Color, int]) -> Goal:
-    """Return the goal of some numbers of cubes by color; colors without any are not named."""
+    """Return the goal of some numbers of cubes by color; colors without any are not named.
+
+    ``{"blue": 2, "green": 0, "red": 1}`` -> ``Goal.of(colors=("red", "blue"), counts=(1, 2))``.
+    """
     named = _named(wanted)
     return Goal.of(colors=tuple(named), counts=tuple(wanted[color] for color in named))
 
@@ -162,7 +172,10 @@ def plan_motions(cubes: Sequence[SceneObject], *, late: bool) -> tuple[Motion, .
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Return all goals of up to five cubes in all, at most the present ones of each color."""
+    """Return all goals of one to five cubes in all, at most the present ones of each color.
+
+    Two red cubes and a blue one -> one or two red; one blue; one or two red and one blue.
+    """
     possible_counts = [range(len(_of_color(scene, color)) + 1) for color in GOAL_ORDER]
     goals: list[Goal] = []
     for counts in itertools.product(*possible_counts):
@@ -173,10 +186,12 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Return 2 N + 1 stages: pick and put in once for each of N cubes, then press.
+    """Return 2 N + 1 stages: pick and put in once for each of N cubes, then press the button.
 
-    Any cube completes a stage, so the cubes may come in any order; the colors are judged by what
-    the last stage forbids, a press with wrong numbers in the bin.
+    What a stage forbids fails the episode when it becomes true. Any cube completes a stage, so the
+    cubes may come in any order; the colors are judged by what the last stage forbids, a press with
+    wrong numbers in the bin. In a subgoal, ``{at}`` stands for the point of the object `points_at`
+    in the picture.
     """
     cubes = [cube.name for cube in scene.of_kind("cube")]
     any_picked = FactCount(tuple(Fact("picked", cube) for cube in cubes))
@@ -202,7 +217,10 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 class _WantedCube(NamedTuple):
-    """A cube that the oracle takes, and which one of its color it is: ``"first"``."""
+    """A cube that the oracle takes, and which one of its color it is.
+
+    The second red cube: ``_WantedCube("cube_red_1", "red", "second")``.
+    """
 
     name: str
     color: str
@@ -210,7 +228,11 @@ class _WantedCube(NamedTuple):
 
 
 def _wanted_cubes(scene: Scene, goal: Goal) -> Iterator[_WantedCube]:
-    """Yield the cubes that the oracle takes, color by color."""
+    """Yield the cubes that the oracle, which plays the goal perfectly, takes: color by color.
+
+    Colors come in the scene's `color_order`, cubes of a color as numbered. Two red and one blue
+    wanted, order blue, red -> the first blue cube, the first red one, the second red one.
+    """
     counts = dict(goal.amounts)
     for color in dict.fromkeys((*scene.color_order, *counts)):
         names = _of_color(scene, color)[: counts.get(color, 0)]
@@ -245,7 +267,7 @@ def _wrong_counts(scene: Scene, goal: Goal) -> Iterator[Rule]:
 
 
 def _of_color(scene: Scene, color: str) -> list[str]:
-    """Return the names of all cubes of a color, as numbered."""
+    """Return the names of all cubes of a color, as numbered: ``["cube_red_0", "cube_red_1"]``."""
     return [cube.name for cube in scene.of_kind("cube") if cube.color == color]
 
 

@@ -20,12 +20,12 @@ BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.05)
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
-    """Draw a button, then containers as in VideoUnmask; the first ones are to be lifted."""
+    """Draw a button, then containers as in VideoUnmask; the goal is one, in hard episodes two."""
     return unmask.sample(rng, difficulty, [draw_button(rng, BUTTON_REGION)])
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Return the stages: press the button, then lift the containers."""
+    """Return the stages: press the button, then lift the goal's containers in its order."""
     return (press_stage(), *unmask.pick_stages(scene, goal))
 
 

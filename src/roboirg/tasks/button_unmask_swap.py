@@ -32,7 +32,12 @@ MAX_SHIFT = 0.1
 
 
 def shifted_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ...]:
-    """Draw three or four points near which the containers stand; the pattern is not turned."""
+    """Draw three or four points (x, y; meters) near which the containers stand.
+
+    The pattern is shifted at random, but, unlike VideoUnmaskSwap's, not turned. Four points: each
+    of the two rows moves sideways by its own shift. Three, in a triangle or on a line: each point
+    moves away from the robot by its own shift. Draws come in the order of the points.
+    """
     points: list[PlanePoint] = []
     if count == len(FOUR):
         for row in (FOUR[:2], FOUR[2:]):
@@ -46,7 +51,11 @@ def shifted_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ..
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
-    """Draw two buttons, and containers near the points of a layout, three of them over a cube."""
+    """Draw two buttons, and containers near the points of a layout, three of them over a cube.
+
+    Draws come in this order: right button, left button, points, containers, then cubes, swaps and
+    goal.
+    """
     right = draw_button(rng, RIGHT_REGION, RIGHT)
     left = draw_button(rng, LEFT_REGION, LEFT)
     points = shifted_points(rng, unmask_swap.CONTAINERS[difficulty])
@@ -56,7 +65,10 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Return the stages: press both buttons, in any order, then lift the containers."""
+    """Return the stages: press both buttons, in any order, then lift the containers.
+
+    The subgoals and the oracle press the left button first; the judge accepts either.
+    """
     left = Fact("pressed", LEFT)
     right = Fact("pressed", RIGHT)
     either = FactCount((left, right))

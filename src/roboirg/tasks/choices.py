@@ -33,7 +33,8 @@ _PRESSES = ("press", "press_below")
 def choices_of(episode: Episode) -> tuple[Choice, ...]:
     """Return the choices of an episode; they are the same in all episodes of a task.
 
-    PickXtimes -> a *pick up the cube*, b *place it on the target*, c *press the button*.
+    A choice is a labeled motion that a program can ask for. PickXtimes -> a *pick up the cube*, b
+    *place it on the target*, c *press the button*; with a, a point of the picture says which cube.
     """
     scene = episode.scene
     each_once = list(dict.fromkeys(_motions(scene, episode)))
@@ -54,6 +55,7 @@ def choices_of(episode: Episode) -> tuple[Choice, ...]:
 def _with_buttons(motions: list[Primitive], scene: Scene) -> list[Primitive]:
     """Return motions with a press for each button; as in RoboMME, that at smaller y comes first.
 
+    Two presses among `motions` keep their two positions; only which button is pressed is set anew.
     A task whose stages press nothing gets a press of the first button, if there is one.
     """
     buttons = sorted(scene.of_kind("button"), key=lambda button: button.position.y)
@@ -72,7 +74,9 @@ def _with_buttons(motions: list[Primitive], scene: Scene) -> list[Primitive]:
 def _motions(scene: Scene, episode: Episode) -> Iterator[Primitive]:
     """Yield the motions of all goals' stages, those for the same choice being equal.
 
-    Picking ``cube_red`` and ``cube_blue`` are both picking a ``cube``: a point says which one.
+    Names of objects become kinds: picking ``cube_red`` and ``cube_blue`` are both picking a
+    ``cube``, and a point says which one. Presses, hovering and retreating keep their object.
+    Callers drop repeats.
     """
     task = get_task(episode.task)
     for goal in task.goals(scene):
@@ -91,7 +95,10 @@ def _motions(scene: Scene, episode: Episode) -> Iterator[Primitive]:
 
 
 def _kind_of(name: str | None, scene: Scene) -> ObjectKind | None:
-    """Return the kind of the object of a name; None for none and for the robot."""
+    """Return the kind of the object of a name, ``"cube_red"`` -> ``"cube"``.
+
+    None if `name` is None or the robot, which is no object of the scene.
+    """
     return None if name in (None, ROBOT) else scene[str(name)].kind
 
 
@@ -102,7 +109,11 @@ def _words_for(motion: Primitive) -> str:
 
 
 def _choice(label: str, words: str, motion: Primitive, scene: Scene) -> Choice:
-    """Return the choice of a motion: with a point of its kind of object, if there are several."""
+    """Return the choice of a motion: with a point of its kind of object, if there are several.
+
+    A pick always takes a point. With a single target in the scene, placing names that target; with
+    several, it takes a point of a target.
+    """
     if motion.kind.startswith("pick_"):
         return Choice(label, words, (motion,), motion.subject)
     places = scene.of_kind(motion.place) if motion.place else ()

@@ -14,10 +14,11 @@ from roboirg.util.random_draws import draw
 
 
 def other_goals(episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals of the scene that take as many picks as the episode's.
+    """Return the goals of the scene that are clearly wrong for the episode, but as much work.
 
-    None of them is reached on the way to the episode's goal, or the episode's on the way to it: to
-    *red, then blue*, *green, then blue* is another goal, and *red* is none.
+    They take as many picks as the episode's goal, and none of them is reached on the way to it, or
+    it on the way to them: to *red, then blue*, *green, then blue* is another goal, and *red* is
+    none.
     """
     task = get_task(episode.task)
     others: list[Goal] = []
@@ -32,7 +33,8 @@ def other_goals(episode: Episode) -> tuple[Goal, ...]:
 def draw_other_goal(episode: Episode) -> Goal | None:
     """Return one of `other_goals`, all equally likely; None if there is none.
 
-    The draw depends on the episode alone, not on any words.
+    The draw depends on the episode's task and seed alone, not on any words: the same episode always
+    gets the same other goal.
     """
     goals = other_goals(episode)
     if not goals:
@@ -43,14 +45,21 @@ def draw_other_goal(episode: Episode) -> Goal | None:
 
 
 def begins_with(stages: Sequence[Stage], first: Sequence[Stage]) -> bool:
-    """Return whether stages begin with others: to the judge, not to the oracle."""
+    """Return whether `stages` begin with `first`, as far as the judge can tell.
+
+    Stages that differ only in how the oracle moves, or in their subgoals' words, count as equal.
+    """
     return _judged(stages[: len(first)]) == _judged(first)
 
 
 def _judged(stages: Sequence[Stage]) -> list[tuple[object, ...]]:
-    """Return what the judge reads of stages; the oracle's movements and the words differ more."""
+    """Return, for each stage, the fields that the judge reads.
+
+    The fields for the oracle's movement and for the subgoal's words are left out.
+    """
     return [(stage.expects, stage.forbids, stage.lasting, stage.timer) for stage in stages]
 
 
 def _count_picks(stages: Sequence[Stage]) -> int:
+    """Return how many of the stages pick up a cube, tape or container."""
     return sum(stage.primitive.kind in PICKS for stage in stages)

@@ -32,7 +32,10 @@ then. The longest pick in RoboMME's data takes 137."""
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
-    """Draw the target and a tape on either side; sides, goal tape and number are uniform."""
+    """Draw the target and a tape on either side; sides, goal tape and number are uniform.
+
+    `difficulty` changes nothing.
+    """
     del difficulty
     target = draw_target(rng, "target", TARGET_RADIUS, TARGET_REGION, 0.0, ())
     tapes: list[SceneObject] = []
@@ -53,7 +56,8 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Return the stages: N times pick and place, then leave all tapes alone for a while.
 
-    The other tape is forbidden in all stages, a further pick of the right one in the last.
+    What a stage forbids fails the episode. Picking the other tape is forbidden in all stages, a
+    further pick of the right one in the last, which is complete after `WAIT_STEPS` without it.
     """
     color = goal.text("color")
     wrong: list[Rule] = []

@@ -39,7 +39,10 @@ TARGET_GAP = 0.04
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
-    """Draw button, cubes of different colors, target disc; goal cube and repeats are uniform."""
+    """Draw button, cubes of different colors, target disc; goal cube and repeats are uniform.
+
+    The order of the draws decides which scene a seed gives. Raises SceneRejectedError without room.
+    """
     repeats = draw_number(rng, REPEATS[difficulty])
     placed = draw_button_and_cubes(rng, difficulty, WORK_REGION, CUBE_GAP)
     target = draw_target(rng, "target", TARGET_RADIUS, WORK_REGION, TARGET_GAP, placed.obstacles)
@@ -49,9 +52,10 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Return 2 N + 1 stages: N times pick and place, then press.
+    """Return 2 N + 1 stages: N times pick the goal's cube and place it, then press the button.
 
-    Other cubes and an early press are forbidden until then, and any pick in the last stage.
+    What a stage forbids fails the episode: until the press, picking another cube and pressing
+    early; in the last stage, any pick.
     """
     color = goal.text("color")
     cubes = scene.of_kind("cube")

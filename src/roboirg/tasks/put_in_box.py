@@ -27,7 +27,10 @@ TAPE_GAP = 0.03
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
-    """Draw a box on either side, the tape in front of them; sides and goal box are uniform."""
+    """Draw a box on either side, the tape in front of them; sides and goal box are uniform.
+
+    `difficulty` changes nothing.
+    """
     del difficulty
     boxes: list[SceneObject] = []
     for color, region in draw_regions(rng, BOXES, LEFT_BOX_REGION).items():
@@ -49,7 +52,10 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Return the stages: pick the tape, and put it into the right box only."""
+    """Return the stages: pick up the tape, and put it into the box of the goal's color.
+
+    In both, a tape in the other box fails the episode.
+    """
     color = goal.text("color")
     wrong: list[Rule] = []
     for box in scene.of_kind("box"):

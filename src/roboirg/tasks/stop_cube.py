@@ -44,7 +44,8 @@ STOPPED = Fact("stopped", "shuttle", "target")
 def sample(rng: np.random.Generator, _difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, target and cube; speed, goal visit and direction of the path are uniform.
 
-    The cube has a random color, which means nothing.
+    The cube has a random color, which means nothing. The order of the draws decides which scene a
+    seed gives: the cube's color and speed before the goal's visit.
     """
     button = draw_button(rng, BUTTON_REGION)
     middle = Point(*TARGET_REGION.draw(rng), HEIGHT)
@@ -66,8 +67,10 @@ def sample(rng: np.random.Generator, _difficulty: Difficulty) -> SceneAndGoal:
 def _draw_run(rng: np.random.Generator, middle: Point, interval: int) -> Shuttle:
     """Draw the direction of the cube's path, given its middle and the steps of one pass.
 
-    The path runs from the robot's right to its left, turned by at most `PATH_ANGLE`.
+    A path along the y axis, from the robot's right (smaller y) to its left, turned by at most
+    `PATH_ANGLE` to either side; its ends are `PATH_HALF` meters from the middle.
     """
+    # Uniform, to either side of the y axis.
     angle = (2.0 * rng.random() - 1.0) * PATH_ANGLE
     along_x = -PATH_HALF * math.sin(angle)
     along_y = PATH_HALF * math.cos(angle)
@@ -91,7 +94,9 @@ def goals(_scene: Scene) -> tuple[Goal, ...]:
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Return the stages: move above the button, wait, press.
 
-    The waiting is several stages, since as in RoboMME each ends at a checkpoint.
+    The waiting is several stages, since as in RoboMME each ends at a checkpoint. What a stage
+    forbids fails the episode: in all stages a press off the target and letting the goal's visit
+    pass, in the last also stopping the cube on an earlier visit.
     """
     visit = goal.number("visit")
     interval = scene.motions_of(Shuttle)[0].interval
@@ -123,7 +128,10 @@ def _middle_of(interval: int, visit: int) -> int:
 
 
 def _wait(checkpoint: int, wrong: tuple[Rule, ...]) -> Stage:
-    """Return the stage in which the hand waits until a number of steps since reset."""
+    """Return the stage in which the hand waits until `checkpoint` control steps since reset.
+
+    What holds in `wrong` meanwhile fails the episode.
+    """
     return Stage(
         expects=Elapsed(least=checkpoint),
         forbids=wrong,
@@ -146,7 +154,10 @@ def checkpoints(interval: int, visit: int) -> tuple[int, ...]:
 
 
 def _wrong(interval: int, visit: int) -> tuple[Rule, ...]:
-    """Return the rules of every stage: no press off the target, and none after the goal's visit."""
+    """Return the rules of every stage: no press off the target, and none after the goal's visit.
+
+    `interval` is the control steps of one pass over the target; visits are counted from 1.
+    """
     is_off_target = absent(Fact("near", "shuttle", "target"))
     press_off_target = All((PRESSED, is_off_target))
     too_late = Elapsed(least=interval * visit + 1)
@@ -157,7 +168,10 @@ def _wrong(interval: int, visit: int) -> tuple[Rule, ...]:
 
 
 def _too_early(interval: int, visit: int) -> Rule:
-    """Return the rule against stopping the cube before the pass of a visit begins."""
+    """Return the rule against stopping the cube before the pass of a visit begins.
+
+    Passes of 60 steps, third visit -> no stop in steps 0 to 119.
+    """
     last_step = interval * (visit - 1) - 1
     stop = OccurrenceCount((STOPPED,), least=1, until=last_step)
     return Rule(stop, "stopped the cube on an earlier visit", "wrong_time")

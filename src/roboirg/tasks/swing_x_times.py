@@ -52,7 +52,10 @@ LINGER = 20
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
-    """Draw button, cubes and a target on either side; goal cube and repeats are uniform."""
+    """Draw button, cubes and a target on either side; goal cube and repeats are uniform.
+
+    The order of the draws decides which scene a seed gives.
+    """
     repeats = draw_number(rng, REPEATS[difficulty])
     placed = draw_button_and_cubes(rng, difficulty, CUBE_REGION, CUBE_GAP)
     regions = {f"target_{side}": region for side, region in SIDES.items()}
@@ -86,7 +89,8 @@ def make_scene(
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Return 2 N + 3 stages: pick, N times over the right and left target, put down, press.
 
-    Every stage forbids to pick another cube and to swing too often; all but the last, to press.
+    For one time: pick, right, left, put down, press. What a stage forbids fails the episode: in
+    every stage picking another cube and more visits than the goal's; in all but the last, a press.
     """
     color = goal.text("color")
     repeats = goal.number("repeats")
@@ -104,7 +108,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 def _too_often(cube: str, visits: int) -> Rule:
-    """Return the rule against more visits of the targets than the goal's.
+    """Return the rule against more visits of the targets than `visits`, of both together.
 
     Visits in a wrong order complete no stage but count, so they also violate this rule.
     """

@@ -37,7 +37,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Return a goal for every cube and the disc used before or after the press."""
+    """Return two goals for every cube: the disc used before the press, and that used after it."""
     return goals_by_color(scene, "cube", "relation", MOMENTS)
 
 

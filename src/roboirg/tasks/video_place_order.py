@@ -27,7 +27,8 @@ SITE_RADIUS = 0.1
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw the visited discs, their order, the goal's disc and the time of the press.
 
-    The press comes after the first placing at the earliest, and after the last at the latest.
+    The press comes after the first placing at the earliest, and after the last at the latest. The
+    order of the draws decides which scene a seed gives: the goal's disc before the press.
     """
     table = video_place.draw_table(rng, difficulty, DISCS, SITE_RADIUS)
     shown = _draw_placings(rng, table)
@@ -47,13 +48,16 @@ def _draw_placings(rng: np.random.Generator, table: PlaceTable) -> list[Fact]:
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Return a goal for every cube and every disc that was visited."""
+    """Return a goal for every cube and every disc that was visited, counted from 1."""
     placements = range(1, len(video_place.visited(scene)) + 1)
     return goals_by_color(scene, "cube", "placement", placements)
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Return the stages: pick the cube, and place it on the n-th disc that was visited."""
+    """Return the stages: pick the cube, and place it on the n-th disc that was visited.
+
+    Which one that is follows from the video: ``placement=2`` is the second disc in its order.
+    """
     answer = video_place.visited(scene)[goal.number("placement") - 1]
     return video_place.place_stages(scene, goal.text("color"), answer)
 

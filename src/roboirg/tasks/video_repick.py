@@ -68,7 +68,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button and cubes; the cube of the video and the number of repeats are uniform.
 
     In hard episodes many cubes of all colors lie about, and none moves; in the others, three of one
-    color change places.
+    color change places. The order of the draws decides which scene a seed gives.
     """
     repeats = draw_number(rng, REPEATS)
     swaps = draw_number(rng, SWAPS[difficulty])
@@ -87,10 +87,11 @@ def make_scene(
     initiators: Sequence[str],
     partners: Sequence[str | None] = (),
 ) -> Scene:
-    """Return the scene whose video shows a cube picked up and put down, and then swaps.
+    """Return the scene whose video shows the cube `target` picked up and put down, and then swaps.
 
     `initiators` are the names of the cubes that start a swap, in order; each changes places with
-    the nearest cube, or with its partner where that is known.
+    the nearest cube, or with its partner where that is known. `partners[i]` belongs to
+    `initiators[i]`; None, and those that are missing at the end, are unknown.
     """
     motions = plan_swaps(
         cubes,
@@ -105,7 +106,10 @@ def make_scene(
 
 
 def _draw_layout(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
-    """Draw three cubes of one color, each near its point of a layout."""
+    """Draw three cubes of one color, each near its point of a layout.
+
+    They are called ``cube_red_0`` to ``cube_red_2``.
+    """
     color = draw(rng, COLORS)
     plans: list[CubePlan] = []
     for number, point in enumerate(layout_points(rng, LAYOUT_CUBES)):
@@ -128,7 +132,11 @@ def _clutter_plans(rng: np.random.Generator) -> Iterator[CubePlan]:
 
 
 def demonstration(scene: Scene) -> tuple[Stage, ...]:
-    """Return the video's stages: pick up the cube, put it down, wait while cubes change places."""
+    """Return the video's stages: pick up the cube, put it down, wait while cubes change places.
+
+    `SWAP_STAGE` counts on this order: with swaps, stage 3 is the first in which the hand holds
+    still.
+    """
     target = scene.past[0].subject
     release = Primitive("put_down", target, height=SHOWN_RELEASE)
     put_down = put_down_stage(release, "drop the cube on the table")
@@ -149,8 +157,9 @@ def goals(_scene: Scene) -> tuple[Goal, ...]:
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Return 2 N + 1 stages: N times pick up and put down, then press.
 
-    Timers start with the first stage that has them, so those of a premature press do not start
-    again with each repeat.
+    What a stage forbids fails the episode: picking another cube, an early press; in the last stage
+    any pick. A timer starts with the first stage that names it, so those of a premature press do
+    not start again with each repeat.
     """
     target = scene.past[0].subject  # the cube that the video shows picked up
     cubes = scene.of_kind("cube")
@@ -169,7 +178,10 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 def _early_press(timer: str) -> Rule:
-    """Return the rule against a premature press, given the name of its timer."""
+    """Return the rule against a premature press, given the name of its timer.
+
+    A press fails only from step 50 to step 500 of that timer, as in RoboMME.
+    """
     is_early = Elapsed(*EARLY_PRESS, timer=timer)
     return Rule(All((PRESSED, is_early)), "pressed the button too early")
 

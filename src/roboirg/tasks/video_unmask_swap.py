@@ -23,7 +23,10 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
 
 
 def demonstration(scene: Scene) -> tuple[Stage, ...]:
-    """Return the video's stage: hold still until the last swap, for 114, 164 or 214 steps."""
+    """Return the video's stage: hold still until the last swap is complete.
+
+    With one, two or three swaps these are 114, 164 or 214 control steps.
+    """
     return (hold_still(last_step(scene.motions)),)
 
 

@@ -45,13 +45,14 @@ def write_atomically(path: Path, content: str | bytes) -> None:
 
 @contextlib.contextmanager
 def locked(path: Path, taken: str) -> Iterator[None]:
-    """Hold the lock of a file for one process alone; file and folder are made if missing, and stay.
+    """Hold the lock of a file for one process alone, while the block runs; does not wait for it.
 
-    The kernel releases it when the process ends, however it ends. A symbolic link is refused.
+    File and folder are made if missing, and stay. The kernel releases the lock when the process
+    ends, however it ends. A symbolic link is refused.
 
     Args:
         path: the file.
-        taken: the error if another process holds the lock.
+        taken: the message of the error if another process holds the lock.
 
     Raises:
         InvalidValueError: another process holds it, or it cannot be made.
@@ -70,7 +71,14 @@ def locked(path: Path, taken: str) -> Iterator[None]:
 
 
 def take_lock(descriptor: int, path: Path, *, shared: bool = False) -> bool:
-    """Lock an open file if no other process holds its lock. Returns whether it is locked now.
+    """Lock an open file if no other process holds its lock; return whether it is locked now.
+
+    Does not wait. The lock ends when the file is closed or the process ends.
+
+    Args:
+        descriptor: of the open file.
+        path: of the file, for the error.
+        shared: whether others that also share may hold it at the same time.
 
     Raises:
         InvalidValueError: its file system has no locks, as some network file systems.

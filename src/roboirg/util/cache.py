@@ -71,7 +71,11 @@ class Cache:
         return self._folder is not None
 
     def read(self, key: str) -> memoryview | None:
-        """Return the content of an entry; None if it is missing or damaged."""
+        """Return the content of an entry; None if it is missing or damaged, or the cache is off.
+
+        A damaged entry is removed. Reading an entry makes it the newest, so that it is kept
+        longest.
+        """
         if self._folder is None:
             return None
         path = self._folder / key
@@ -91,7 +95,11 @@ class Cache:
         return content
 
     def write(self, key: str, content: bytes) -> None:
-        """Store an entry; a failure is logged, not raised."""
+        """Store an entry; a failure is logged, not raised.
+
+        Nothing is stored if the cache is off or the entry alone exceeds the limit. Other entries
+        are removed to make room.
+        """
         size = _HEAD_SIZE + len(content)
         if self._folder is None or size > self._limit:
             return
@@ -105,7 +113,7 @@ class Cache:
             _warn_once(error)
 
     def _make_room(self, size: int) -> None:
-        """Remove the least recently used entries until `size` bytes more fit in."""
+        """Remove the least recently used entries until `size` bytes more fit in the limit."""
         entries = sorted(self._entries())
         total = size + sum(entry.size for entry in entries)
         for entry in entries:
@@ -128,7 +136,10 @@ class Cache:
 
 
 def open_cache(kind: Kind) -> Cache:
-    """Return the cache of one kind of entries, as the environment variables configure it."""
+    """Return the cache of one kind of entries, as the environment variables configure it.
+
+    It may be switched off; reading then finds nothing, and writing does nothing.
+    """
     folder = cache_folder()
     if folder is None:
         return Cache(None, 0)
@@ -143,7 +154,11 @@ def cache_folder() -> Path | None:
 
 
 def _size() -> float:
-    """Return the size limit of all caches together, bytes."""
+    """Return the size limit of all caches together, bytes, as the environment variable sets it.
+
+    Raises:
+        InvalidValueError: the variable is no positive number.
+    """
     text = os.environ.get(SIZE_VARIABLE) or str(DEFAULT_GIB)
     try:
         size_gib = float(text)

@@ -44,6 +44,7 @@ class ChildExit(NamedTuple):
         return self.code == -signal.SIGKILL
 
     def __str__(self) -> str:
+        """Return how it ended in words: ``"the process ended with exit code 1"``."""
         if self.code is None:
             return "the process closed its connection"
         if self.code < 0:
@@ -123,7 +124,7 @@ class ChildProcess:
         self._end_group()
 
     def close(self) -> ChildExit:
-        """Let the child exit by closing its channel; kill it after `GRACE_S`.
+        """Let the child exit by closing its channel; kill it after `GRACE_S`; return how it ended.
 
         One that not even that ends, as a call of a driver may hang in the kernel, is left behind.
         """

@@ -22,6 +22,8 @@ def line_width(console: Console) -> int:
 def widen(console: Console, *tables: RenderableType) -> None:
     """Widen a console that writes to a file, so that tables in it are neither cut nor folded.
 
+    Changes ``console.width``, to `LINE_WIDTH` at least.
+
     Args:
         console: left as it is if it is a terminal.
         *tables: that have to fit.

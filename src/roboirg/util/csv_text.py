@@ -15,7 +15,10 @@ _FORMULA = re.compile(
 
 
 def csv_text(rows: Iterable[Mapping[str, object]]) -> str:
-    """Return rows of the same columns under a head; empty without any row."""
+    """Return rows of the same columns as CSV, with a line of names first; empty without any row.
+
+    ``[{"task": "BinFill", "episodes": 2}]`` -> the lines ``task,episodes`` and ``BinFill,2``.
+    """
     table = list(rows)
     if not table:
         return ""

@@ -44,7 +44,11 @@ def discover(package: str, attribute: str, kind: type[Thing], group: str) -> dic
 def with_entries(
     ours: Iterable[Thing], attribute: str, kind: type[Thing], group: str
 ) -> dict[str, Thing]:
-    """Return ours and what the installed entry points define, by name; see `discover`."""
+    """Return ours and what the installed entry points define, by name; see `discover`.
+
+    Raises:
+        InvalidValueError: an entry point cannot be loaded, or adds a name that exists already.
+    """
     things = {thing.name: thing for thing in ours}
     owners = dict.fromkeys(things, "roboirg")
     for entry in entry_points_of(group):
@@ -75,7 +79,8 @@ def entry_names(group: str, packages: Collection[str] | None = None) -> tuple[st
 def find_entry(name: str, attribute: str, kind: type[Thing], group: str) -> Thing | None:
     """Return what the entry point of a name defines; None if no package has one of that name.
 
-    Imports that one only. The other arguments are those of `discover`.
+    Imports that one only, so another package with a fault does no harm. The other arguments are
+    those of `discover`.
     """
     for entry in entry_points_of(group):
         if entry.name == name:
@@ -84,7 +89,11 @@ def find_entry(name: str, attribute: str, kind: type[Thing], group: str) -> Thin
 
 
 def discover_in_modules(package: str, attribute: str, kind: type[Thing]) -> list[Thing]:
-    """Return what the modules of a package define, in the order of their names."""
+    """Return what the modules of a package define, in the order of the modules' names.
+
+    Imports all modules of `package`; those whose `attribute` is no `kind`, or that have none, count
+    for nothing.
+    """
     things = []
     for info in pkgutil.iter_modules(importlib.import_module(package).__path__):
         module = importlib.import_module(f"{package}.{info.name}")

@@ -61,19 +61,25 @@ class Clip:
 
 
 def sample_evenly(frames: Pixels, most: int) -> Pixels:
-    """Return at most `most` frames, evenly spaced, including the first and the last."""
+    """Return at most `most` of frames (T, …), evenly spaced, including the first and the last."""
     if len(frames) <= most:
         return frames
     return frames[evenly_spaced(len(frames), most)]
 
 
 def evenly_spaced(count: int, most: int) -> NDArray[np.intp]:
-    """Return at most `most` of `count` places, evenly spaced, including the first and the last."""
+    """Return at most `most` of `count` indices, evenly spaced, including the first and the last.
+
+    7 and 3 -> ``[0, 3, 6]``; 2 and 3 -> ``[0, 1]``.
+    """
     return np.linspace(0, count - 1, min(count, most)).round().astype(np.intp)
 
 
 def scaled_square(picture: NDArray[Any], size: int) -> NDArray[Any]:
-    """Crop a picture to its central square and scale it to `size` x `size` pixels."""
+    """Crop a picture to its central square and scale it to `size` x `size` pixels.
+
+    The picture is (height, width, 3) or (height, width); the result has as many channels.
+    """
     import cv2
 
     height, width = picture.shape[:2]
@@ -85,11 +91,13 @@ def scaled_square(picture: NDArray[Any], size: int) -> NDArray[Any]:
 
 
 def contact_sheets(frames: Pixels, labels: Sequence[str]) -> Iterator[Pixels]:
-    """Yield sheets of frames at half their size, in reading order, each with its label.
+    """Yield sheets, each a picture of up to `SHEET_SIDE` ** 2 frames in reading order, with labels.
+
+    Frames have half their size.
 
     Args:
         frames: uint8 (T, height, width, 3).
-        labels: T short texts.
+        labels: T short texts, such as times.
     """
     small = np.ascontiguousarray(frames[:, ::2, ::2])  # every second row and column, as a copy
     for frame, label in zip(small, labels, strict=True):
@@ -101,7 +109,10 @@ def contact_sheets(frames: Pixels, labels: Sequence[str]) -> Iterator[Pixels]:
 
 
 def _sheet(frames: Pixels) -> Pixels:
-    """Return frames in rows of `SHEET_SIDE`; what is missing in the last row is black."""
+    """Return frames (n, height, width, 3) as one picture, in rows of `SHEET_SIDE`.
+
+    What is missing in the last row is black.
+    """
     count, height, width, _ = frames.shape
     rows = math.ceil(count / SHEET_SIDE)
     places = np.zeros((rows * SHEET_SIDE, height, width, 3), np.uint8)
@@ -112,7 +123,7 @@ def _sheet(frames: Pixels) -> Pixels:
 
 
 def encode_png(picture: Picture) -> bytes:
-    """Return a picture as a PNG file."""
+    """Return a picture as a PNG file, by PyAV, which every installation with a simulator has."""
     _check_pyav()
     import av
 
@@ -149,7 +160,7 @@ def encode_jpeg(pixels: Pixels) -> bytes:
 
 
 def encode_mp4(clip: Clip) -> bytes:
-    """Return a clip as an MP4 file, H.264."""
+    """Return a clip as an MP4 file, H.264; the same frames give the same bytes on one machine."""
     _check_pyav()
     import av
 

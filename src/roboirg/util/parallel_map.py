@@ -39,10 +39,15 @@ def parallel_map(
 ) -> Iterator[tuple[Item, Outcome]]:
     """Yield every item with the result of its call, in the order in which the calls finish.
 
+    An error of a call is raised here, and ends the other processes; so does closing the iterator.
+
     Args:
         work: a function that can be pickled.
         items: its arguments, one for each call.
-        workers: number of processes; 0 runs all calls in this process.
+        workers: number of processes; 0 runs all calls in this process, in order.
+
+    Raises:
+        RoboIRGError: a process died.
     """
     if workers == 0:
         for item in items:

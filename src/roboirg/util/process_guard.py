@@ -40,7 +40,14 @@ def run_main() -> None:
 
 
 def begin(parent: int) -> None:
-    """Put this process under the supervision of its parent, and prepare it for its work."""
+    """Put this process under the supervision of its parent, and prepare it for its work.
+
+    From then on it ignores Ctrl-C, is killed when its parent dies, and leads a process group and
+    session of its own, so that what it starts can be ended with it. Call it once, first of all.
+
+    Args:
+        parent: process id of the parent; if that is dead already, this process ends at once.
+    """
     # Ctrl-C is for the parent, which decides what to do.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
@@ -120,7 +127,8 @@ def _reap(child: int) -> int | None:
 def _end_descendants(child: int) -> None:
     """End all that a dead child has started, until nothing is left.
 
-    It gets SIGTERM at first, and SIGKILL after `_TERM_S`.
+    Its processes get SIGTERM at first, and SIGKILL after `_TERM_S`. They become children of this
+    process, as it is their subreaper: no children left means done.
     """
     # Python's resource trackers are among them, and have to clean up, which SIGKILL prevents.
     number = signal.SIGTERM

@@ -44,7 +44,9 @@ def processor_features() -> str:
 
 
 def _described_by(names: Sequence[str]) -> list[str]:
-    """Return the fields of these names that Linux has; Python's name of the processor without any.
+    """Return the values of these fields that Linux has; Python's name of the processor without any.
+
+    ``("vendor_id", "cpu family")`` -> ``["GenuineIntel", "6"]``.
 
     Args:
         names: of fields of ``/proc/cpuinfo``.
@@ -56,7 +58,7 @@ def _described_by(names: Sequence[str]) -> list[str]:
 
 @functools.cache
 def _fields() -> dict[str, str]:
-    """Return what Linux says of the first processor; empty elsewhere."""
+    """Return what Linux says of the first processor: ``{"model name": "…"}``; empty elsewhere."""
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -69,7 +71,7 @@ def _fields() -> dict[str, str]:
 
 
 def core_count() -> int:
-    """Return how many cores this process may use, within the limit of its container."""
+    """Return how many cores this process may use, within the limit of its container; at least 1."""
     if not hasattr(os, "sched_getaffinity"):
         return os.cpu_count() or 1
     limits = [len(os.sched_getaffinity(0)), *_quotas()]

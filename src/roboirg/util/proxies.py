@@ -33,6 +33,7 @@ def proxy_of(url: str) -> Proxy:
     """Return the proxy through which an address is reached, from the environment's variables.
 
     There is none for this machine, for what NO_PROXY lists, and without a variable for its scheme.
+    For an address with https, ``https_proxy`` counts before ``all_proxy``.
 
     Raises:
         MissingDependencyError: what a variable holds cannot be used; a run stops.

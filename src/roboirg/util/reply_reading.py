@@ -21,9 +21,11 @@ _THOUGHTS_END = re.compile(
 _ANSWER_ENDS = re.compile(
     r"""(?i)(?:<(?:think|thinking|thought|thoughts|reasoning)>|\[THINK\])(?!"\s*[,\]}])"""
     r"|◁think▷|<\|channel\|>(?:analysis|commentary)\b"
-    r"|<\|(?:im_end|endoftext|end|return|eot_id)\|>|</s>"
+    r"|<\|(?:im_end|endoftext|end|return|eot_id|cut_off)\|>|</s>"
 )
 """Where thoughts begin, or a token at the end of a reply."""
+CUT_OFF = "<|cut_off|>"
+"""Ends the text of a reply that its service broke off at the limit of tokens."""
 
 _JSON_BEGINS = re.compile(
     r"""(?mx)
@@ -39,20 +41,23 @@ _DECISIVE = re.compile(
     (?:
         (?P<line>^[^\w\n]*(?:(?:choice|option)\b[^\w\n]*)?)
         | \b(?:answer|(?:best|correct|final|my|right)\s+(?:choice|option|one))\b
-          (?:[^\w.?!]+(?:be|choice|correct|is|letter|must|option|right|should|the|would)\b)*
+          # At most twelve of these words: a text of nothing else is read in linear time.
+          (?:[^\w.?!]+(?:be|choice|correct|is|letter|must|option|right|should|the|would)\b){0,12}
           [^\w.?!]*
         | \\boxed\{(?:\\\w+\{)?[^\w}]*
     )
-    (?P<letter>[A-D])(?![\w'’-])
+    (?P<letter>[A-D])(?![\w'’\u0300-\u036f\u20d0-\u20ff-])
     (?(line)
         [^\w\n]*$
         # *A cube* names no choice, while *A because …* does; *A or B* names two.
         | (?!(?<=a)[ \t]+(?!(?:and|as|because|is|since)\b)(?-i:[a-z]))
-          (?!\W*(?:,|/|&|\b(?:or|and)\b)\W*[A-D]\b)
+          (?!(?=\W*[A-D]\b)[^\w,/&]*[,/&])
+          (?!\W*\b(?:or|and)\b\W*[A-D]\b)
     )
     """
 )
-"""A letter alone on its line, after *answer* and the like, or in a box."""
+"""A letter alone on its line, after *answer* and the like, or in a box; none with a combining mark,
+which may strike it out."""
 _SUGGESTED = re.compile(
     r"""(?imx)
     (?: ^[^\w\n]*(?:(?:choice|option)\b[^\w\n]*)? | \*\*[(\[]? )
@@ -98,11 +103,27 @@ def with_thoughts(answer: str, thoughts: Sequence[Any]) -> str:
     return f"<think>{json.dumps(thoughts, ensure_ascii=False)}</think>\n{answer}"
 
 
+def check_whole(text: str) -> None:
+    """Raise if a reply ends with `CUT_OFF`, because what looks like its answer may be a draft.
+
+    If the end of a JSON object, or of a code fence, is the last that it says, it is whole.
+
+    Raises:
+        UnparsableReplyError: it was cut off.
+    """
+    is_whole = answer_of(text).endswith(("}", "```"))
+    if text.endswith(CUT_OFF) and not is_whole:
+        raise UnparsableReplyError(
+            "The reply was cut off at the limit of tokens; give the answer alone."
+        )
+
+
 def answer_of(text: str) -> str:
     """Return a reply without the thoughts in it, and without the tokens at its end.
 
-    What follows the last end of thoughts is the answer, up to thoughts that break off. The tag at
-    their beginning may be missing, as some services put it into the prompt.
+    ``"<think>red or blue?</think> red <|im_end|>"`` -> ``"red"``. What follows the last end of
+    thoughts is the answer, up to thoughts that break off. The tag at their beginning may be
+    missing, as some services put it into the prompt.
     """
     after_thoughts = _THOUGHTS_END.split(text)[-1]
     return _ANSWER_ENDS.split(after_thoughts)[0].strip()
@@ -127,7 +148,7 @@ def json_object(text: str) -> dict[str, Any]:
 def last_json(text: str) -> Any:  # noqa: ANN401 - JSON
     """Return the last JSON object in a reply, or the last list of objects; None without any.
 
-    ``Not {"a": 1}, but {"a": 2}.`` gives ``{"a": 2}``.
+    ``Not {"a": 1}, but {"a": 2}.`` -> ``{"a": 2}``. Thoughts are left out first.
 
     Raises:
         UnparsableReplyError: a brace belongs to no well-formed object, so that none is sure to be
@@ -156,11 +177,15 @@ def _distinct_fields(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def chosen_letter(text: str, letters: str) -> str:
-    """Return the letter that a reply chooses, in upper case: ``The answer is b.`` chooses ``B``.
+    """Return the letter that a reply chooses, in upper case: ``The answer is b.`` -> ``B``.
 
     If the reply has a JSON object with the field ``choice`` or ``answer``, only that is read.
     Letters alone on a line, after *answer* and in boxes decide; only without any do those that
     begin a line or are set in bold.
+
+    Args:
+        text: the reply.
+        letters: those that may be chosen, such as ``"ABC"``.
 
     Raises:
         UnparsableReplyError: it names none of the letters from A to D, several different ones, one

@@ -40,7 +40,13 @@ def user_folder(kind: Literal["cache", "data"], variable: str = "", *, below: st
 
 
 def _platform_folder(kind: Literal["cache", "data"]) -> Path:
-    """Return the folder of this user by the customs of the platform; ``~`` without a home."""
+    """Return the folder of this user by the customs of the platform; ``~`` without a home.
+
+    On Linux ``~/.cache/roboirgbench`` or ``~/.local/share/roboirgbench``; it need not exist.
+
+    Raises:
+        MissingDependencyError: platformdirs is not installed.
+    """
     try:
         import platformdirs
 

@@ -21,6 +21,7 @@ from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.apps.demonstrations.export_plan import recording_jobs
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import OPTION_NAMES
 
 HERE = Path(__file__).parent
 
@@ -132,7 +133,13 @@ def test_a_trajectory_s_name_has_all_that_it_depends_on(make_plan):
     others = [replace(job, **{name: value}) for name, value in fields.items()]
     for name, value in spec.items():
         others.append(replace(job, spec=job.spec._replace(**{name: value})))
-    for words in ({"setting": "direct"}, {"form": "resolved"}):
+    options = (
+        {"setting": "direct"}, {"form": "resolved"}, {"stages": (1, 5)}, {"frame": "camera"},
+        {"distractor": "competing"}, {"distractors": 3}, {"wordings": "train"},
+        {"delivery": "turns"},
+    )  # fmt: skip
+    assert {name for words in options for name in words} == set(OPTION_NAMES)
+    for words in options:
         others.append(replace(job, options=replace(job.options, **words)))
 
     assert len({exported.path(Path()) for exported in (job, *others)}) == 1 + len(others)

@@ -416,6 +416,15 @@ def _with(changes, *, manifest_fits=True):
     return build
 
 
+def _manifest_with(**entries):
+    def build(good):
+        manifest = json.loads(members_of(good)[MANIFEST])
+        changed = json.dumps({**manifest, **entries}).encode()
+        return _with({MANIFEST: changed}, manifest_fits=False)(good)
+
+    return build
+
+
 def _without(name):
     def build(good):
         members = members_of(good)
@@ -452,6 +461,8 @@ PACKS = {
     "no manifest": (_without(MANIFEST), "cannot be read"),
     "empty manifest": (_with({MANIFEST: b"{}"}, manifest_fits=False), "cannot be read"),
     "manifest that is no JSON": (_with({MANIFEST: b"no"}, manifest_fits=False), "cannot be read"),
+    "other format": (_manifest_with(format=2), "of format 2; this roboirg reads format 1"),
+    "negative number of records": (_manifest_with(records=-1), "cannot be read"),
     "encrypted": (ENCRYPTED, "not a packed run"),
     "unknown compression": (UNKNOWN_METHOD, "not a packed run"),
     "cut short": (lambda good: good[:-100], "not a packed run"),

@@ -11,9 +11,6 @@ from typer.testing import CliRunner
 from roboirg.apps.policy_check.check_result import CheckResult
 from roboirg.apps.policy_check.commands import check_policy as command
 from roboirg.apps.policy_check.policy_check import check_policy, print_check_results
-from roboirg.core.observations import CAMERAS, PICTURE_SIZE
-from roboirg.core.policy_needs import PolicyNeeds
-from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes
 
 
 class Sound:
@@ -184,36 +181,6 @@ def test_what_is_allowed_is_noted():
 )
 def test_what_cannot_be_tried_is_told(spec, words):
     assert any(words in sentence for sentence in found(spec, "fail").values())
-
-
-@pytest.mark.parametrize(("frames", "count"), [("all", 10), (4, 3), ("none", None)])
-def test_made_up_videos_have_the_pictures_that_a_policy_wants(frames, count):
-    needs = PolicyNeeds(cameras=("front",), demonstration_frames=frames)
-    episode = SyntheticEpisodes(needs).episode("Go.", 10)
-
-    video = episode.demonstration
-
-    assert len(video["joint_positions"]) == 10
-    assert (len(video["front_rgb"]) if "front_rgb" in video else None) == count
-    assert "wrist_rgb" not in {*video, *episode.first}
-    assert "history" not in episode.first
-
-
-def test_made_up_observations_have_depth_matrices_and_a_history_that_ends_in_the_present():
-    needs = PolicyNeeds(cameras=CAMERAS, observe_every=4, depth=True, calibration=True)
-    studio = SyntheticEpisodes(needs)
-    episode = studio.episode("Go.", 0)
-    later = studio.after(episode, 16)
-
-    for seen in (episode.first, later):
-        for camera in CAMERAS:
-            assert seen[f"{camera}_depth"].shape == (PICTURE_SIZE, PICTURE_SIZE, 1)
-            assert seen[f"{camera}_extrinsic"].shape == (3, 4)
-            assert seen[f"{camera}_intrinsic"].shape == (3, 3)
-    assert len(later["history"]) == 4
-
-    now = later["history"][-1]
-    assert all(np.array_equal(now[name], later[name]) for name in now)
 
 
 @pytest.mark.parametrize(("name", "code"), [("Sound", 0), ("NotFinite", 2)])

@@ -32,7 +32,8 @@ _ORANGE = (
     "#7f2704", "#a63603", "#c0510a", "#dd6a1c", "#ee8130", "#fbb477", "#fddfbf", "#fff1e3",
 )  # fmt: skip
 _BLUE = (
-    "#08306b", "#20578f", "#3271a8", "#4b90c4", "#74b0d8", "#a9d0e8", "#d9ebf6", "#edf5fb",
+    "#08306b", "#20578f", "#3271a8", "#4b90c4", "#74b0d8", "#a9d0e8", "#c4dff0", "#d9ebf6",
+    "#edf5fb",
 )  # fmt: skip
 _GRAY = ("#5f5f5f", "#858585", "#ababab", "#cfcfcf")
 _DARK = frozenset((*_ORANGE[:4], *_BLUE[:4], *_GRAY[:2]))

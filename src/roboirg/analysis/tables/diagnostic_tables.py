@@ -41,6 +41,7 @@ from roboirg.analysis.results.option_labels import (
 from roboirg.analysis.results.run_cells import cells_of
 from roboirg.analysis.tables.arm_table import make_arm_table
 from roboirg.analysis.tables.facts_table import make_facts_table
+from roboirg.analysis.tables.rewriter_table import make_rewriter_table
 from roboirg.analysis.tables.subgoal_table import make_subgoal_table
 from roboirg.analysis.tables.table import (
     PARTIAL_MARK,
@@ -502,6 +503,7 @@ _OURS = (
     RunTable("heard", make_heard_table, " (how many prompts were cut)"),
     RunTable("arms", make_arm_table, " (what control arms show)"),
     RunTable("subgoals", make_subgoal_table, " (of planners, and what models cost)"),
+    RunTable("rewriters", make_rewriter_table, " (the share of the gap that each closes)"),
     RunTable("facts", make_facts_table, " (what a methods section needs)"),
 )
 

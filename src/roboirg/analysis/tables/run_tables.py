@@ -150,10 +150,15 @@ def _scene_order(result: Summary) -> SortKey:
     return result.task, result.split, result.episode, options_sort_key(result.options)
 
 
+_NAMED_BY_A_MODEL = ("misunderstood", "no_answer")
+"""Failures that a model's reply decides, whatever the hands do."""
+
+
 def failure_text(result: Summary) -> str:
     """Return an episode without success in one line: which one, its options, and the cause.
 
-    For example ``PickXtimes test/3 relational (policy seed 1): picked up the wrong cube``.
+    For example ``PickXtimes test/3 relational (policy seed 1): picked up the wrong cube``. What a
+    model named instead of the goal follows the cause, which the hands alone do not explain.
     """
     text = f"{result.task} {result.split}/{result.episode} {options_label(result.options)}"
     if result.policy_seed:
@@ -161,6 +166,9 @@ def failure_text(result: Summary) -> str:
     if result.arm != TOLD:
         text += f" ({result.arm})"
     text += f": {printable(result.cause or result.outcome)}"
+    found = result.attribution
+    if found is not None and found.failure in _NAMED_BY_A_MODEL:
+        text += f". {printable(found.sentence)}"
     if result.outcome == "error":
         text += f" {ERROR_MARK}"
     return text

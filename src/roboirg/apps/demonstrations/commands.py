@@ -110,6 +110,7 @@ def _print_size(plan: ExportPlan) -> None:
     """Print how many trajectories the plan records, and how many episodes it exports.
 
     Warn if episodes or words of the test split are exported, on which a policy must not be trained.
+    All goes to the error stream.
     """
     from roboirg.apps.demonstrations.export_plan import recording_jobs
 
@@ -118,7 +119,7 @@ def _print_size(plan: ExportPlan) -> None:
     if plan.options.wordings == "test":
         typer.echo(_TEST_WORDS, err=True)
     jobs = recording_jobs(plan)
-    episodes = sum(len(spoken.texts) for spoken in jobs)
+    episodes = sum(len(spoken.instructions) for spoken in jobs)
     recorded = counted(len(jobs), "trajectory", "trajectories")
     typer.echo(f"{recorded}, {counted(episodes, 'episode')}", err=True)
 

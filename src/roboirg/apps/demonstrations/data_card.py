@@ -30,7 +30,7 @@ _MEANINGS = {
 def card_text(
     plan: ExportPlan, parts: Sequence[DatasetPart], facts: Sequence[TrajectoryFacts], root: Path
 ) -> str:
-    """Return the card of a dataset as Markdown, with the head that Hugging Face reads.
+    """Return the text of a dataset's README.md (its card), with the head that Hugging Face reads.
 
     Args:
         plan: what is exported.
@@ -53,6 +53,7 @@ def card_text(
 
 
 def _head_line(plan: ExportPlan) -> str:
+    """Return the card's first sentences: split, format, versions, and how long a frame is."""
     rate = f"{CONTROL_RATE} frames per second, one per control step."
     if plan.actions == "waypoint":
         rate = f"A frame per waypoint; time stamps count frames, {CONTROL_RATE} to the second."
@@ -84,14 +85,17 @@ class _Counts:
 
 
 def _counts(parts: Sequence[DatasetPart]) -> dict[str, _Counts]:
-    """Count trajectories, frames and episodes of each task, and as ``all`` those of all tasks."""
+    """Count trajectories, frames and episodes of each task, and as ``all`` those of all tasks.
+
+    ``{"PickXtimes": …, "all": …}``: tasks in the order of the parts, ``all`` last.
+    """
     by_task: dict[str, _Counts] = {}
     total = _Counts()
     for part in parts:
         for episode in part.episodes:
             facts = load_facts(episode.path)
             for counts in (by_task.setdefault(facts.task, _Counts()), total):
-                counts.add(facts.frames, len(episode.texts))
+                counts.add(facts.frames, len(episode.instructions))
     return {**by_task, "all": total}
 
 
@@ -104,7 +108,10 @@ def _count_lines(counts: Mapping[str, _Counts]) -> Iterator[str]:
 
 
 def _words_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator[str]:
-    """Yield the card's sentences on the instructions, and on how many trajectories succeeded."""
+    """Yield two sentences of the card: on the instructions, and on the trajectories by outcome.
+
+    `facts` are those of all trajectories, exported or not.
+    """
     yield (
         f"Settings: {', '.join(plan.settings)}; forms: {', '.join(plan.forms)}. Each trajectory "
         "comes once with the words of each of them that can express it; "
@@ -116,7 +123,7 @@ def _words_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator
 
 
 def _content_lines(plan: ExportPlan) -> Iterator[str]:
-    """Yield the card's lines on what a frame holds: state, action and pictures."""
+    """Yield the card's lines on what a frame holds: state, action, video and pictures."""
     yield "State: seven joint angles (rad) and the first finger (m)."
     origin = "exactly what was executed"
     if plan.disturbed:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from roboirg.apps.demonstrations.export_plan import ORACLE, TaskText
-from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
+from roboirg.apps.demonstrations.export_plan import ORACLE, ExportedInstruction
+from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedInstruction
 from roboirg.apps.demonstrations.trajectory import (
     Trajectory,
     TrajectoryFacts,
@@ -26,11 +26,11 @@ class RecordedEpisode(NamedTuple):
 
     Attributes:
         path: of the trajectory's file.
-        texts: with their places in the dataset.
+        instructions: each with its place in the dataset.
     """
 
     path: Path
-    texts: tuple[PlacedText, ...]
+    instructions: tuple[PlacedInstruction, ...]
 
 
 class FilePlace(NamedTuple):
@@ -62,32 +62,33 @@ class DatasetPart:
         return FilePlace(*divmod(self.number, CHUNK_SIZE))
 
 
-class RecordedTexts(NamedTuple):
+class RecordedInstructions(NamedTuple):
     """A trajectory and its instructions, which have no place yet."""
 
     path: Path
-    texts: tuple[TaskText, ...]
+    instructions: tuple[ExportedInstruction, ...]
 
 
-def place_texts(recorded: Sequence[RecordedTexts]) -> list[RecordedEpisode]:
+def place_instructions(recorded: Sequence[RecordedInstructions]) -> list[RecordedEpisode]:
     """Give every instruction of a trajectory the numbers that LeRobot has for an episode.
 
-    An episode is a trajectory with one of its instructions, so a trajectory of 90 frames with two
-    makes the episodes 0 and 1, whose first frames have the numbers 0 and 90. Equal texts have the
-    same task index. Trajectories without frames are left out.
+    An episode of the dataset is a trajectory with one of its instructions. So a trajectory of 90
+    frames with two instructions makes the episodes 0 and 1, whose first frames have the numbers 0
+    and 90. Equal texts have the same task index. Trajectories without frames are left out. Numbers
+    follow the order of `recorded`, and no number is left out.
     """
     task_indices: dict[str, int] = {}
     episode_index = 0
     first_index = 0
     episodes = []
-    for path, texts in recorded:
+    for path, instructions in recorded:
         length = load_facts(path).frames
         if not length:
             continue
         placed = []
-        for words in texts:
-            task_index = task_indices.setdefault(words.text, len(task_indices))
-            placed.append(PlacedText(words, episode_index, first_index, task_index))
+        for instruction in instructions:
+            task_index = task_indices.setdefault(instruction.text, len(task_indices))
+            placed.append(PlacedInstruction(instruction, episode_index, first_index, task_index))
             episode_index += 1
             first_index += length
         episodes.append(RecordedEpisode(path, tuple(placed)))
@@ -95,12 +96,15 @@ def place_texts(recorded: Sequence[RecordedTexts]) -> list[RecordedEpisode]:
 
 
 def all_texts(parts: Sequence[DatasetPart]) -> list[str]:
-    """Return the distinct texts of all instructions, in the order of their indices from 0."""
+    """Return the distinct texts of all instructions, in the order of their task indices from 0.
+
+    The indices are those of `place_instructions`, which have no gaps.
+    """
     text_by_index = {}
     for part in parts:
         for episode in part.episodes:
-            for placed in episode.texts:
-                text_by_index[placed.task_index] = placed.words.text
+            for placed in episode.instructions:
+                text_by_index[placed.task_index] = placed.instruction.text
     return [text_by_index[index] for index in range(len(text_by_index))]
 
 
@@ -113,7 +117,7 @@ def read_episodes(
             yield part, episode, load_trajectory(episode.path)
 
 
-def episode_row(trajectory: Trajectory, placed: PlacedText) -> dict[str, Any]:
+def episode_row(trajectory: Trajectory, placed: PlacedInstruction) -> dict[str, Any]:
     """Return what is known of an episode: a row of the table of facts next to the dataset.
 
     Args:
@@ -121,7 +125,7 @@ def episode_row(trajectory: Trajectory, placed: PlacedText) -> dict[str, Any]:
         placed: the episode's instruction, with its numbers in the dataset.
     """
     facts = trajectory.facts
-    words = placed.words
+    instruction = placed.instruction
     final_joints = trajectory.joint_positions[-1].tolist()
     final_fingers = trajectory.gripper[-1].tolist()
     return {
@@ -136,12 +140,12 @@ def episode_row(trajectory: Trajectory, placed: PlacedText) -> dict[str, Any]:
         "variation": facts.variation,
         "actions": facts.actions,
         "disturbed": facts.disturbed,
-        "trajectory": _trajectory_name(facts, words.options),
+        "trajectory": _trajectory_name(facts, instruction.options),
         "final_state": final_joints + final_fingers,
         "demonstration_source": facts.demonstration_source,
         "environment_version": facts.environment_version,
-        "delivery": words.options.delivery,
-        **words.facts,
+        "delivery": instruction.options.delivery,
+        **instruction.facts,
     }
 
 

@@ -70,6 +70,7 @@ def replay(recorded: ReplayableTrajectory) -> ReplayResult:
     """Execute a trajectory's recorded actions in the simulator, and measure how far states differ.
 
     Differences are between joint angles (rad) and finger positions (m), the largest of each step.
+    Stops early if the episode ends before the actions do.
     """
     env = make(_find_episode(recorded), cameras=(), actions=recorded.space)
     differences = []
@@ -100,14 +101,14 @@ def replay(recorded: ReplayableTrajectory) -> ReplayResult:
 
 
 def _difference(state: NDArray[np.floating[Any]], expected: NDArray[np.floating[Any]]) -> float:
-    """Return the greatest difference of a number."""
+    """Return the greatest absolute difference between two arrays of the same shape."""
     return float(np.abs(state.astype(np.float64) - expected).max())
 
 
 def _find_episode(recorded: ReplayableTrajectory) -> Episode:
-    """Return the episode of a trajectory.
+    """Return the episode of a trajectory, by its split and number or else by its seed.
 
-    It is named by split and number; RoboMME's files have only the seed, by which it is found.
+    RoboMME's files have only the seed, by which it is looked up among train, val and test.
 
     Raises:
         InvalidValueError: no episode has the seed.
@@ -124,7 +125,10 @@ def _find_episode(recorded: ReplayableTrajectory) -> Episode:
 
 @functools.cache
 def _places(task: str) -> dict[int, tuple[str, int]]:
-    """Return the split and the number in it of each episode of a task, by its seed."""
+    """Return the split and the number in it of each episode of a task, by its seed.
+
+    Of train, val and test: ``{510000: ("test", 0), …}``. Makes all of them once, and keeps them.
+    """
     places = {}
     for split in SPLITS:
         for index in range(SIZES[split]):

@@ -24,7 +24,7 @@ class ExportFormat:
         name: as in the command line.
         make_parts: returns the parts of a dataset in order: a `DatasetPart` for each file or so.
             It is called with the `ExportPlan`, the folder of the dataset and the trajectories, each
-            a `RecordedTexts`.
+            a `RecordedInstructions`.
         write_part: writes the frames of a part; runs in a worker process.
         finish: writes what describes a dataset, whose last file makes it readable. It is called
             with the folder and all parts.
@@ -65,7 +65,10 @@ def export_formats() -> Mapping[str, ExportFormat]:
 
 
 def names_where(has: Callable[[ExportFormat], bool]) -> str:
-    """Return the names of the formats that have a trait: ``'robomme-hdf5'``, or ``'a' or 'b'``."""
+    """Return the names of the formats for which `has` is true: ``"'robomme-hdf5'"``.
+
+    Several are joined: ``"'lerobot-v2.1' or 'lerobot-v3'"``.
+    """
     return " or ".join(repr(known.name) for known in export_formats().values() if has(known))
 
 

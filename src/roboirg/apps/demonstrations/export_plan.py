@@ -90,13 +90,15 @@ class ExportPlan:
                 "`disturbed: true`."
             )
         self._check_disturbed()
+        self._check_waypoints()
         self._check_pictures()
         return self
 
     def _check_disturbed(self) -> None:
-        """Check that the format has room for disturbed demonstrations, and for waypoints.
+        """Check what disturbed demonstrations need; undisturbed ones always pass.
 
-        Of a disturbed demonstration both the executed and the right action are stored.
+        In a disturbed one the expert is led off its way and comes back. Both the executed and the
+        right action of each step are stored, for which the format must have room (labels).
 
         Raises:
             InvalidValueError: it has not, or the policy is not the oracle.
@@ -108,6 +110,13 @@ class ExportPlan:
                 f"only the oracle is disturbed, and a time step of {unlabeled} is the "
                 "result of its action, so it has no place for one that was not executed."
             )
+
+    def _check_waypoints(self) -> None:
+        """Check what frames that are waypoints need; frames that are control steps always pass.
+
+        Raises:
+            InvalidValueError: the format has no such frames, or the video is to be included.
+        """
         if self.actions == "waypoint" and (self.video or not self.file_format.has_waypoints):
             able = names_where(lambda known: known.has_waypoints)
             raise InvalidValueError(
@@ -117,6 +126,8 @@ class ExportPlan:
 
     def _check_pictures(self) -> None:
         """Check the cameras and the size of pictures, also against what the format needs.
+
+        RoboMME's format and openpi need both cameras in full size; what has depth needs PNG.
 
         Raises:
             InvalidValueError: a value or a combination is not possible.
@@ -173,12 +184,15 @@ class ExportPlan:
         return language_label(self.tasks, self.pool, self.settings, self.options.wordings)
 
     def fingerprint(self) -> str:
-        """Return a hash of everything that determines the dataset."""
+        """Return a hash (SHA-256, hexadecimal) of everything that determines the dataset.
+
+        A stopped export is only continued with the same one.
+        """
         versions = [self.language_label, ENVIRONMENT_VERSION, TRAJECTORY_VERSION]
         return hashlib.sha256(json.dumps([asdict(self), versions]).encode()).hexdigest()
 
 
-class TaskText(NamedTuple):
+class ExportedInstruction(NamedTuple):
     """One instruction of an episode.
 
     Attributes:
@@ -219,16 +233,24 @@ class RecordingJob:
         return get_episode(self.task, self.split, self.number)
 
     def path(self, folder: Path) -> Path:
-        """Return the path of the trajectory's file, whose name has all that it depends on."""
+        """Return the path of the trajectory's file, whose name has all that it depends on.
+
+        For example ``PickXtimes-train-00003-000-png.zip``. Exports that keep trajectories in one
+        folder share the files of equal names.
+        """
         name = f"{self.task}-{self.split}-{self.number:05d}-{self.variation:03d}"
         if self.options is not None:
             name += f"-{short_hash(self.policy)}-{self.options.setting}-{self.options.form}"
+            usual = InstructionOptions(self.options.setting, self.options.form)
+            if self.options != usual:
+                name += f"-{short_hash(repr(self.options))}"
         return folder / f"{'-'.join([name, *self._spec_words()])}{SUFFIX}"
 
     def _spec_words(self) -> list[str]:
         """Return the words of the file's name for what it holds: ``["png", "video", "front"]``.
 
-        What is usual, such as all cameras, is left out.
+        What is usual, such as all cameras, is left out. The order is fixed: kept files are found by
+        it.
         """
         spec = self.spec
         words: list[str] = [spec.coding]
@@ -251,11 +273,15 @@ class SpokenJob(NamedTuple):
     """A trajectory to record, and the instructions with which it is exported."""
 
     job: RecordingJob
-    texts: tuple[TaskText, ...]
+    instructions: tuple[ExportedInstruction, ...]
 
 
 def training_words(split: str, options: InstructionOptions) -> InstructionOptions:
-    """Return options with words of the pool for training, unless they name their words."""
+    """Return options whose words are for training, unless they name their words.
+
+    Options without `wordings`, split ``"test"`` -> the same with ``wordings="train"``. For train
+    and val, these are the words of the split anyway.
+    """
     if options.wordings is None and pool_of(split) != "train":
         return replace(options, wordings="train")
     return options
@@ -263,6 +289,8 @@ def training_words(split: str, options: InstructionOptions) -> InstructionOption
 
 def recording_jobs(plan: ExportPlan) -> list[SpokenJob]:
     """Return what is to be recorded: trajectories with their instructions, in the dataset's order.
+
+    Task by task, episode by episode; the dataset's numbers follow this order.
 
     Raises:
         InvalidValueError: no setting can express any of the episodes.
@@ -276,13 +304,14 @@ def recording_jobs(plan: ExportPlan) -> list[SpokenJob]:
 
 
 def _jobs_of(plan: ExportPlan, episode: Episode) -> list[SpokenJob]:
-    """Return the trajectories to record of an episode, each with the instructions that it fits.
+    """Return the trajectories to record of an episode, each with the instructions that it serves.
 
-    The oracle, which knows the goal, moves in the same way whatever is said, so its trajectory
-    serves all instructions; any other policy is recorded once for each.
+    The oracle, which knows the goal, moves in the same way whatever is said: one trajectory serves
+    all instructions, or each of several variations does. Any other policy is recorded once for each
+    instruction, and does not vary. No instruction -> no trajectory.
     """
-    texts = _texts_of(plan, episode)
-    if not texts:
+    exported = _instructions_of(plan, episode)
+    if not exported:
         return []
     job = RecordingJob(
         task=episode.task,
@@ -294,20 +323,20 @@ def _jobs_of(plan: ExportPlan, episode: Episode) -> list[SpokenJob]:
         spec=plan.recording,
     )
     if plan.policy != ORACLE:
-        return [SpokenJob(replace(job, options=text.options), (text,)) for text in texts]
+        return [SpokenJob(replace(job, options=text.options), (text,)) for text in exported]
     variations = range(plan.variations)
-    return [SpokenJob(replace(job, variation=number), texts) for number in variations]
+    return [SpokenJob(replace(job, variation=number), exported) for number in variations]
 
 
-def _texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
+def _instructions_of(plan: ExportPlan, episode: Episode) -> tuple[ExportedInstruction, ...]:
     """Return the instructions of an episode in all settings and forms of the plan.
 
-    Settings that cannot express the episode have none. The implicit form of an explicit instruction
-    is also its resolved form, so it is not given twice.
+    Settings that cannot express the episode have none. An explicit instruction points back at
+    nothing, so its implicit form is also its resolved form and is not given twice.
     """
-    words = InstructionOptions(wordings=plan.options.wordings)
-    explicit = instruct_with(episode, words).text
-    texts = []
+    explicit_options = InstructionOptions(wordings=plan.options.wordings)
+    explicit = instruct_with(episode, explicit_options).text
+    exported = []
     found = instructions([episode], plan.settings, plan.forms, plan.options)
     for _, instruction in found:
         is_explicit = not all_settings()[instruction.setting].implicit
@@ -316,5 +345,5 @@ def _texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
             continue
         options = replace(plan.options, setting=instruction.setting, form=instruction.form)
         facts = row(episode, instruction) | {"explicit": explicit}  # columns of the facts' table
-        texts.append(TaskText(options, instruction.text, facts))
-    return tuple(texts)
+        exported.append(ExportedInstruction(options, instruction.text, facts))
+    return tuple(exported)

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.apps.demonstrations import data_card
-from roboirg.apps.demonstrations.dataset_part import DatasetPart, RecordedTexts
+from roboirg.apps.demonstrations.dataset_part import DatasetPart, RecordedInstructions
 from roboirg.apps.demonstrations.export_plan import (
     ORACLE,
     ExportPlan,
@@ -81,6 +81,9 @@ def run_export(
 ) -> ExportSummary:
     """Export a plan into a folder, or continue an export that was stopped.
 
+    The order matters: all trajectories first, as parts are numbered over all of them; then parts;
+    last what describes the dataset.
+
     Args:
         plan: what to export.
         out: folder of the dataset, new or of the same plan.
@@ -90,8 +93,8 @@ def run_export(
             None for one in `out` that is deleted at the end.
 
     Raises:
-        InvalidValueError: the folder holds something else, another export uses it, or no
-            trajectory can be exported.
+        InvalidValueError: the folder holds something else, another export uses it, or no trajectory
+            can be exported.
         MissingDependencyError: a package is not installed.
     """
     check_parquet_support("demonstrations")
@@ -116,13 +119,13 @@ def run_export(
 
 def _wanted(
     plan: ExportPlan, jobs: Sequence[SpokenJob], facts: Sequence[TrajectoryFacts], folder: Path
-) -> list[RecordedTexts]:
-    """Choose the trajectories that the plan exports, for example only successes.
+) -> list[RecordedInstructions]:
+    """Return the files and instructions of the trajectories that the plan exports.
 
     Args:
-        plan: what is exported.
+        plan: what is exported: all trajectories, or successes only.
         jobs: all trajectories, with their instructions.
-        facts: how each of them ended.
+        facts: how each of them ended, in the order of `jobs`.
         folder: of the trajectories' files.
 
     Raises:
@@ -130,7 +133,9 @@ def _wanted(
     """
     pairs = zip(jobs, facts, strict=True)
     wanted = [spoken for spoken, recorded in pairs if _is_wanted(plan, recorded)]
-    found = [RecordedTexts(spoken.job.path(folder), spoken.texts) for spoken in wanted]
+    found = [
+        RecordedInstructions(spoken.job.path(folder), spoken.instructions) for spoken in wanted
+    ]
     if not found:
         raise InvalidValueError(
             f"None of the {len(jobs)} trajectories is a success; ask for `outcomes: all`."
@@ -143,16 +148,17 @@ def _episode_count(parts: Sequence[DatasetPart]) -> int:
     count = 0
     for part in parts:
         for episode in part.episodes:
-            count += len(episode.texts)
+            count += len(episode.instructions)
     return count
 
 
 @contextlib.contextmanager
 def _opened(plan: ExportPlan, out: Path) -> Iterator[Path]:
-    """Begin or continue an export; yield the folder for its unfinished work.
+    """Begin or continue an export; yield the folder `out/.export` for its unfinished work.
 
     The folder is locked, and deleted when the block ends without error. After an error it stays, so
-    that the same plan can be continued.
+    that the same plan can be continued. Its presence means *not complete*; `plan.json` in it has
+    the fingerprint of the plan that was started.
 
     Raises:
         InvalidValueError: `out` holds other files, a complete export, or one of another plan, or
@@ -200,7 +206,8 @@ def _record_missing(
         jobs: all trajectories of the plan.
         usable: the folder of trajectories, in which some may be there already.
         workers: worker processes; 0 uses this process only.
-        report: called with the number of trajectories that are done, and of all.
+        report: called with ``"record"``, the number of trajectories that are done, and of all, and
+            the size of their files in bytes.
     """
     usable.folder.mkdir(parents=True, exist_ok=True)
     missing = [spoken.job for spoken in jobs if not usable.has(spoken.job)]
@@ -217,6 +224,7 @@ def _record_missing(
 
 
 def _record_job(folder: Path, job: RecordingJob, *, only_successes: bool) -> None:
+    """Play one job's episode and write its trajectory into the folder; runs in a worker process."""
     record_trajectory(
         job.episode,
         choose_policy(job),
@@ -232,8 +240,8 @@ def _record_job(folder: Path, job: RecordingJob, *, only_successes: bool) -> Non
 def choose_policy(job: RecordingJob) -> Policy:
     """Return the policy that plays an episode to be recorded.
 
-    The oracle's motions go through waypoints if these are to be recorded, or if it is disturbed on
-    its way; else it is the policy of its name.
+    The oracle becomes an expert that goes from waypoint to waypoint if these are to be recorded, or
+    if it is disturbed on its way; else it is the policy of its name.
     """
     disturbance = Disturbance() if job.spec.disturbed else None
     if job.policy == ORACLE and job.spec.actions == WaypointExpert.actions:
@@ -289,11 +297,14 @@ def _write_parts(
 ) -> None:
     """Write the parts of the dataset that an earlier call has not written yet.
 
+    A part is marked, by an empty file, after it is written and before its trajectories lose their
+    pictures, so that a kill at any moment loses none.
+
     Args:
         parts: of the dataset, all.
-        folder: with an empty file for each part that is written.
+        folder: of the marks.
         workers: worker processes; 0 uses this process only.
-        report: called with the number of parts that are done, and of all.
+        report: called with ``"write"``, the number of parts that are done, and of all, and 0.
         keeps_pictures: whether trajectories keep their pictures when their part is written.
     """
     folder.mkdir(exist_ok=True)
@@ -315,6 +326,7 @@ def _mark(folder: Path, part: DatasetPart) -> Path:
 
 
 def _write_part(part: DatasetPart) -> None:
+    """Write one part in its plan's format; runs in a worker process."""
     part.columns.plan.file_format.write_part(part)
 
 

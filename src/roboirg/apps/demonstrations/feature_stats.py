@@ -43,11 +43,12 @@ def picture_stats(counts: NDArray[np.int64], pixels: int) -> FeatureStats:
     """Return the statistics of all pixels of a camera, exactly, from the counts of their values.
 
     Args:
-        counts: (3, 256) how often each value occurs in each channel.
-        pixels: of a picture.
+        counts: (3, 256) how often each value occurs in each channel, over all pictures.
+        pixels: of one picture, height times width.
 
     Returns:
-        Nested lists (3, 1, 1) in 0 to 1, and `count`, a list with the number of pictures.
+        By name (min, max, mean, std, q01, …) nested lists of shape (3, 1, 1), as LeRobot has them,
+            in 0 to 1; and `count`, a list with the number of pictures.
     """
     channels = [_channel_stats(channel) for channel in counts]
     stats: FeatureStats = {
@@ -78,6 +79,8 @@ def _channel_stats(counts: NDArray[np.int64]) -> dict[str, float]:
 
 def _quantile(counts: NDArray[np.int64], share: float) -> float:
     """Return the quantile of values from how often each occurs, as NumPy does from the values.
+
+    Counts ``[2, 0, 2]`` are the values 0, 0, 2, 2; share 0.5 -> 1.0, between the second and third.
 
     Args:
         counts: of the values 0, 1, 2, …

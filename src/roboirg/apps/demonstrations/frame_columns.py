@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.demonstrations.export_plan import ExportPlan, TaskText
+from roboirg.apps.demonstrations.export_plan import ExportedInstruction, ExportPlan
 from roboirg.apps.demonstrations.feature_stats import FeatureStats, picture_stats, vector_stats
 from roboirg.apps.demonstrations.picture_coding import STORED_FORMATS
 from roboirg.apps.demonstrations.trajectory import Trajectory, picture_name
@@ -44,17 +44,17 @@ EXECUTED = "executed_action"
 """Column of what was executed where that is not the action to learn."""
 
 
-class PlacedText(NamedTuple):
+class PlacedInstruction(NamedTuple):
     """An instruction at its place in a dataset.
 
     Attributes:
-        words: the instruction.
+        instruction: the instruction.
         episode_index: of its episode in the dataset.
         first_index: index of its first frame among all frames.
         task_index: of its text among all texts.
     """
 
-    words: TaskText
+    instruction: ExportedInstruction
     episode_index: int
     first_index: int
     task_index: int
@@ -108,6 +108,7 @@ class FrameColumns:
         return {name: feature for name, feature in features if feature["dtype"] != "video"}
 
     def _picture_feature(self) -> dict[str, Any]:
+        """Return what ``info.json`` says of a column of pictures: type, shape, coding of videos."""
         feature: dict[str, Any] = {
             "dtype": "video" if self.has_videos else "image",
             "shape": [self.plan.size, self.plan.size, 3],
@@ -131,10 +132,11 @@ class FrameColumns:
         """Return the columns of numbers that do not depend on the instruction.
 
         Row 0 of a trajectory is before its first action. A frame has the state of one row and the
-        action that leads to the next, so there is one frame less than rows.
+        action that leads to the next (``[:-1]`` and ``[1:]``), so there is one frame less than
+        rows.
 
         Returns:
-            Each of shape (frames, size).
+            By column, arrays of shape (frames, size); size is 1 for flags and times.
         """
         facts = trajectory.facts
         frames = np.arange(facts.frames, dtype=np.int64)
@@ -147,16 +149,20 @@ class FrameColumns:
             columns[EXECUTED] = trajectory.actions[1:].astype(np.float32)
         is_last = frames == facts.frames - 1
         is_success = is_last & (facts.status == "success")
-        columns["next.reward"] = is_success.astype(np.float32)[:, None]
-        columns["next.done"] = is_last[:, None]
-        columns["next.success"] = is_success[:, None]
-        columns["is_video_demo"] = (frames < facts.video_length)[:, None]
-        columns["timestamp"] = (frames / CONTROL_RATE).astype(np.float32)[:, None]
-        columns["frame_index"] = frames[:, None]
+        single_values = {
+            "next.reward": is_success.astype(np.float32),
+            "next.done": is_last,
+            "next.success": is_success,
+            "is_video_demo": frames < facts.video_length,
+            "timestamp": (frames / CONTROL_RATE).astype(np.float32),
+            "frame_index": frames,
+        }
+        for name, values in single_values.items():
+            columns[name] = values[:, None]  # (frames,) becomes (frames, 1)
         return columns
 
     @staticmethod
-    def indices(placed: PlacedText, length: int) -> dict[str, NDArray[np.int64]]:
+    def indices(placed: PlacedInstruction, length: int) -> dict[str, NDArray[np.int64]]:
         """Return the columns of indices of one instruction, (frames, 1)."""
         return {
             "episode_index": np.full((length, 1), placed.episode_index, dtype=np.int64),
@@ -172,7 +178,11 @@ class FrameColumns:
         }
 
     def pictures(self, trajectory: Trajectory) -> dict[str, list[bytes]]:
-        """Return the pictures of each camera as PNG files, one for each frame, by column."""
+        """Return the pictures of each camera as PNG files, one for each frame, by column.
+
+        ``{"observation.images.front": [b"…", …]}``. The last row has no frame, as no action follows
+        it.
+        """
         rows = range(trajectory.facts.frames)
         columns = {}
         with zipfile.ZipFile(trajectory.path) as archive:

@@ -58,10 +58,10 @@ def write_frames(
     The file stores each picture only once, whatever the number of instructions.
 
     Args:
-        path: file to write.
+        path: file to write; it appears whole or not at all.
         features: the columns in order, with what ``info.json`` says of them.
-        shared: columns that are the same for every instruction.
-        own: for each instruction its other columns.
+        shared: by name, columns that are the same for every instruction.
+        own: for each instruction its other columns, by name.
         is_described: whether the file holds the types of the columns, for readers that take them
             from it.
     """
@@ -118,7 +118,7 @@ def _hugging_face_type(feature: Mapping[str, Any]) -> dict[str, Any]:
     """Return a column's type as Hugging Face's `datasets` stores it in a file.
 
     A vector of eight numbers is ``{"feature": {"dtype": "float32", "_type": "Value"}, "length": 8,
-    "_type": "Sequence"}``.
+    "_type": "Sequence"}``, a single number its inner part, a picture ``{"_type": "Image"}``.
     """
     if feature["dtype"] == "image":
         return {"_type": "Image"}

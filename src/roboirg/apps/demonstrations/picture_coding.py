@@ -61,7 +61,7 @@ def _png(image: NDArray[Any]) -> bytes:
 
 
 class VideoEncoder:
-    """Encodes one video in memory.
+    """Encodes one video in memory: `add` each picture in order, then `finish` once.
 
     Args:
         coding: ``lossless-video`` or ``lossy-video``.
@@ -69,6 +69,7 @@ class VideoEncoder:
     """
 
     def __init__(self, coding: PictureCoding, size: int) -> None:
+        """Open a video in memory; the codec follows from `coding`."""
         import av
 
         codec = _CODECS[coding]
@@ -96,7 +97,7 @@ class VideoEncoder:
         self._container.mux(self._stream.encode(frame))
 
     def finish(self) -> bytes:
-        """Return the video as MP4."""
+        """Return the video as MP4; no picture can be added after this."""
         self._container.mux(self._stream.encode(None))
         self._container.close()
         return self._file.getvalue()

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from roboirg.apps.demonstrations.picture_coding import PictureCoding
 from roboirg.core.actions import JOINT_ANGLE, CheckedActions
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import CAMERAS, Pixels
+from roboirg.core.observations import Pixels
 from roboirg.util.atomic_write import replacing
 from roboirg.util.media import decode_png
 
@@ -33,6 +33,8 @@ SUFFIX = ".zip"
 
 _FACTS = "facts.json"
 _ARRAY = ".npy"
+_HISTOGRAM = "_histogram"
+"""Ends the name of an array with the histogram of a camera, such as ``front_histogram``."""
 
 
 class TrajectoryFacts(msgspec.Struct, frozen=True):
@@ -147,6 +149,10 @@ class Trajectory:
 def load_trajectory(path: Path) -> Trajectory:
     """Read a trajectory from its file: facts, states and actions, but no pictures.
 
+    The file has an array for each field of `Trajectory` that is one, and for each camera's
+    histogram; with depth, also for each matrix of the calibration. `write_arrays` is the other
+    half.
+
     Raises:
         InvalidValueError: the file is missing or damaged, or of another version.
     """
@@ -155,12 +161,11 @@ def load_trajectory(path: Path) -> Trajectory:
         names = [name for name in archive.namelist() if name.endswith(_ARRAY)]
         arrays = {name.removesuffix(_ARRAY): _read_array(archive, name) for name in names}
     histograms = {}
-    for camera in CAMERAS:
-        if f"{camera}_histogram" in arrays:
-            histograms[camera] = arrays.pop(f"{camera}_histogram")
     calibration = {}
     for name in list(arrays):
-        if name.endswith(("_extrinsic", "_intrinsic")):
+        if name.endswith(_HISTOGRAM):
+            histograms[name.removesuffix(_HISTOGRAM)] = arrays.pop(name)
+        elif name.endswith(("_extrinsic", "_intrinsic")):
             calibration[name] = arrays.pop(name)
     return Trajectory(path, facts, histograms=histograms, calibration=calibration, **arrays)
 
@@ -190,6 +195,11 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
 
 
 def _read_facts(archive: zipfile.ZipFile, path: Path) -> TrajectoryFacts:
+    """Read the facts of an open trajectory's file; `path` is for the message.
+
+    Raises:
+        InvalidValueError: the file is of another version of the format.
+    """
     fields = json.loads(archive.read(_FACTS))
     if fields.get("version") != TRAJECTORY_VERSION:
         raise InvalidValueError(
@@ -200,6 +210,7 @@ def _read_facts(archive: zipfile.ZipFile, path: Path) -> TrajectoryFacts:
 
 
 def _read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    """Read one array of an open trajectory's file, given its name there, ``actions.npy``."""
     array: NDArray[Any] = np.load(io.BytesIO(archive.read(name)), allow_pickle=False)
     return array
 
@@ -244,7 +255,10 @@ def read_depth(archive: zipfile.ZipFile, camera: str, row: int) -> NDArray[np.in
 
 
 def drop_pictures(path: Path) -> None:
-    """Remove the pictures from a trajectory's file, to save space; keep its facts and arrays."""
+    """Remove the pictures from a trajectory's file, to save space; keep its facts and arrays.
+
+    The file is replaced at once, so a reader finds either the old or the new one.
+    """
     if not has_pictures(path):
         return
     with (

@@ -92,9 +92,17 @@ class _Row(NamedTuple):
 
 
 class PictureTracks:
-    """Encodes the pictures of the cameras in the order of rows, into a trajectory's open file."""
+    """Encodes the pictures of the cameras in the order of rows, into a trajectory's open file.
+
+    Call `add` for each row, then `finish` once, which stores videos.
+
+    Attributes:
+        histograms: for each camera (3, 256) how often each value of each channel occurs, in all
+            rows but the last.
+    """
 
     def __init__(self, archive: zipfile.ZipFile, spec: RecordingSpec) -> None:
+        """Begin with row 0; a video has an encoder for each camera, PNGs have none."""
         self._archive = archive
         self._spec = spec
         self._rows = 0
@@ -107,7 +115,7 @@ class PictureTracks:
         self._last_pictures: Mapping[str, Pixels] = {}
 
     def add(self, pictures: Mapping[str, Any]) -> None:
-        """Encode the pictures of a time step into the trajectory's file.
+        """Encode the pictures of one row into the trajectory's file; nothing if none are stored.
 
         Args:
             pictures: by name, such as ``front_rgb``, and ``front_depth`` if depth is recorded.
@@ -219,11 +227,15 @@ class _GivenUpError(Exception):
 
 
 class _Recorder(EpisodeLoop):
-    """Plays one episode and records it."""
+    """Plays one episode with a policy and records it; call `record` once.
+
+    `EpisodeLoop` calls `begin`, then `act` and `execute` in turns.
+    """
 
     def __init__(
         self, env: RoboIRGEnv, policy: Policy, spec: RecordingSpec, archive: zipfile.ZipFile
     ) -> None:
+        """Begin with no rows; the pictures go into `archive`, the trajectory's open file."""
         super().__init__(env, policy)
         self._spec = spec
         self._archive = archive
@@ -233,7 +245,11 @@ class _Recorder(EpisodeLoop):
         self._acts_in_waypoints = env.actions == WAYPOINT.name
 
     def record(self, policy_name: str, variation: int) -> TrajectoryFacts:
-        """Play the episode, and store its pictures, states and actions; return how it ended."""
+        """Play the episode, and store its pictures, states and actions; return how it ended.
+
+        Pictures are written while it is played, all else at the end. `policy_name` and `variation`
+        are kept among the facts.
+        """
         if self._spec.video and self._spec.coding != "none":
             self.env.set_frame_hook(self._see_video)
         observation, info = self.begin()
@@ -249,7 +265,8 @@ class _Recorder(EpisodeLoop):
     def _see_video(self, env: RoboIRGEnv, is_demonstration: bool) -> None:
         """Encode the pictures of the demonstration video while the simulator plays it.
 
-        Called after each of its steps, and of the policy's, in which nothing is done.
+        The environment calls this after every step: of the video, and of the policy's turn, in
+        which it does nothing, since `_add_row` encodes those pictures.
 
         Raises:
             InvalidValueError: the video is played again from its beginning, in another session,
@@ -272,7 +289,11 @@ class _Recorder(EpisodeLoop):
         self._tracks.add(pictures)
 
     def begin(self) -> Moment:
-        """Start the episode; store what the policy observes first, as if after a step at home."""
+        """Start the episode; store what the policy observes first, as if after a step at home.
+
+        Row 0 of the policy's turn has the home pose as its action, since every row has the action
+        that led to it.
+        """
         from roboirg.simulation.physics_settings import HOME_ACTION
 
         observation, info = super().begin()
@@ -323,7 +344,11 @@ class _Recorder(EpisodeLoop):
         return due if stage is None else str(stage.subgoal)
 
     def _rounded(self, action: CheckedActions) -> CheckedActions:
-        """Return an action in float32; a waypoint's angles near those of the one before."""
+        """Return an action in the precision of float32, so that datasets hold what is executed.
+
+        Of a waypoint, whole turns are first added to its angles, to be near those of the last row:
+        3.1, then -3.1 rad -> 3.1, then 3.18.
+        """
         if self._acts_in_waypoints:
             angles = np.unwrap([self._rows[-1].action[_ANGLES], action[_ANGLES]], axis=0)[1]
             action = np.concatenate([action[:3], angles, action[POSE_SIZE:]])
@@ -367,6 +392,7 @@ class _Recorder(EpisodeLoop):
         """Return everything of the trajectory that is stored as arrays, the video's rows first.
 
         They are states, actions, subgoals, and how often each value of a color channel occurs.
+        Their names are the fields of `Trajectory`; `load_trajectory` reads them.
         """
         length = info["demonstration"].length if self._spec.video else 0
         arrays = self._observed_arrays(info["demonstration"], length)
@@ -402,7 +428,8 @@ class _Recorder(EpisodeLoop):
     def _action_arrays(self, of_video: CheckedActions) -> dict[str, NDArray[Any]]:
         """Return the actions of all rows: as executed, and as poses of the tool.
 
-        If the expert was disturbed, also the labels: the actions that it should have done.
+        If the expert was disturbed, also the labels: the actions that it should have done, which
+        are then also what the poses are of.
 
         Args:
             of_video: the actions of the video, shape (rows, size), which come first.
@@ -417,7 +444,9 @@ class _Recorder(EpisodeLoop):
     def _subgoal_arrays(self, of_video: Sequence[str]) -> dict[str, NDArray[Any]]:
         """Return the texts of all rows: what the robot was doing, and what was due by the task.
 
-        Both come with the pixel of the thing that is meant (``grounded_…``) and without.
+        Both come with the pixel of the thing that is meant, ``grounded_subgoals`` *pick up the cube
+        at <120, 80>*, and without, ``subgoals`` *pick up the cube*; what was due is called
+        ``online_…``.
 
         Args:
             of_video: what was due in the rows of the video, which come first.
@@ -459,7 +488,9 @@ def without_pixel(subgoal: str) -> str:
 def _with_pixels(templates: Sequence[str], due_subgoals: Sequence[str]) -> list[str]:
     """Fill pixels into the texts of what the robot was doing: where in the picture a thing is.
 
-    The pixel is that of the last row in which the same subgoal was due; without one, there is none.
+    *pick up the cube {at}*, while *pick up the cube at <120, 80>* is due -> the latter. The pixel
+    is that of the last row, up to this one, in which the same subgoal was due; without one, there
+    is none.
 
     Args:
         templates: what the robot was doing in each row, with ``{at}`` where the pixel goes.

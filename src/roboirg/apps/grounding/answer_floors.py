@@ -44,10 +44,11 @@ def floor_answers(name: str, items: Sequence[GroundingItem], seed: int = 0) -> I
 
     These listeners are the floors; the oracle, which knows the goal, is the exception. All answer
     the questions for a goal's values (slots) and for one of several goals (choice); oracle and
-    chance also point at pixels. Random numbers depend on seed and item alone.
+    chance also point at pixels. Random numbers depend on seed, floor and item alone, not on the
+    other items.
 
     Args:
-        name: one of `FLOORS`.
+        name: one of `FLOORS`, such as ``"chance"``.
         items: questions.
         seed: of all random choices.
 
@@ -84,7 +85,9 @@ def _goal_answers(
 ) -> Iterator[Answer]:
     """Yield a guessed goal as two answers: as values in JSON (slots), and as a letter (choice).
 
-    If the goal is none of the choices, the letter is random. Without a goal the slots are empty.
+    Red, once -> ``'{"color": "red", "repeats": 1}'`` and ``"B"``. If the goal is none of the
+    choices, the letter is drawn at random. Without a goal (None) the slots are empty, which is
+    wrong.
     """
     answer = None if goal is None else goal_schema(item.task).answers[goal]
     yield Answer(item.id, "slots", answer or "")
@@ -105,10 +108,12 @@ def _random_points(item: GroundingItem, rng: np.random.Generator) -> str:
 
 
 def _random_goal(_item: GroundingItem, episode: Episode, rng: np.random.Generator) -> Goal:
+    """Guess any goal of the scene, all equally likely."""
     return draw(rng, goals_of(episode))
 
 
 def _command_goal(item: GroundingItem, episode: Episode, rng: np.random.Generator) -> Goal:
+    """Guess a goal that fits the command alone, or any goal if those are not known."""
     return draw(rng, _left_by_command(item, episode) or goals_of(episode))
 
 
@@ -122,6 +127,7 @@ def _left_by_command(item: GroundingItem, episode: Episode) -> tuple[Goal, ...]:
 def _rule_goal(
     rule: str, item: GroundingItem, episode: Episode, rng: np.random.Generator
 ) -> Goal | None:
+    """Guess the goal that a surface rule, such as *first mention*, finds in the words, if any."""
     return draw_goal(guess_goal(rule, item.text, item.task), goals_of(episode), rng)
 
 
@@ -139,7 +145,8 @@ rules; and the learner of words, trained on the same options."""
 def _learn(items: Sequence[GroundingItem]) -> dict[str, TextGuess]:
     """Return, by the ids of items, the goals that a learner guesses from their words alone.
 
-    It learns anew for each task and set of instruction options.
+    It is trained anew for each task and set of instruction options, as these say things
+    differently.
     """
     groups: dict[tuple[str, InstructionOptions], list[GroundingItem]] = {}
     for item in items:

@@ -104,6 +104,9 @@ def score_answers(
         answers: to questions of the items.
         name: of the model that answered.
 
+    Returns:
+        A score for each kind of which there is an answer, in the order of `QUESTION_KINDS`.
+
     Raises:
         InvalidValueError: the items are of several splits or wordings, or there is no answer.
         UnknownNameError: a task is not installed.
@@ -124,7 +127,10 @@ def score_answers(
 
 
 def score_rows(score: GroundingScore) -> tuple[ScoreRow, ...]:
-    """Return a row for each set of options, with intervals and corrected tests."""
+    """Return a row for each set of instruction options, over all tasks.
+
+    Rows have intervals, and p-values of the gap to explicit after Holm's correction.
+    """
     summaries = summarize(cells_of(score.frame))
     return tuple(
         _row(score, summary) for key, summary in summaries.items() if key.scope == ALL_TASKS
@@ -133,6 +139,8 @@ def score_rows(score: GroundingScore) -> tuple[ScoreRow, ...]:
 
 def _policy_run(items: Sequence[GroundingItem], name: str) -> PolicyRun:
     """Describe a model's answers as the run of a policy, so that runs' statistics apply to them.
+
+    `PolicyRun` holds the model's name, the split and words, and the versions.
 
     Raises:
         InvalidValueError: the items differ in split, words or versions.
@@ -228,7 +236,7 @@ def _row(score: GroundingScore, summary: Measured[ScopeKey]) -> ScoreRow:
     """Return the row of a table of scores: success of one set of instruction options.
 
     It includes the success of random answers and, if the items have it, of a guess from the command
-    alone, as means over tasks.
+    alone. Both are means over tasks, as the rate is, so that the three can be compared.
     """
     options = summary.key.options
     judged = [answered for answered in score.judged if answered.item.options == options]
@@ -247,7 +255,10 @@ def _row(score: GroundingScore, summary: Measured[ScopeKey]) -> ScoreRow:
 
 
 def _mean_over_tasks(by_task: Mapping[str, Sequence[float]]) -> float:
-    """Return the mean over tasks of their means, weighted as the rates are; 0 without any."""
+    """Return the mean over tasks of each task's mean; 0 if there are no tasks.
+
+    ``{"PickXtimes": [1, 0], "BinFill": [1]}`` -> 0.75: tasks weigh the same, as in the rates.
+    """
     means = [float(np.mean(of_task)) for of_task in by_task.values()]
     return float(np.mean(means)) if means else 0.0
 
@@ -263,8 +274,9 @@ def _hidden_share(judged: Iterable[JudgedItem]) -> float | None:
 def hidden_fields(item: GroundingItem) -> tuple[str, ...]:
     """Return the fields of the right answer that the command does not name, such as ``("color",)``.
 
-    They are those of the goal's slots that must be found in the context. Where an answer's fields
-    are amounts, such as how many cubes of each color, they are no slots of the goal, and all count.
+    They are those of the goal's slots (its named values) that must be found in the context. Answers
+    that count cubes of each color, ``{"red": 2, "blue": 1}``, have colors instead of slots as their
+    fields; if anything is hidden there, all fields count.
     """
     fields = json.loads(item.answer)
     hidden = tuple(field for field in fields if field in item.hidden_slots)

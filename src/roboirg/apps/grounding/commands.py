@@ -200,7 +200,7 @@ def _comparisons(scores: Sequence[GroundingScore]) -> list[str]:
 
 
 def _title(score: GroundingScore) -> str:
-    """Return for example ``my-model (slots)``."""
+    """Return a model and its kind of question, for example ``"my-model (slots)"``."""
     return f"{score.name} ({score.kind})"
 
 

@@ -138,7 +138,7 @@ def _size(folder: Path) -> int:
 
 
 def _card(request: ExportRequest, items: Sequence[GroundingItem], facts: DatasetFacts) -> str:
-    """Return the page of the dataset in Markdown, with a head for Hugging Face."""
+    """Return the dataset's README.md: Markdown with a head of YAML, which Hugging Face reads."""
     files = [f"  - split: {split}\n    path: data/{split}-*.parquet" for split in _by_split(items)]
     return _CARD.format(
         facts=facts,
@@ -154,7 +154,10 @@ def _card(request: ExportRequest, items: Sequence[GroundingItem], facts: Dataset
 
 
 def _counts(items: Sequence[GroundingItem]) -> str:
-    """Return a Markdown table of the numbers of items, tasks by settings; a dash for none."""
+    """Return a Markdown table of the numbers of items, tasks by settings; a dash for none.
+
+    Columns are the settings that occur, in the order in which the benchmark lists them.
+    """
     count_by_task: dict[str, Counter[str]] = {}
     for item in items:
         count_by_task.setdefault(item.task, Counter())[item.setting] += 1

@@ -29,12 +29,12 @@ def write_parquet(items: Sequence[GroundingItem], folder: Path, split: str) -> N
     """Write the questions of a split as a Parquet file with pictures inside.
 
     It is for pandas, and for Hugging Face's `datasets`, which loads the file without options since
-    pictures are columns of its type Image.
+    pictures are columns of its type Image. The file appears whole or not at all.
 
     Args:
         items: the questions, a row for each.
         folder: of the dataset, where pictures are read and the file is written.
-        split: for the file's name.
+        split: for the file's name, ``test-00000-of-00001.parquet``.
     """
     check_parquet_support()
     import pyarrow as pa
@@ -62,14 +62,17 @@ def write_parquet(items: Sequence[GroundingItem], folder: Path, split: str) -> N
 
 
 class _PictureFiles:
-    """The pictures of a dataset's folder, each read once."""
+    """The pictures of a dataset's folder, each read from the disk once and then kept."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._contents: dict[str, bytes] = {}
 
     def value(self, path: str) -> Mapping[str, Any]:
-        """Return a picture as the type Image of `datasets`."""
+        """Return a picture as the type Image of `datasets`.
+
+        ``{"bytes": b"…", "path": "pictures/3f9c.png"}``, the path as items have it.
+        """
         if path not in self._contents:
             self._contents[path] = read_regular(self._folder / path)
         return {"bytes": self._contents[path], "path": path}

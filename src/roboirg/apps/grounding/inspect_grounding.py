@@ -84,7 +84,7 @@ def roboirg_grounding(
 def ask(data: str, question: str) -> Solver:
     """Return a solver that asks the model, and asks once more if its answer cannot be used.
 
-    Only answers in JSON (slots) are asked for again, with the reason.
+    Only answers in JSON (slots) are asked for again, with the reason, as the listener does.
 
     Args:
         data: folder of the dataset.
@@ -93,6 +93,7 @@ def ask(data: str, question: str) -> Solver:
     again = load_prompts(PROMPTS)["again"]
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:
+        """Ask once, and once more if the answer is no readable JSON; the last answer counts."""
         state = await generate(state)
         if question == "slots":
             item = _items(data)[str(state.sample_id)]
@@ -120,6 +121,7 @@ def right(data: str, question: str) -> Scorer:
     kind = known_name("question", question, QUESTION_KINDS)
 
     async def score(state: TaskState, target: Target) -> Score:
+        """Judge the model's last answer as `roboirg score grounding` does."""
         item = _items(data)[str(state.sample_id)]
         verdict = judge_reply(item, kind, state.output.completion)
         return Score(
@@ -173,13 +175,16 @@ def _as_content(part: str | ContentImage) -> Content:
 
 
 def _picture(path: Path) -> ContentImage:
+    """Return a picture file as Inspect sends it to a model."""
     return ContentImage(image=str(path.resolve()))
 
 
 @functools.cache
 def _items(data: str) -> Mapping[str, GroundingItem]:
+    """Return the items of a dataset's folder by their ids; read once for each folder."""
     return {item.id: item for item in read_items(Path(data))}
 
 
 def _selects(names: str, name: str) -> bool:
+    """Return whether a name is in a list of names with commas, or the list is ``all``."""
     return means_all(names) or name in parse_names("name", names)

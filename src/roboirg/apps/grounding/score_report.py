@@ -55,7 +55,7 @@ def confusion_tables(score: GroundingScore) -> Iterator[Table]:
     """Yield a confusion table for each field of answers, such as ``color``: meant by understood.
 
     An instruction counts in the fields that its command leaves to its context. Explicit ones, whose
-    command names all, count in none.
+    command names all, count in none. An unreadable answer counts as `NO_ANSWER`.
     """
     found: dict[str, Counter[Confusion]] = {}
     for item, verdict in score.judged:
@@ -70,20 +70,17 @@ def confusion_tables(score: GroundingScore) -> Iterator[Table]:
 
 
 def _confusion_table(field: str, counts: Counter[Confusion]) -> Table:
-    """Return the table of how often which value was understood instead of which.
+    """Return the table of how often which value was understood where another one was meant.
 
-    It has a row for each value that was meant, and a column for each that was understood; right
-    ones are marked.
+    A row for each value that was meant, and a column for each that was understood, `NO_ANSWER`
+    last; right ones are marked. ``Confusion("red", "blue"): 3`` is 3 in row *red*, column *blue*.
 
     Args:
         field: of the answers, such as ``color``.
         counts: by the values that were meant and understood.
     """
-    every_meant = set()
-    every_understood = set()
-    for pair in counts:
-        every_meant.add(pair.meant)
-        every_understood.add(pair.understood)
+    every_meant = {pair.meant for pair in counts}
+    every_understood = {pair.understood for pair in counts}
     columns = sorted(every_understood - {NO_ANSWER})
     if NO_ANSWER in every_understood:
         columns.append(NO_ANSWER)
@@ -138,7 +135,8 @@ def _mistakes(score: GroundingScore, pictures: Path) -> Iterator[str]:
 def _spread(wrong: Iterable[JudgedItem]) -> list[JudgedItem]:
     """Choose at most `MOST_MISTAKES` wrong answers from as many tasks and settings as possible.
 
-    They are the first one of every task and setting, then the second one of each, and so on.
+    They are the first one of every task and setting, then the second one of each, and so on. Groups
+    A A A B -> A B A A.
     """
     seen: Counter[tuple[str, str]] = Counter()
     by_rank: dict[int, list[JudgedItem]] = {}

@@ -23,7 +23,10 @@ QUESTIONS = {"slots": "slots", "choice": "choices", "points": "points"}
 
 
 def score_table(scores: Iterable[GroundingScore]) -> Table:
-    """Return the table of scores: a row for each model, kind of question and set of options."""
+    """Return the table of scores: a row for each model, kind of question and set of options.
+
+    `scores` may be read only once; the table has notes on what was unreadable or missing.
+    """
     scores = tuple(scores)
     rows = []
     for score in scores:
@@ -49,7 +52,7 @@ def breakdown_tables(score: GroundingScore) -> Iterator[Table]:
     """Yield tables of success by kinds of instructions, with gaps to explicit ones.
 
     Kinds are reasoning patterns, referring expressions, and values that the command leaves to its
-    context. Explicit instructions name the goal.
+    context: a table for each that some item has. An item may have several labels of one kind.
     """
     for name, labels_of in _LABELS.items():
         labels = [tuple(labels_of(item)) for item in score.frame["item"]]
@@ -80,7 +83,10 @@ def _words(row: ScoreRow) -> tuple[str, ...]:
 
 
 def _notes(scores: Sequence[GroundingScore]) -> Iterator[str]:
-    """Yield the notes below the table: its columns, and answers that are unreadable or missing."""
+    """Yield the notes below the table: its columns, and answers that are unreadable or missing.
+
+    One sentence for each score that has some of them.
+    """
     yield (
         "Percent correct, as means over tasks. Random: goals of the scene, letters or pixels "
         "drawn at random. Above random: 0 is random, 100 all correct. Command: a guess among the "

@@ -64,7 +64,7 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
 
     The actions are None if the episode did not begin. No picture is drawn. If the record is an
     error, its actions are played as far as they go, and the new record gets the same error and
-    cause: actions do not show whether a policy raised.
+    cause: actions do not show whether a policy raised. `record` and `log` stay as they are.
 
     Raises:
         InvalidValueError: the job's wording file is missing or has changed.
@@ -101,9 +101,12 @@ class RecordedJob(PreparedJob):
 
     @cached_property
     def words(self) -> TrialWords:
-        """The words of the trial, with those of the record in place of those made from its job.
+        """What is said in the trial: utterances and command of the record, not the installed words.
 
-        What they mean (`meaning`) stays open: the record does not hold it.
+        For records whose words are of another version, so that making them again would give others.
+        The goal is made here, in the arm (kind of comparison) that decides it: `OTHER_GOAL`, or
+        `TOLD` for all others. What the words mean (`meaning`) stays open: the record does not hold
+        it.
         """
         arm = OTHER_GOAL if self.job.arm == OTHER_GOAL else TOLD
         explicit = word_trial(self.scene_episode, InstructionOptions(), arm)
@@ -123,7 +126,11 @@ class RecordedJob(PreparedJob):
 
 
 def prepared_job(record: Record) -> PreparedJob:
-    """Return what was played, without the address of the policy, and what was said."""
+    """Return the job of a record, ready to be played: what was to be done, and what was said.
+
+    The address of the policy is left out. If the record's words are not those of this package, they
+    are taken from the record.
+    """
     job = msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)
     if has_other_words(record):
         return RecordedJob(job, record)

@@ -92,7 +92,8 @@ def _share(text: str) -> float:
 def _print(verification: Verification) -> None:
     """Print what was found in a run, and last one sentence: whether all that was checked holds.
 
-    Of records with faults, and of missing ones, only the first are listed.
+    Of records with faults, and of missing ones, only the first `_MOST_SHOWN` are listed, and the
+    others counted.
     """
     played = verification.records - verification.verdicts["not replayed"]
     _print_played(verification, played)

@@ -46,11 +46,7 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
     """
     run = StoredRun(folder, read_summary)
     run.file.refuse_damage()
-    names = [RECORDS_FILE, *plan_names(folder), *_names_below(folder, ACTION_FOLDER)]
-    if logs:
-        names += _names_below(folder, LOG_FOLDER)
-    if videos:
-        names += _names_below(folder, VIDEO_FOLDER)
+    names = _names_to_pack(folder, videos=videos, logs=logs)
     paths = {name: run_file(folder, name) for name in names}
     _check_size(paths, folder)
     policies = {entry.policy for entry in run.newest}
@@ -64,8 +60,24 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
     return manifest
 
 
+def _names_to_pack(folder: Path, *, videos: bool, logs: bool) -> list[str]:
+    """Return the files of a run that go into a pack, by their paths in the run, in a fixed order.
+
+    Records, plans and actions always, logs and videos if they are wanted.
+    """
+    names = [RECORDS_FILE, *plan_names(folder), *_names_below(folder, ACTION_FOLDER)]
+    if logs:
+        names += _names_below(folder, LOG_FOLDER)
+    if videos:
+        names += _names_below(folder, VIDEO_FOLDER)
+    return names
+
+
 def _names_below(folder: Path, name: str) -> list[str]:
-    """Return the files in a folder of a run, but no hidden ones, by their paths in the run."""
+    """Return the files below a folder of a run, sorted, by their paths in the run.
+
+    ``"actions"`` -> ``["actions/1a/2b.npz", …]``; hidden ones are left out.
+    """
     names: list[str] = []
     for path in (folder / name).rglob("[!.]*"):
         if path.is_file():
@@ -74,7 +86,7 @@ def _names_below(folder: Path, name: str) -> list[str]:
 
 
 def _write(out: Path, manifest: PackManifest, paths: Mapping[str, Path]) -> None:
-    """Write manifest and files into a pack, a ZIP file.
+    """Write manifest and files into a pack, a ZIP file, in the order of `paths`.
 
     Every entry gets the same date, so that the same files give the same bytes.
     """
@@ -90,7 +102,15 @@ def _write(out: Path, manifest: PackManifest, paths: Mapping[str, Path]) -> None
 
 
 def _check_size(paths: Mapping[str, Path], folder: Path) -> None:
-    """Raise if the files are larger in all than the most that is unpacked from a pack."""
+    """Raise if the files are larger in all than the most that is unpacked from a pack.
+
+    Args:
+        paths: of the files, by their names in the pack.
+        folder: of the run, for the error.
+
+    Raises:
+        StoreError: they are; the message names the largest.
+    """
     sizes = {name: path.stat().st_size for name, path in paths.items()}
     total = sum(sizes.values())
     if total > MOST_PACKED_BYTES:

@@ -92,7 +92,9 @@ class LineToCheck(NamedTuple):
 
 
 def check_line(line: LineToCheck, folder: Path) -> RecordCheck:
-    """Check one record of a run's folder.
+    """Check one record of a run's folder; runs in a worker process.
+
+    An error of the package, such as damaged actions, becomes a finding.
 
     Raises:
         StoreError: the line is not a record.
@@ -105,9 +107,10 @@ def check_line(line: LineToCheck, folder: Path) -> RecordCheck:
 
 
 def _names_words(record: Record) -> bool:
-    """Return whether a record names the words that it should have, of whatever version.
+    """Return whether a record names words of its own task and pool, of whatever version.
 
-    Only these excuse from checking what was said.
+    ``PickXtimes/test@1a2b`` where ``PickXtimes/test@9f8e`` is installed -> True. Only these excuse
+    from checking what was said.
     """
     installed = installed_words(record) or ""
     name, _, _ = installed.partition("@")
@@ -115,10 +118,10 @@ def _names_words(record: Record) -> bool:
 
 
 def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
-    """Check a record.
+    """Check a record: first its versions, then, if they are the installed ones, all that follows.
 
     Args:
-        record: of the run.
+        record: of the run; a part of it may be changed here (`_excuse_words`).
         folder: of the run, which has the actions.
         play: whether to play its actions again, if it has any.
     """
@@ -132,7 +135,7 @@ def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
 
 
 def _version_findings(record: Record) -> Iterator[str]:
-    """Yield a sentence for each version of a record that is not the installed one.
+    """Yield a finding, a sentence, for each version of a record that is not the installed one.
 
     Words may be those of another version, which are then not checked, but they must be words of the
     record's own task and pool.
@@ -150,7 +153,10 @@ def _version_findings(record: Record) -> Iterator[str]:
 
 
 def _check_unplayed(record: Record, *, has_actions: bool) -> RecordCheck:
-    """Check what follows from the job of a record alone, such as its scene and its words."""
+    """Check what follows from the job of a record alone, such as its scene and its words.
+
+    Without actions, the verdict of a record that is no error cannot be checked, which is a finding.
+    """
     expected = begin_record(prepared_job(record))
     _excuse_words(record, expected)
     findings = list(_differences(record, expected, WORD_FIELDS))
@@ -165,7 +171,11 @@ def _check_unplayed(record: Record, *, has_actions: bool) -> RecordCheck:
 
 
 def _check_played(record: Record, log: ActionLog) -> RecordCheck:
-    """Play the actions of a record again, and check all that follows from job and actions."""
+    """Play the actions of a record again, and check all that follows from job and actions.
+
+    The order matters: whether another kind of processor may excuse differences is decided from the
+    findings before the motion is compared.
+    """
     again, played = replay(record, log)
     _excuse_words(record, again)
     findings = list(_differences(record, again, WORD_FIELDS))
@@ -196,14 +206,17 @@ def _check_played(record: Record, log: ActionLog) -> RecordCheck:
 
 
 def _excuse_words(record: Record, expected: Record) -> None:
-    """Set what a record says of other words than the installed ones to what is expected."""
+    """Overwrite what `record` says of other words than the installed ones by what is expected.
+
+    So comparing the two finds no difference there.
+    """
     if has_other_words(record):
         for name in _WORD_FACTS:
             setattr(record, name, getattr(expected, name))
 
 
 def _deviation(log: ActionLog, played: ActionLog) -> float:
-    """Return the largest difference of two end states, in m, rad and s."""
+    """Return the largest difference of two end states (m, rad, s); infinite if sizes differ."""
     if played.end_state.shape != log.end_state.shape:
         return float("inf")
     return float(np.max(np.abs(played.end_state - log.end_state), initial=0.0))
@@ -220,6 +233,10 @@ def _verdict(deviation: float, *, has_same_hash: bool, is_elsewhere: bool) -> Re
         has_same_hash: whether the hashes are equal.
         is_elsewhere: whether the record is of another kind of processor; only then may the numbers
             differ by up to `TOLERANCE`.
+
+    Returns:
+        ``exact``: numbers and hash are equal; ``tolerant``: both differ, the numbers by little;
+            ``different``: all else, also numbers and hash that contradict each other.
     """
     if deviation == 0.0 and has_same_hash:
         return "exact"

@@ -73,6 +73,9 @@ def verify_run(
 ) -> Verification:
     """Check all records of a run, and play the actions of a sample of them.
 
+    All records are checked for what follows from their jobs; those of the sample, also for what
+    follows from their actions.
+
     Args:
         folder: output folder of the run.
         sample: share of the episodes that are played, 0 to 1.
@@ -102,6 +105,8 @@ def _summed_up(
 ) -> Verification:
     """Return the result of a verification: of the checks of all records, and of the run's plans.
 
+    Only checks with findings are kept, sorted, so that the result does not depend on their order.
+
     Args:
         folder: of the run, which has the plans.
         entries: all records.
@@ -125,7 +130,12 @@ def _summed_up(
 
 
 def _excuses(failed: Sequence[RecordCheck], entries: Sequence[Summary]) -> Iterator[str]:
-    """Yield why a record may not hold here, or was not checked, without being wrong."""
+    """Yield why a record may not hold here, or was not checked, without being wrong.
+
+    Args:
+        failed: checks with findings.
+        entries: all records.
+    """
     elsewhere = [result for result in failed if result.elsewhere]
     if elsewhere:
         yield (
@@ -141,7 +151,10 @@ def _excuses(failed: Sequence[RecordCheck], entries: Sequence[Summary]) -> Itera
 
 
 def _lines(run: StoredRun[Summary], sample: float, seed: int | None) -> Sequence[LineToCheck]:
-    """Return the newest line of each episode; a random share of them is marked to be played."""
+    """Return the newest line of each episode; a random share of them is marked to be played.
+
+    A share above 0 marks one line at least. `seed` None draws other lines each time.
+    """
     total = len(run.newest)
     count = round(sample * total)
     if sample > 0:
@@ -187,27 +200,29 @@ def _completeness(plans: Sequence[Plan], kept: Plans, entries: Sequence[Summary]
     episodes of an earlier plan that were never played, are no faults: the notes count them.
 
     Args:
-        plans: the newest ones of the run.
+        plans: the newest ones of the run; without any, nothing is missing.
         kept: all plans of the run by fingerprint, which records name.
         entries: all records.
     """
+    # Episodes are compared by their keys, what identifies them, and named by their slugs.
     planned = _slugs(plans)
     recorded = {identity_key(entry) for entry in entries}
     missing = {slug for key, slug in planned.items() if key not in recorded}
 
     notes: list[str] = []
-    earlier = recorded.difference(planned)
-    if plans and earlier:
-        notes.append(f"From an earlier plan: {counted(len(earlier), 'record')}.")
-    earlier_plans = {entry.plan for entry in entries} & kept.keys()
-    unplayed = _slugs([kept[name] for name in earlier_plans]).keys() - recorded - planned.keys()
+    unplanned = recorded.difference(planned)
+    if plans and unplanned:
+        notes.append(f"From an earlier plan: {counted(len(unplanned), 'record')}.")
+    named_plans = {entry.plan for entry in entries} & kept.keys()
+    planned_at_some_time = _slugs([kept[name] for name in named_plans])
+    unplayed = planned_at_some_time.keys() - recorded - planned.keys()
     if unplayed:
         notes.append(f"Earlier plans name {counted(len(unplayed), 'more episode')}, not played.")
     return _Completeness(tuple(sorted(missing)), tuple(notes))
 
 
 def _slugs(plans: Sequence[Plan]) -> dict[RecordKey, str]:
-    """Return the names of the episodes of some plans, by what identifies them."""
+    """Return the names (slugs) of the episodes of some plans, by what identifies them."""
     slugs: dict[RecordKey, str] = {}
     for plan in plans:
         for job in plan.jobs():

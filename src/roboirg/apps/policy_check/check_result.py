@@ -32,11 +32,13 @@ class CheckAbortedError(Exception):
 
 @contextlib.contextmanager
 def ending_checks(check: str, call: str = "") -> Iterator[None]:
-    """Let any exception of the policy's own code fail a check that the others rely on.
+    """Let any exception of the policy's own code, in the block, end all checks as a failure.
+
+    For checks on which the later ones rely.
 
     Args:
         check: its name.
-        call: of the policy that is made, such as ``reset(): ``.
+        call: of the policy that is made, such as ``"reset(): "``; the message begins with it.
 
     Raises:
         CheckAbortedError: instead of the exception.

@@ -34,7 +34,12 @@ from roboirg.policies.prompt_length.tokenizer_file import prompt_limit
 
 
 def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
-    """Check that the policy can be made and needs no simulator."""
+    """Check that the policy can be made and needs no simulator.
+
+    Raises:
+        CheckAbortedError: it cannot be checked any further.
+        MissingDependencyError: a library that it needs is not installed.
+    """
     try:
         policy = player.make_fresh()
         missing = [name for name in ("reset", "act") if not callable(getattr(policy, name, None))]
@@ -54,7 +59,10 @@ def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
 
 
 def check_requirements(player: PolicyPlayer) -> Iterator[CheckResult]:
-    """Read what the policy requires of an environment, and keep it for the later checks."""
+    """Read what the policy requires of an environment, and keep it for the later checks.
+
+    Sets ``player.needs``, on which all later checks rely.
+    """
     try:
         needs = PolicyNeeds.of(player.policy)
         prompt_limit(needs)  # raises if the tokenizer cannot be read
@@ -145,7 +153,10 @@ def _describe_actions(
 
 
 def check_reports(player: PolicyPlayer) -> Iterator[CheckResult]:
-    """Check what records take from the policy besides its actions: metadata, subgoal and costs."""
+    """Check what records take from the policy besides its actions: metadata, subgoal and costs.
+
+    The policy has just played, as some of them exist only after `reset` or `act`.
+    """
     policy = player.policy
     source = player.source
     is_ours = isinstance(source, str) and not read_policy(source).is_foreign
@@ -161,7 +172,10 @@ def check_reports(player: PolicyPlayer) -> Iterator[CheckResult]:
 
 
 def check_determinism(player: PolicyPlayer) -> Iterator[CheckResult]:
-    """Check that two equal episodes have equal actions."""
+    """Check that two equal episodes have equal actions.
+
+    Sets ``player.repeatable``, on which `check_reset` relies.
+    """
     again = player.play("deterministic", player.with_video)
     player.repeatable = are_equal(player.expected, again)
     if player.repeatable:
@@ -181,7 +195,11 @@ def check_determinism(player: PolicyPlayer) -> Iterator[CheckResult]:
 
 
 def check_reset(player: PolicyPlayer) -> Iterator[CheckResult]:
-    """Check that an episode does not depend on the one before it."""
+    """Check that an episode does not depend on the one before it.
+
+    The same object plays an episode without a video, then the one with a video whose answers of a
+    fresh policy are known. `check_determinism` must have run.
+    """
     name = "reset forgets"
     expected = player.expected
     if not (player.repeatable and getattr(player.policy, "deterministic", True)):

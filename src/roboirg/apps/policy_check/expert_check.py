@@ -66,10 +66,10 @@ def _error(chunks: Chunks, moments: Sequence[ExpertMoment]) -> float:
     """Return how far chunks of actions are from the expert's, on average over the moments.
 
     The distance of an action is that of its farthest joint, rad, or coordinate, m. A pose's angles
-    are left out, as different numbers can mean the same rotation.
+    are left out, as different numbers can mean the same rotation, and so is the gripper.
 
     Args:
-        chunks: one for each moment; rows beyond the expert's do not count.
+        chunks: (n, size), one for each moment; rows beyond the expert's do not count.
         moments: of the expert's episode.
     """
     distances: list[float] = []
@@ -88,7 +88,13 @@ def _check_gripper(answers: Chunks, moments: list[ExpertMoment]) -> Iterator[Che
 
     The numbers at moments where the expert's gripper opens are compared with those where it closes.
     If they lie clearly apart the wrong way round, the sign is wrong. If they lie the right way
-    round, but closing is not below 0, the range is 0 to 1 and not -1 to +1.
+    round, but closing is not below 0, the range is 0 to 1 and not -1 to +1. With too few moments of
+    either kind, nothing is said.
+
+    Args:
+        answers: the policy's chunks (n, size), one for each moment; the gripper comes last in a
+            row.
+        moments: of the expert's episode.
     """
     given = np.array([chunk[0, -1] for chunk in answers])
     expert_opens = np.array([moment.actions[0, -1] > 0 for moment in moments])

@@ -103,8 +103,9 @@ def _play(env: RoboIRGEnv, rows: int, keeper: _PoseKeeper | None) -> ExpertEpiso
     Args:
         env: where it plays.
         rows: the expert's actions from one moment to the next.
-        keeper: notes the tool's poses, for a policy whose actions are poses; None for one whose
-            actions are joint angles, as the expert's are.
+        keeper: notes the tool's pose after each control step, as a hook of `env`, for a policy
+            whose actions are poses; None for one whose actions are joint angles, as the expert's
+            are.
     """
     observation, info = env.reset()
     instruction = observation["instruction"]
@@ -126,10 +127,10 @@ def _play(env: RoboIRGEnv, rows: int, keeper: _PoseKeeper | None) -> ExpertEpiso
 
 
 def _pieces(expert: OraclePolicy, rows: int) -> Iterator[Rows]:
-    """Yield the expert's actions, at most `rows` at a time.
+    """Yield the expert's actions, (n, 8) with n at most `rows`, for `EXPERT_STEPS` steps or more.
 
-    The caller executes each piece before it takes the next one, as the expert plans by the state
-    of the world.
+    The caller must execute each piece before it takes the next one, as the expert plans by the
+    state of the world.
     """
     steps = 0
     while steps < EXPERT_STEPS:
@@ -152,7 +153,7 @@ class _PoseKeeper:
         self._reader: Proprioception | None = None
 
     def keep(self, env: RoboIRGEnv, is_demonstration: bool) -> None:  # noqa: ARG002 - a hook
-        """Keep the pose of the tool now."""
+        """Keep the pose of the tool now; called by the environment after each control step."""
         if self._reader is None:
             from roboirg.simulation.proprioception import Proprioception
 
@@ -161,5 +162,8 @@ class _PoseKeeper:
         self.poses.append(self._reader.read()["end_effector"])
 
     def with_gripper(self, actions: Rows) -> Rows:
-        """Return the poses, each with the gripper of the action that led to it."""
+        """Return the poses, (n, 7), each with the gripper of the action that led to it.
+
+        If the episode ended early, there are fewer poses than actions.
+        """
         return np.column_stack([self.poses, actions[: len(self.poses), -1:]])

@@ -72,7 +72,7 @@ def check_policy(
 
 
 def print_check_results(results: list[CheckResult], console: Console) -> None:
-    """Print a table of results, and how many checks failed or warn."""
+    """Print a table of results, and in a last line how many checks failed or warn."""
     from rich.markup import escape
     from rich.table import Table
 
@@ -90,7 +90,7 @@ def print_check_results(results: list[CheckResult], console: Console) -> None:
 
 
 def _summary(results: list[CheckResult]) -> str:
-    """Return how many checks failed or warn: ``9 checks, none failed, 1 warning.`` is one."""
+    """Return a sentence on how many checks failed or warn: ``9 checks, none failed, 1 warning``."""
     verdicts = [result.verdict for result in results]
     failed = verdicts.count("fail")
     warned = verdicts.count("warn")

@@ -41,16 +41,20 @@ class SyntheticRollout(NamedTuple):
 class PolicyPlayer:
     """Makes a policy and asks it; episodes depend on the seed alone.
 
+    Checks run in a fixed order and leave here what later ones need.
+
     Args:
         source: a spec, or an object, which is reset wherever a spec would give a fresh object.
         seed: of the policy and of the synthetic episodes.
 
     Attributes:
-        needs: of the policy; set by a check.
-        repeatable: whether two equal episodes had equal actions; set by a check.
+        needs: of the policy; its defaults until `check_requirements` sets it.
+        repeatable: whether two equal episodes had equal actions; False until `check_determinism`
+            sets it.
     """
 
     def __init__(self, source: str | Policy, seed: int) -> None:
+        """Note the policy; it is made when it is first needed."""
         self.source = source
         self.seed = seed
         self.needs = PolicyNeeds()
@@ -69,10 +73,12 @@ class PolicyPlayer:
 
     @cached_property
     def without_video(self) -> SyntheticEpisode:
+        """The inputs of an episode without a video; `play` copies them."""
         return SyntheticEpisodes(self.needs, self.seed).episode(FIRST, 0)
 
     @cached_property
     def with_video(self) -> SyntheticEpisode:
+        """The inputs of an episode with a video; `play` copies them."""
         return SyntheticEpisodes(self.needs, self.seed).episode(SECOND, VIDEO_STEPS)
 
     @cached_property
@@ -125,7 +131,10 @@ class PolicyPlayer:
         return SyntheticRollout(chunks, dtype)
 
     def ask(self, episode: ExpertEpisode) -> Chunks:
-        """Return a fresh policy's answers in the expert's episode; its errors are not caught."""
+        """Return a fresh policy's answers, (n, size) each, at the moments of the expert's episode.
+
+        Its errors are not caught. The observations follow the expert, whatever the policy answers.
+        """
         policy = self.make_fresh()
         policy.reset(episode.instruction, episode.demonstration)
         answers: Chunks = []
@@ -149,7 +158,10 @@ class PolicyPlayer:
 
 
 def are_equal(one: SyntheticRollout, other: SyntheticRollout) -> bool:
-    """Return whether two rollouts have the same actions, bit for bit."""
+    """Return whether two rollouts have the same actions, bit for bit.
+
+    Both must have as many chunks, as `PolicyPlayer.play` gives with equal `calls`.
+    """
     return all(map(np.array_equal, one.chunks, other.chunks))
 
 

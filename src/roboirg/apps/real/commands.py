@@ -63,7 +63,10 @@ def plan(
 
 
 def _write(study: StudyPlan, folder: Path) -> None:
-    """Write the files of a plan and print their names."""
+    """Write the files of a plan into a folder, and print their names and how many trials there are.
+
+    They are the plan, CSV files, a plan of the simulated twin for each task, and the sheet.
+    """
     from roboirg.apps.real.pages.trial_sheet import SHEET_FILE, sheet_text
     from roboirg.apps.real.study import study_csv
     from roboirg.apps.real.study.study_plan import write_study

@@ -63,8 +63,8 @@ def show(
 def _print_words(episode: Episode, settings: Sequence[str], options: InstructionOptions) -> None:
     """Print what is said in each setting, and how many tokens it needs.
 
-    A setting that cannot express the episode has the reason instead, but an episode that none can
-    express is an error.
+    A setting that cannot express the episode has the reason (the *refusal*) instead. If none can,
+    the first one's refusal is raised as an error.
     """
     from roboirg.language.generator import find_refusal, instruct_with
     from roboirg.language.token_counts import tokens_shown
@@ -88,7 +88,8 @@ def _draw(
 ) -> None:
     """Print the scene and the instructions, let the oracle play, and draw what it did.
 
-    What can fail is checked before anything is printed, as playing takes a while.
+    What can fail is checked before anything is printed, as playing takes a while. `path` is the PNG
+    file; a second one for dark pages is written next to it.
     """
     from rich.console import Console
 

@@ -77,7 +77,7 @@ class SpokenSetting(NamedTuple):
 
 
 def draw_strip(title: str, said: Sequence[SpokenSetting], moments: Sequence[StripMoment]) -> Figure:
-    """Draw the words above all moments, in order of time.
+    """Return a figure with the words above all moments of an episode, in order of time.
 
     Args:
         title: one line.
@@ -125,6 +125,7 @@ class _Grid:
 
     @property
     def rows(self) -> int:
+        """Number of rows of pictures."""
         return math.ceil(len(self.moments) / PER_ROW)
 
     @property

@@ -29,7 +29,11 @@ MINIMUM_WIDTH = 100
 def print_episode(
     episode: Episode, settings: Sequence[str], options: InstructionOptions, console: Console
 ) -> None:
-    """Print objects, motions, video, goal, and the instruction in some settings."""
+    """Print objects, motions, video, goal, and the instruction in some settings.
+
+    Where the output is no terminal, lines have at least `MINIMUM_WIDTH` characters: the width of
+    `console` changes.
+    """
     if not console.is_terminal:
         console.width = max(console.width, MINIMUM_WIDTH)
     console.print(
@@ -58,7 +62,10 @@ def objects_table(scene: Scene) -> Table:
 
 
 def describe_motions(scene: Scene) -> list[str]:
-    """Describe the scripted motions; objects with the same motion share a line."""
+    """Return a line for each scripted motion; objects with the same motion share it.
+
+    ``["cube_1, cube_2: away until step 80"]``, in the order of the scene.
+    """
     movers: dict[str, list[str]] = {}
     for motion in scene.motions:
         movers.setdefault(_motion_words(motion), []).append(_mover(motion))
@@ -66,7 +73,10 @@ def describe_motions(scene: Scene) -> list[str]:
 
 
 def describe_video(episode: Episode) -> list[str]:
-    """Describe the stages of the demonstration and the facts that instructions refer to."""
+    """Return lines on the video: its numbered stages, then the acts that instructions refer to.
+
+    ``["1. pick up the cube", …, "that is: cube_red placed on target_0"]``; none without a video.
+    """
     shown = [plain_subgoal(stage) for stage in episode.demonstration if stage.in_video]
     lines = [f"{number}. {words}" for number, words in enumerate(shown, start=1)]
     if episode.scene.past:
@@ -87,7 +97,7 @@ def instructions_table(
     """Return a table of the instruction in each setting, implicit and resolved.
 
     The explicit setting has one form only. A setting that cannot express the episode has the reason
-    instead, and one whose words fit another goal, too, a warning.
+    instead, and one whose words fit another goal, too, a warning in the next row.
     """
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_lines=False)
     table.add_column("setting", style="bold")
@@ -115,7 +125,7 @@ def instructions_table(
 def spoken_settings(
     episode: Episode, settings: Sequence[str], options: InstructionOptions
 ) -> list[SpokenSetting]:
-    """Return what is said in each setting that can express the episode."""
+    """Return what is said in each setting that can express the episode, in their order."""
     said = []
     for setting in settings:
         chosen = replace(options, setting=setting)
@@ -178,6 +188,7 @@ def _kind(item: SceneObject) -> str:
 
 
 def _plane(point: Point) -> str:
+    """Return a point without its height: ``"(0.10, -0.05)"``, meters."""
     return f"({point.x:.2f}, {point.y:.2f})"
 
 

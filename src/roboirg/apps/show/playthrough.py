@@ -59,6 +59,8 @@ class Playthrough:
 def play_through(episode: Episode) -> Playthrough:
     """Let the oracle play; capture the start, completed stages, key events and the end.
 
+    The last picture gets the verdict as its caption; after a success, with what was done last.
+
     Raises:
         RenderDeviceError: no Vulkan device can render.
         MissingDependencyError: the simulator is not installed.
@@ -110,11 +112,11 @@ class _RankedMoment(NamedTuple):
 
 @dataclass
 class _MomentRecorder:
-    """Captures remarkable moments after each control step.
+    """Captures remarkable moments after each control step, as a frame hook of an environment.
 
     Attributes:
         key_events: key events of the scene.
-        captured: the newest moment of each step.
+        captured: the newest moment of each step, by the control steps since reset.
     """
 
     key_events: KeyEvents
@@ -126,8 +128,9 @@ class _MomentRecorder:
     def __call__(self, env: RoboIRGEnv, is_demonstration: bool) -> None:
         """Capture the moment after a step for the first reason of these that it has, if any.
 
-        A video or turn has begun, a stage is done, something moves by itself, or the last picture
-        is some time ago.
+        In this order: a video or turn has begun, a stage is done, something moves by itself, the
+        step's number is a multiple of `FILLER_STEPS`. Must be called after every step, as stages
+        are told by comparison with the step before.
         """
         judge = env.session.judge
         step = env.session.world.elapsed
@@ -164,11 +167,12 @@ class _MomentRecorder:
 
 
 def choose_moments(ranks: Sequence[int]) -> tuple[int, ...]:
-    """Choose the moments of a sheet, by position, given the rank of each.
+    """Return the positions of the moments to show, in order, given the rank of each (see `Rank`).
 
-    Adds moments rank by rank while they fit, evenly spaced if not all do. The last rank only fills
-    a sheet up to the minimum. Of the ranks 4, 4, 4, 0, 4, 1, those at the positions 3 and 5 are
-    chosen first, and then the four fillers, because a sheet has six moments or more.
+    Adds moments rank by rank, the lowest number first, while they fit, evenly spaced if not all do.
+    The last rank only fills a sheet up to the minimum. Of the ranks 4, 4, 4, 0, 4, 1, those at the
+    positions 3 and 5 are chosen first, and then the four fillers, because a sheet has six moments
+    or more.
     """
     chosen: list[int] = []
     for rank in Rank:
@@ -182,11 +186,14 @@ def choose_moments(ranks: Sequence[int]) -> tuple[int, ...]:
 class KeyEvents:
     """Reports, step by step, the objects that move by themselves.
 
+    `at` notes when stages begin, so it must be called for every step, in order.
+
     Args:
         motions: scripted motions of the scene.
     """
 
     def __init__(self, motions: Sequence[Motion]) -> None:
+        """Sort the motions into swaps, and objects that appear at a step, by that step."""
         self._swaps: list[Swap] = []
         self._appearing: dict[int, list[str]] = {}
         self._stage_starts: dict[int, int] = {}
@@ -197,7 +204,9 @@ class KeyEvents:
                 self._appearing.setdefault(motion.end + 1, []).append(_plain(motion.subject))
 
     def at(self, step: int, stage: int) -> str | None:
-        """Return the event after a control step, or None; call for every step.
+        """Return what happens after a control step, or None; call for every step, in order.
+
+        ``"cube 0 and cube 2 change places"``, when they are halfway.
 
         Args:
             step: control steps since reset.

@@ -21,6 +21,7 @@ from typing import Any
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import (
+    BEHIND,
     BUILT_IN,
     ELSEWHERE,
     HANDS,
@@ -123,7 +124,7 @@ def _read_rewritten(ref: PolicyRef) -> PolicyRef:
     rewriting = rewriting_in(ref)
     follower = read_policy(rewriting.policy)
     options = _changed_options(namer_of(rewriting, 0), dict(rewriting.options))
-    options["behind"] = makeup_text(follower.makeup)
+    options[BEHIND] = makeup_text(follower.makeup)
     if rewriting.wordings is not None:
         options["wordings"] = rewriting.wordings
     is_asked = rewriting.namer.partition(":")[0] == LISTENER

@@ -124,7 +124,7 @@ class AttachedPolicy:
 
 
 def close_policy(policy: object) -> None:
-    """Call the ``close`` of a policy or planner, if it has one."""
+    """Call the ``close`` of a policy or planner, if it has one; None is allowed."""
     close = getattr(policy, "close", None)
     if callable(close):
         close()

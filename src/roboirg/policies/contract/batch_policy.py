@@ -81,7 +81,7 @@ _made: dict[tuple[str, object], Any] = {}
 
 
 def forget_batched(spec: str) -> None:
-    """Let the policies of a spec be made anew, as when a run begins."""
+    """Forget the policies of a spec that this process has made, so that they are made anew."""
     for key in list(_made):
         made_spec, _ = key
         if made_spec == spec:
@@ -89,11 +89,11 @@ def forget_batched(spec: str) -> None:
 
 
 def make_batched(key: tuple[str, object], make: Callable[[], Any], seed: int) -> BatchedEpisode:
-    """Return a new episode of a policy, which is made when the first one begins.
+    """Return a new episode of a policy; the policy itself is made for the first one and then kept.
 
     Args:
         key: identifies the policy: its spec, and its class or object.
-        make: makes it.
+        make: makes it; called at most once for a key.
         seed: of the episode's random choices.
     """
     if key not in _made:

@@ -22,11 +22,15 @@ def check_policy(spec: str, policy: object, methods: tuple[str, ...]) -> None:
     """Raise for a policy, or a class of policies, with which every episode would end in an error.
 
     What shows only when a policy is made, such as a missing argument, is found when it is opened.
+    Arguments are checked of classes only: an object's methods may be anything callable.
 
     Args:
         spec: of the policy, for errors.
         policy: the policy or the class.
         methods: that it must have; one that takes batches is checked without them.
+
+    Raises:
+        InvalidValueError: the message names the policy and what is wrong.
     """
     kind = policy if isinstance(policy, type) else type(policy)
     if takes_batches(policy):
@@ -51,7 +55,13 @@ def check_policy(spec: str, policy: object, methods: tuple[str, ...]) -> None:
 
 
 def _check_arguments(spec: str, method: Callable[..., Any], takes: tuple[str, ...]) -> None:
-    """Raise for a method that cannot be called with the arguments that it gets."""
+    """Raise for a method of a class that cannot be called with the arguments that it gets.
+
+    Args:
+        spec: of the policy, for the error.
+        method: not bound to an object, so `self` is its first argument.
+        takes: names of the positional arguments, for the error, too.
+    """
     try:
         inspect.signature(method).bind(None, *takes)
     except ValueError:  # a method written in C may have no signature

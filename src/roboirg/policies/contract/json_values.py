@@ -44,8 +44,8 @@ class _Place(NamedTuple):
 def as_json(value: Any, owner: str | None = None) -> Any:  # noqa: ANN401
     """Return a value as JSON values that every reader of records can read.
 
-    Numbers and arrays of NumPy, PyTorch and JAX become numbers and lists, paths and keys texts;
-    large arrays are described.
+    Numbers and arrays of NumPy, PyTorch and JAX become numbers and lists. Paths, keys and whole
+    numbers of more than 63 bits become texts; large arrays are described.
 
     Args:
         value: anything.
@@ -53,8 +53,8 @@ def as_json(value: Any, owner: str | None = None) -> Any:  # noqa: ANN401
             text, cut and without characters that control a terminal.
 
     Raises:
-        InvalidValueError: the owner's value is something else, a number that is not finite, a
-            whole one of more than 63 bits, or nested too deep.
+        InvalidValueError: the owner's value is something else, a number that is not finite, or
+            nested too deep.
     """
     return _as_json(value, _Place(owner))
 
@@ -64,7 +64,7 @@ def _as_json(value: Any, place: _Place) -> Any:  # noqa: ANN401
 
     Args:
         value: anything.
-        place: where it stands in what is converted.
+        place: where it stands in what is converted; decides what is refused, and the words for it.
     """
     if place.depth > MAX_DEPTH:
         if place.owner is not None:
@@ -86,7 +86,11 @@ def _as_json(value: Any, place: _Place) -> Any:  # noqa: ANN401
 
 
 def _scalar(value: object, place: _Place) -> Any:  # noqa: ANN401
-    """Return a value that holds no others as a plain JSON value; one that JSON lacks as a text."""
+    """Return a value that holds no others as a plain JSON value; one that JSON lacks as a text.
+
+    Numbers of a subclass become plain ones. Infinite or too large ones are texts, or an error; see
+    `_text`.
+    """
     if value is None or isinstance(value, bool):
         return value
     if isinstance(value, int) and abs(value) < _TOO_LARGE:
@@ -99,14 +103,17 @@ def _scalar(value: object, place: _Place) -> Any:  # noqa: ANN401
 def _object(value: Mapping[Any, Any], place: _Place) -> dict[str, Any]:
     """Return a mapping as a JSON object, whose keys are texts.
 
-    In errors, the entry ``b`` of ``a`` is called ``a.b``.
+    ``{1: 2.5}`` -> ``{"1": 2.5}``. In errors, the entry ``b`` of ``a`` is called ``a.b``, and a key
+    that cannot be a text *a key*.
     """
     entries: dict[str, Any] = {}
     for key, entry in value.items():
         if place.owner is not None and not isinstance(key, _TEXTUAL):
             shown = clip_text(repr(key), _MAX_SHOWN)
-            where = place.key or "them"
-            raise InvalidValueError(f"{place.owner}: {shown} is a key of {where}, and no text.")
+            where = place.key or "it"
+            raise InvalidValueError(
+                f"{place.owner}: {where} has the key {shown}; keys must be text."
+            )
         name = _text(key, place)
         path = f"{place.key}.{key}" if place.key else str(key)
         entries[name] = _as_json(entry, place.inside(path))
@@ -114,8 +121,13 @@ def _object(value: Mapping[Any, Any], place: _Place) -> dict[str, Any]:
 
 
 def _array(value: Any, place: _Place) -> Any:  # noqa: ANN401
-    """Return an array as lists; of a large one only ``array of shape (256, 256, 3), uint8``."""
-    if math.prod(value.shape) > _MAX_LISTED:
+    """Return an array, or a scalar of NumPy, PyTorch or JAX, as lists or a number.
+
+    Of more than `_MAX_LISTED` numbers only a text: ``"array of shape (256, 256, 3), uint8"``.
+    """
+    # An axis of length 0 does not make the lists of the others fewer.
+    lists = math.prod(max(length, 1) for length in value.shape)
+    if lists > _MAX_LISTED:
         return f"array of shape {tuple(value.shape)}, {value.dtype}"
     listed = value.tolist()
     if isinstance(listed, np.generic):
@@ -126,8 +138,8 @@ def _array(value: Any, place: _Place) -> Any:  # noqa: ANN401
 def _text(value: object, place: _Place) -> str:
     """Return a value as a text.
 
-    A stranger's value may be anything. One with an owner has to be a text, a path or a whole
-    number, and anything else raises `InvalidValueError`.
+    A stranger's value (without an owner) may be anything, and is cut. One with an owner has to be a
+    text, a path or a whole number, and anything else raises `InvalidValueError`.
     """
     if place.owner is None:
         return printable(str(value)[:_MAX_TEXT_LENGTH])

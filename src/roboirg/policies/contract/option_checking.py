@@ -41,9 +41,10 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
 def _in_one_sentence(
     error: ValidationError, kind: type[BaseModel], origin: str
 ) -> InvalidValueError | UnknownNameError:
-    """Return pydantic's faults as an error of one sentence.
+    """Return (not raise) pydantic's faults as an error of one sentence.
 
-    It is about the first unknown option, or without any about the first fault.
+    It is about the first unknown option, or without any about the first fault: ``Policy 'x': option
+    port is 'a'; it must be a whole number.``
 
     Args:
         error: with all faults.
@@ -70,7 +71,8 @@ def _in_one_sentence(
 def flags_as_words(given: Any) -> Any:  # noqa: ANN401 - options, or the value of one
     """Return options with True and False as words, because numbers would take them as 1 and 0.
 
-    Options that are flags take the words.
+    ``{"steps": True}`` -> ``{"steps": "True"}``, which a number refuses and a flag takes. Tables
+    within tables are treated likewise.
     """
     if isinstance(given, Mapping):
         return {name: flags_as_words(value) for name, value in given.items()}
@@ -80,8 +82,8 @@ def flags_as_words(given: Any) -> Any:  # noqa: ANN401 - options, or the value o
 def plain_complaint(message: str) -> str:
     """Return pydantic's complaint about a value in plain words, to stand behind the value.
 
-    ``Input should be a valid integer, unable to parse string`` becomes ``it must be a whole
-    number``.
+    ``Input should be a valid integer, unable to parse string`` -> ``it must be a whole number``.
+    The order of the replacements matters: ``valid `` alone goes last.
     """
     return (
         re.sub("^Value error, |, (unable|got) .*| or an instance of .*", "", message)
@@ -96,7 +98,10 @@ def plain_complaint(message: str) -> str:
 
 
 def _names(kind: type[BaseModel]) -> list[str]:
-    """Return the names of all options, with those in a table (a field that is a model itself)."""
+    """Return the names of all options, for suggestions.
+
+    A field that is a model itself is a table of options; its options are listed instead.
+    """
     names: list[str] = []
     for name, field in kind.model_fields.items():
         table = field.annotation

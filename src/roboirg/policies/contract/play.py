@@ -21,7 +21,11 @@ Moment = tuple[dict[str, Any], dict[str, Any]]
 
 
 class EpisodeLoop:
-    """The turns of an episode; subclasses guard, record or split its calls."""
+    """The turns of an episode; subclasses guard, record or split its calls.
+
+    `play` calls `begin`, then, while the episode goes on, `act`, `execute` and, if something was
+    said meanwhile, `hear`.
+    """
 
     def __init__(self, env: RoboIRGEnv, policy: Policy) -> None:
         self.env = env
@@ -91,7 +95,13 @@ _CHECKED_NEEDS = (
 
 
 def _check(env: RoboIRGEnv, policy: Policy) -> None:
-    """Raise if the environment was made with other values than the policy declares as its needs."""
+    """Raise if the environment was made with other values than the policy declares as its needs.
+
+    What a policy does not declare, it takes as it comes; only the action space always counts.
+
+    Raises:
+        InvalidValueError: the message says how to make the environment.
+    """
     needs = PolicyNeeds.of(policy, *ENV_NEEDS)
     for name in _CHECKED_NEEDS:
         needed = getattr(needs, name)

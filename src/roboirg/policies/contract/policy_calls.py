@@ -104,7 +104,7 @@ def _checked(metadata: object, *, is_ours: bool) -> dict[str, JsonValue]:
     """Return a policy's metadata as JSON values, or raise like `policy_metadata`.
 
     Args:
-        metadata: of the policy.
+        metadata: of the policy; anything but a mapping is refused.
         is_ours: whether the policy's code is ours; only that may use the key `SERVER`.
     """
     if not isinstance(metadata, Mapping):
@@ -135,7 +135,7 @@ def _checked(metadata: object, *, is_ours: bool) -> dict[str, JsonValue]:
 
 
 def policy_usage(policy: Policy) -> dict[str, float]:
-    """Return the costs that a policy reports, such as ``{"calls": 3.0}``.
+    """Return the costs that a policy reports, such as ``{"calls": 3.0}``; empty if it reports none.
 
     Costs below 0, of `_TOO_LARGE` or more, and NaN, which means that one is unknown, are left out.
 

@@ -32,6 +32,8 @@ def is_url(spec: str) -> bool:
 def split_url(spec: str) -> PolicyRef:
     """Return the policy of a URL: the scheme is its kind, its target what follows.
 
+    ``openpi://host:8000?execute=5`` -> kind ``openpi``, target ``host:8000``, option ``execute``.
+
     Raises:
         InvalidValueError: there is nothing after the scheme, or the query is malformed.
     """
@@ -44,7 +46,7 @@ def split_url(spec: str) -> PolicyRef:
 
 
 def parse_query(spec: str, query: str) -> dict[str, str]:
-    """Return the options in the query of a policy's spec: of ``a=1&b=x`` a is ``1`` and b ``x``.
+    """Return the options in the query of a policy's spec: ``a=1&b=x`` -> ``{"a": "1", "b": "x"}``.
 
     Args:
         spec: the whole of it, for errors; it must hold no key or password.

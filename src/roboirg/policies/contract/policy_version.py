@@ -24,7 +24,8 @@ CHECKPOINT_FILE = "config.json"
 def read_version(policy: object) -> str | None:
     """Return a policy's, planner's or class's ``version`` as text; None if it has none.
 
-    Numbers, NumPy's among them, and paths become text. A policy may set it until its `reset` ends.
+    Numbers, NumPy's among them, and paths become text: ``2`` -> ``"2"``. A policy may set it until
+    its `reset` ends.
 
     Raises:
         InvalidValueError: it is something else, which may differ in each process, or empty; or it
@@ -94,9 +95,10 @@ def file_fingerprint(declaring: object) -> str | None:
 
 
 def content_of(text: str) -> str:
-    """Return a hash of the file or checkpoint that a text names; the text if it names neither.
+    """Return a hash of the file or checkpoint that a text names; the text itself if it names none.
 
-    A checkpoint is a folder with a `CHECKPOINT_FILE`; all files in it count.
+    A checkpoint is a folder with a `CHECKPOINT_FILE`; all files in it count, those in folders below
+    it do not. An empty text gives ``"empty"``.
     """
     files = [Path(text)]
     hashes = ""

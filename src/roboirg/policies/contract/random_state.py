@@ -15,13 +15,15 @@ import numpy as np
 class RandomState:
     """The states of the global random generators, as one episode left them.
 
-    PyTorch's generators are seeded in the first turn after an import of it.
+    `restore` before the episode's turn, `keep` after it. PyTorch's generators are seeded in the
+    first turn after an import of it.
 
     Args:
         seed: of all generators at the beginning of the episode.
     """
 
     def __init__(self, seed: int) -> None:
+        """Make the states that generators have right after seeding; the process's own stay."""
         self._seed = seed
         self._python = random.Random(seed).getstate()
         self._numpy: Any = np.random.RandomState(seed % 2**32).get_state()
@@ -33,7 +35,7 @@ class RandomState:
         """States of PyTorch's generators of devices."""
 
     def keep(self) -> None:
-        """Take over the states of this process's generators."""
+        """Take over the states of this process's generators, after the episode's turn."""
         self._python = random.getstate()
         self._numpy = np.random.get_state()  # noqa: NPY002
         if self._torch is not None:
@@ -42,7 +44,7 @@ class RandomState:
                 self._torch_devices = self._torch.cuda.get_rng_state_all()
 
     def restore(self) -> None:
-        """Set this process's generators to these states."""
+        """Set this process's generators to these states, before the episode's turn."""
         random.setstate(self._python)
         np.random.set_state(self._numpy)  # noqa: NPY002 - what policies may use
         if self._torch is not None:
@@ -69,7 +71,7 @@ class RandomTurns:
         """Of the episode whose numbers the generators give; None between turns."""
 
     def begin(self, episode: RandomState) -> None:
-        """Let the generators give the numbers of an episode, until the turn of another."""
+        """Let the generators give the numbers of an episode, until the turn of another or `end`."""
         if self._episode is not episode:
             self.end()
             self._episode = episode

@@ -37,7 +37,9 @@ class SyntheticEpisode(NamedTuple):
 
 
 class SyntheticEpisodes:
-    """Makes the inputs that a policy with these needs receives.
+    """Makes the inputs that a policy with these needs receives, with random values.
+
+    The same calls in the same order give the same values: all draw from one generator.
 
     Args:
         needs: of the policy.
@@ -84,7 +86,10 @@ class SyntheticEpisodes:
         return cast("Observation", last)
 
     def _observation(self, instruction: str) -> dict[str, Any]:
-        """Return an observation with random values in all fields that the policy needs."""
+        """Return an observation with random values in all fields that the policy needs.
+
+        The history is left to the callers. The order of the draws decides the values.
+        """
         rng = self._rng
         observation: dict[str, Any] = {}
         for camera in self._needs.cameras:

@@ -36,7 +36,7 @@ def read_facts(place: str) -> CheckpointFacts:
     """Return what a checkpoint takes, as far as its configuration is on this computer.
 
     That is in a folder, or in the cache of the Hub. Without it, or if it cannot be read, `UNKNOWN`
-    is returned.
+    is returned, and what is wrong shows when the checkpoint is loaded.
 
     Args:
         place: a folder, or the id of a repository of the Hub; nothing is downloaded.

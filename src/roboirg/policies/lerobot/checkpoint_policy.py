@@ -16,7 +16,7 @@ import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,8 @@ from roboirg.policies.contract.option_checking import NOT_COMPARED
 from roboirg.policies.contract.policy_urls import UrlOptions, read_options, split_url
 from roboirg.policies.lerobot.checkpoint_facts import PICTURE, STATE, picture_sizes, read_facts
 from roboirg.util.media import scaled_square
+
+Item = TypeVar("Item")
 
 _MAX_BRIGHTNESS = 255.0
 _GPU_BATCH = 8
@@ -100,6 +102,7 @@ class LeRobotPolicy:
     demonstration_frames: ClassVar[str] = "none"
 
     def __init__(self, url: str, seed: int = 0) -> None:  # noqa: ARG002
+        """Check the URL, and read what the checkpoint says of itself; it is loaded by `begin`."""
         parts = split_url(url)
         self.options = read_options(parts, LeRobotPolicyOptions)
         self.place = parts.target
@@ -118,7 +121,10 @@ class LeRobotPolicy:
         demonstration: Demonstration,  # noqa: ARG002
         seed: int = 0,
     ) -> CheckpointEpisode:
-        """Load the checkpoint and begin an episode.
+        """Load the checkpoint, if this is the first episode, and begin an episode.
+
+        Its model is a shallow copy, which shares the weights; parts with a reset of their own are
+        copied, too.
 
         Raises:
             MissingDependencyError: LeRobot, PyTorch or what the checkpoint needs is not installed.
@@ -137,7 +143,7 @@ class LeRobotPolicy:
     def act_batch(
         self, states: Sequence[CheckpointEpisode], observations: Sequence[Observation]
     ) -> list[Actions]:
-        """Return the checkpoint's next actions, (n, 8) for each episode."""
+        """Return the checkpoint's next actions, (n, 8) for each episode, in their order."""
         import torch
 
         # One at a time, unless the model takes batches: the noise of an episode, or what the model
@@ -156,34 +162,31 @@ class LeRobotPolicy:
     def _ask(
         self, states: Sequence[CheckpointEpisode], observations: Sequence[Observation], size: int
     ) -> list[Actions]:
-        """Return the model's actions for at most `size` episodes, in one batch.
+        """Return the model's actions (n, 8) for each of at most `size` episodes, in one batch.
 
         A batch always has `size` rows, as a model's rounding depends on their number: the last
         episode is repeated to fill it up, and the surplus rows are dropped.
         """
         import torch
 
-        count = len(states)
-        missing = size - count
         seeds = [int(state.rng.integers(_SEEDS)) for state in states]
         torch.manual_seed(seeds[0])  # before all that may draw random numbers
-        filled_observations = [*observations, *[observations[-1]] * missing]
-        batch = self._before(self._batch(filled_observations))
+        batch = self._before(self._batch(_filled_up(observations, size)))
         if size == 1:
             rows = self._select(states[0].model, batch)
         else:
-            filled_seeds = [*seeds, *[seeds[-1]] * missing]
-            rows = self._predict(states[0].model, filled_seeds, batch)
+            rows = self._predict(states[0].model, _filled_up(seeds, size), batch)
         # The postprocessor takes the actions of one step.
         steps = [self._after(rows[:, step]) for step in range(rows.shape[1])]
-        rows = torch.stack(steps, dim=1)
-        actions: NDArray[np.float64] = rows[:count].cpu().numpy().astype(np.float64)
+        wanted_rows = torch.stack(steps, dim=1)[: len(states)]
+        actions: NDArray[np.float64] = wanted_rows.cpu().numpy().astype(np.float64)
         return list(actions)
 
     def _predict(self, model: Any, seeds: Sequence[int], batch: dict[str, Any]) -> Any:  # noqa: ANN401
         """Return the chunks of several episodes (episodes, n, 8), each with noise of its own seed.
 
-        The model must remember nothing of an episode, as all are asked about with the same one.
+        The model must remember nothing of an episode, as that of the first one answers for all. A
+        model that takes no noise draws none; see `_load_model`.
         """
         import torch
 
@@ -201,7 +204,8 @@ class LeRobotPolicy:
         """Return the next actions of one episode (1, n, 8), as ``lerobot-eval`` asks for them.
 
         That asks before every action; the model answers from a queue until it is empty. Here, all
-        are taken from the queue at once that the next observations cannot change any more.
+        are taken from the queue at once that the next observations cannot change any more. Models
+        without a queue give one action.
         """
         import torch
 
@@ -217,7 +221,11 @@ class LeRobotPolicy:
         return torch.stack(rows, dim=1)
 
     def _batch(self, observations: Sequence[Observation]) -> dict[str, Any]:
-        """Return observations in LeRobot's form: pictures (n, 3, H, W) in [0, 1]."""
+        """Return observations in LeRobot's form, by its names of inputs, as tensors.
+
+        Pictures (n, 3, height, width) in [0, 1], states (n, 8) float32, and the list of
+        instructions.
+        """
         import torch
 
         states = []  # seven joints and the first finger
@@ -237,7 +245,7 @@ class LeRobotPolicy:
         return batch
 
     def _load(self) -> None:
-        """Load the checkpoint; raises like `begin`."""
+        """Load the checkpoint; turn the errors of LeRobot into ours, which `begin` names."""
         place = "" if Path(self.place).is_dir() else " (no folder here, so an id of the Hub)"
         try:
             self._load_model()
@@ -254,7 +262,11 @@ class LeRobotPolicy:
             ) from error
 
     def _load_model(self) -> None:
-        """Load configuration, processors and weights; find out how the model may be asked."""
+        """Load configuration, processors and weights; find out how the model may be asked.
+
+        Sets `model` last, so that a checkpoint that could not be loaded is tried again. Whether
+        several episodes can be asked about at once depends on where the model gets its noise from.
+        """
         from lerobot.configs.policies import PreTrainedConfig
         from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 
@@ -289,8 +301,14 @@ class LeRobotPolicy:
         self.model = model.to(self.options.device).eval()
 
 
+def _filled_up(items: Sequence[Item], size: int) -> list[Item]:
+    """Return `size` items: those given, then the last one as often as it takes."""
+    missing = size - len(items)
+    return [*items, *[items[-1]] * missing]
+
+
 def _noise_shape(config: Any, model: Any) -> tuple[int, int] | None:  # noqa: ANN401
-    """Return the shape of the noise that a chunk is made of; None if the model takes none."""
+    """Return the shape (steps, numbers) of the noise that a chunk is made of; None without."""
     steps = getattr(config, "chunk_size", None)
     dimensions = getattr(config, "max_action_dim", None)
     takes_noise = "noise" in inspect.signature(model.predict_action_chunk).parameters
@@ -336,5 +354,6 @@ def _describe(config: Any, before: object, after: object) -> dict[str, Any]:  # 
 
 
 def _step_names(processor: object) -> list[str]:
+    """Return the names of the steps of LeRobot's pre- or postprocessor, in order."""
     steps = getattr(processor, "steps", ())
     return [getattr(step, "_registry_name", type(step).__name__) for step in steps]

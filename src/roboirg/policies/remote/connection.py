@@ -60,7 +60,7 @@ _MAX_TRACEBACK_END = 4096
 
 
 class ServerConnection:
-    """One episode's use of a server; can begin again after its end.
+    """One episode's use of a server: `begin`, any number of `exchange`, `end`; can begin again.
 
     Args:
         scheme: of the policy's URL.
@@ -72,6 +72,7 @@ class ServerConnection:
     """
 
     def __init__(self, scheme: str, endpoints: Sequence[Endpoint], options: RemoteOptions) -> None:
+        """Note the servers and options; `begin` connects."""
         self._scheme = scheme
         self._endpoints = endpoints
         self._options = options
@@ -187,8 +188,14 @@ class ServerConnection:
     def _attempt(self, left: float) -> ClientConnection | str:
         """Return a connection, or why there is none yet; raise if another attempt cannot help.
 
+        The connection is closed by `end`.
+
         Args:
             left: seconds that are left to connect.
+
+        Returns:
+            The connection; or the reason in words, ``"HTTP status 503"``: the server may still be
+                starting.
         """
         endpoint = self.endpoint
         scheme = "wss" if self._options.tls else "ws"
@@ -228,7 +235,7 @@ class ServerConnection:
             raise PolicyConnectionError(f"{self} refused: {_describe(error)}.") from error
 
     def _refuse_surplus(self, websocket: ClientConnection) -> None:
-        """Raise if there is a message already, before the request."""
+        """Raise if there is a message before the request: it would be taken for the reply."""
         with contextlib.suppress(TimeoutError):
             surplus = websocket.recv(timeout=0)
             if isinstance(surplus, str):
@@ -236,7 +243,13 @@ class ServerConnection:
             raise PolicyReplyError(f"{self} sent a message without a request.")
 
     def _read(self, data: bytes | str) -> dict[str, Any]:
-        """Return what a server has sent; a text is an error of the server."""
+        """Return the message that a server has sent; a text is an error of the server.
+
+        Keys that this process has sent are replaced by asterisks first.
+
+        Raises:
+            PolicyReplyError: it is a text, or no message.
+        """
         if isinstance(data, str):
             raise self.error_reply(data)
         data = bytes_without_keys(data)
@@ -249,7 +262,7 @@ class ServerConnection:
             ) from error
 
     def _broken(self, error: ConnectionClosed, sent: int) -> RoboIRGError:
-        """Return the error for a connection that has ended, by what the library found out of it.
+        """Return (not raise) the error for a connection that has ended, by what is known of it.
 
         Args:
             error: of the library.
@@ -279,6 +292,9 @@ class ServerConnection:
 def _next_message(websocket: ClientConnection, end: float) -> bytes | str | None:
     """Return the next message of a server; None if none comes until `end` of the monotonic clock.
 
+    It is waited for in pieces of `_CHECK_S`, to see whether the library has refused a message
+    meanwhile.
+
     Raises:
         ConnectionClosed: the connection broke.
     """
@@ -294,7 +310,10 @@ def _next_message(websocket: ClientConnection, end: float) -> bytes | str | None
 
 
 def _shut_down(websocket: ClientConnection) -> None:
-    """Wake the threads that use a socket, also one with TLS, whose state is left alone."""
+    """Shut a socket down, which wakes the threads that use it.
+
+    The state of TLS is left alone, as another thread may be in the middle of it.
+    """
     with contextlib.suppress(OSError):
         socket.socket.shutdown(websocket.socket, socket.SHUT_RDWR)
 

@@ -102,7 +102,14 @@ def read_endpoints(url: PolicyRef) -> tuple[Endpoint, ...]:
 
 
 def _endpoint(url: PolicyRef, text: str) -> Endpoint:
-    """Return the server of a part of a URL, such as ``localhost:8001`` or ``host:80/path``."""
+    """Return the server of a part of a URL, such as ``localhost:8001`` or ``host:80/path``.
+
+    `url` is the whole policy, for the error. The host is in lower case; a slash at the end is
+    dropped.
+
+    Raises:
+        InvalidValueError: it is no host and port.
+    """
     complaint = InvalidValueError(
         f"Policy {url.spec!r}: {text!r} is not a server; write {url.kind}://host:port, several "
         "with commas."

@@ -68,7 +68,7 @@ def unpack(data: bytes) -> dict[str, Any]:
 
 
 def _encode(text_keys: bool, value: object) -> object:
-    """Return an array or scalar of NumPy in a form that msgpack can pack.
+    """Return an array or scalar of NumPy in a form that msgpack can pack; `_decode` reverses it.
 
     Args:
         text_keys: the dialect. If true, an array is a map with texts as keys and a scalar a plain
@@ -99,7 +99,9 @@ def _encode(text_keys: bool, value: object) -> object:
 def _decode(packed: dict[Any, Any]) -> object:
     """Return what a map of a message stands for: an array, a scalar, or the map itself.
 
-    Maps of all dialects are read: ours with texts or bytes as keys, and those of msgpack-numpy.
+    ``{b"__ndarray__": True, b"data": …, b"dtype": "<f4", b"shape": [8]}`` -> an array (8,). Maps of
+    all dialects are read: ours with texts or bytes as keys, and those of msgpack-numpy. msgpack
+    calls this for every map, the innermost first.
     """
     entries: dict[Any, Any] = {}
     for key, value in packed.items():
@@ -141,7 +143,11 @@ def _array(described: object, shape: Any, data: object) -> np.ndarray[Any, Any]:
 
 
 def _dtype(text: object) -> np.dtype[Any]:
-    """Return the dtype that a text such as ``<f4`` describes; raise if it is not accepted."""
+    """Return the dtype that a text such as ``<f4`` describes.
+
+    Raises:
+        ValueError: it is no text, too long, or not accepted: Python objects are never read.
+    """
     if not isinstance(text, str) or len(text) > _MAX_DTYPE_LENGTH:
         raise ValueError(f"the dtype of an array is {str(text)[:_MAX_DTYPE_LENGTH]!r}")
     dtype = np.dtype(text)

@@ -16,6 +16,7 @@ from roboirg.core.errors import InvalidActionError, PolicyReplyError
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
 from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.policies.contract.json_values import as_json
+from roboirg.policies.contract.policy_calls import SERVER
 from roboirg.policies.contract.policy_urls import read_options, split_url
 from roboirg.policies.remote.endpoints import RemoteOptions, read_endpoints
 
@@ -55,6 +56,7 @@ class RemotePolicy(ABC):
     actions: str = JOINT_ANGLE.name
 
     def __init__(self, url: str, seed: int = 0) -> None:
+        """Check URL and options; connect to nothing yet."""
         from roboirg.policies.remote.connection import ServerConnection
 
         del seed
@@ -90,11 +92,11 @@ class RemotePolicy(ABC):
         self.instruction = instruction
         with self._closed_on_error():
             self.connection.begin()
-            self.metadata = {
-                "server": str(self.connection.endpoint),
-                **as_json(self.greet()),
-                "execute": getattr(self.options, "execute", None) or "all",
-            }
+            reported = as_json(self.greet())
+            self.metadata = {SERVER: "", **reported}
+            # Whatever the server calls itself, these are ours to say.
+            self.metadata[SERVER] = str(self.connection.endpoint)
+            self.metadata["execute"] = getattr(self.options, "execute", None) or "all"
             self.begin_episode(demonstration)
 
     def act(self, observation: Observation) -> Actions:
@@ -202,7 +204,7 @@ class RemotePolicy(ABC):
 
     @contextlib.contextmanager
     def _closed_on_error(self) -> Iterator[None]:
-        """Unlock the server as soon as an episode cannot go on."""
+        """Disconnect and unlock the server as soon as the block raises: the episode is over."""
         try:
             yield
         except Exception:

@@ -102,7 +102,10 @@ def lock_folder() -> Path:
 
 
 def _lock_any(endpoints: Sequence[Endpoint], folder: Path, *, shared: bool) -> ServerLock | None:
-    """Return a lock on the first server whose lock file can be locked; None if none is free."""
+    """Return a lock on the first server whose lock file can be locked; None if none is free.
+
+    Does not wait. The lock lasts as long as its file is open.
+    """
     for endpoint in endpoints:
         with contextlib.ExitStack() as stack:
             path = folder / f"{endpoint.identity}.lock"

@@ -26,6 +26,7 @@ _REAL_KINDS = "fiu"
 class Service(ABC):
     """Answers messages with a policy, one message at a time over all connections.
 
+    Subclasses define `handle`, in which they call `begin` for a new episode, `hear` and `act`.
     Whatever it raises goes to the client as a traceback.
 
     Args:
@@ -35,7 +36,7 @@ class Service(ABC):
         max_request_bytes: size limit of a message; by default, that of the longest video (1187
             steps; an episode of the challenge may have 1500) with the pictures and depth of two
             cameras.
-        policy: of the episode, if there is one.
+        policy: of the episode; None between episodes.
         said: what it heard last.
     """
 
@@ -97,11 +98,11 @@ def read_array(
     Args:
         message: that holds it.
         key: its name.
-        numbers: what it must hold.
+        numbers: what it must hold: bytes of pictures, or any real numbers.
         shape: with letters where any length will do, such as ``("T", 8)``.
 
     Raises:
-        ValueError: it is missing, or has another shape or type.
+        ValueError: it is missing, or has another shape or type; the client is shown the message.
     """
     array = np.asarray(message.get(key))
     if numbers == "uint8":

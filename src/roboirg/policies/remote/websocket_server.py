@@ -67,6 +67,7 @@ class WebsocketServer:
     def __init__(
         self, service: Service, metadata: Mapping[str, Any], options: ServerOptions
     ) -> None:
+        """Listen at once; answer once `serve_forever` is called."""
         self._service = service
         self._metadata = pack(metadata)
         self._options = options
@@ -89,6 +90,7 @@ class WebsocketServer:
             self._loop.call_soon_threadsafe(self._stop.set)
 
     async def _serve(self) -> None:
+        """Accept connections until `shutdown` is called."""
         async with serve(
             self._converse,
             sock=self.socket,
@@ -130,7 +132,11 @@ class WebsocketServer:
         return hmac.compare_digest(authorization.encode(), expected.encode())
 
     async def _converse(self, connection: ServerConnection) -> None:
-        """Send the metadata, then reply to each message until the client or an error ends it."""
+        """Send the metadata, then reply to each message until the client or an error ends it.
+
+        An idle or slow client ends it after `timeout_s`; after an error, its traceback is the last
+        reply.
+        """
         service = self._service.connection()
         timeout_s = self._options.timeout_s
         with contextlib.ExitStack() as ends, contextlib.suppress(ConnectionClosed, TimeoutError):
@@ -151,7 +157,10 @@ class WebsocketServer:
 
 
 def _answer(service: Service, data: bytes | str) -> bytes | str:
-    """Return the reply to a message in bytes, or the traceback of an error as a text."""
+    """Return the reply to a message in bytes, or the traceback of an error as a text.
+
+    Runs in the policy's thread. The last line of the text is the error in one sentence.
+    """
     try:
         if isinstance(data, str):
             raise TypeError("Messages must be binary, not text.")

@@ -1,6 +1,6 @@
 """All goals of a task as a JSON schema, and the goal of an answer.
 
-An answer has a field for each slot of a goal, such as ``{"color": "red", "times": 3}``. Where a
+An answer has a field for each slot of a goal, such as ``{"color": "red", "repeats": 3}``. Where a
 goal counts cubes by color, each color is a field: ``{"blue": 0, "green": 2, "red": 1}``.
 
 The names of the slots and all their values come from the goals of the task's training scenes.
@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from roboirg.core.episode import Goal
 from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES
-from roboirg.tasks import get_task
+from roboirg.tasks import Task, get_task
 from roboirg.tasks.splits.splits import split_episodes
 from roboirg.util.reply_reading import UnparsableReplyError, json_object, whole_number
 
@@ -49,7 +49,10 @@ class Field:
         return isinstance(self.values[0], int)
 
     def schema(self) -> dict[str, Any]:
-        """Return the JSON schema of the field."""
+        """Return the JSON schema of the field.
+
+        ``{"type": "string", "enum": ["blue", "green", "red"]}``; a list has one as its ``items``.
+        """
         kind = "integer" if self.is_number else "string"
         item: dict[str, Any] = {"type": kind, "enum": list(self.values)}
         if self.lengths is None:
@@ -101,7 +104,9 @@ class GoalSchema:
         return object_schema(properties)
 
     def read(self, text: str) -> Goal:
-        """Return the goal that a reply names in a JSON object.
+        """Return the goal that a reply names in a JSON object, perhaps with other words around it.
+
+        ``'I think {"color": "Red", "repeats": "3"}'`` -> the goal *red, three times*.
 
         Raises:
             UnparsableReplyError: it names none; the message, which the model gets, says why.
@@ -140,20 +145,17 @@ def goal_schema(task: str) -> GoalSchema:
     """Return the form of an answer that names a goal of a task, and all goals by their answers.
 
     The goals are those of the training split. Answers with colors that are counted have a field for
-    each color; a goal has no entry for a color that it does not want, so 0 is filled in.
+    each color; a goal has no entry for a color that it does not want, so 0 is filled in: *two red*
+    -> ``{"blue": 0, "green": 0, "red": 2}``.
     """
     known_task = get_task(task)
-    goals: dict[Goal, None] = {}  # a set that keeps its order
-    for episode in split_episodes([known_task.name], ["train"]):
-        goals.update(dict.fromkeys(known_task.goals(episode.scene)))
-
-    short_answers = {goal: _answer(goal) for goal in goals}
+    short_answers = {goal: _answer(goal) for goal in _training_goals(known_task)}
     names = max(short_answers.values(), key=len)  # the longest answer has all fields
-    absent = dict.fromkeys(names, 0)
+    zeros = dict.fromkeys(names, 0)
     answers: list[dict[str, Any]] = []
     goals_by_answer: dict[str, Goal] = {}
     for goal, short_answer in short_answers.items():
-        answer = absent | dict(short_answer)
+        answer = zeros | dict(short_answer)
         answers.append(answer)
         goals_by_answer[_canonical(answer)] = goal
 
@@ -164,8 +166,19 @@ def goal_schema(task: str) -> GoalSchema:
     return GoalSchema(tuple(fields), goals_by_answer, known_task.things.colored)
 
 
+def _training_goals(task: Task) -> Iterable[Goal]:
+    """Return all goals of the scenes of the training split, each once, in order of appearance."""
+    goals: dict[Goal, None] = {}  # a set that keeps its order
+    for episode in split_episodes([task.name], ["train"]):
+        goals.update(dict.fromkeys(task.goals(episode.scene)))
+    return goals
+
+
 def _answer(goal: Goal) -> Answer:
-    """Return the answer that names a goal; of counted colors, those that it names."""
+    """Return the answer that names a goal; of counted colors, those that it names.
+
+    *Two red* -> ``{"red": 2}``; *red, three times* -> ``{"color": "red", "repeats": 3}``.
+    """
     slots = goal.as_mapping()
     if "counts" in slots:
         return dict(goal.amounts)

@@ -50,7 +50,7 @@ def question_texts(
 
     Args:
         prompts: with the entries of ``listener.toml``.
-        schema: of the task.
+        schema: of the task's goals.
         instruction: everything that was said.
         steps: control steps of the video; 0 without one.
         reasoning: meaning of the field in which the model may think; None without it.
@@ -69,7 +69,10 @@ def question_texts(
 
 
 def _describe_fields(prompts: Prompts, schema: GoalSchema, reasoning: str | None) -> Iterator[str]:
-    """Yield a line for each field of the answer: its name, its meaning and its values."""
+    """Yield a line for each field of the answer: its name, its meaning and its values.
+
+    The field in which to think comes first, if `reasoning` gives its meaning.
+    """
     if reasoning is not None:
         yield f"- reasoning: {reasoning}"
     for field in schema.fields:

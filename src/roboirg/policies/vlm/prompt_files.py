@@ -32,7 +32,7 @@ class Prompts:
     origin: str
 
     def __getitem__(self, name: str) -> Template:
-        """Return the text of a name; a dot descends into a table.
+        """Return the text of a name as a template; a dot descends into a table: ``"values.one"``.
 
         Raises:
             InvalidValueError: the file has no such text.
@@ -72,7 +72,7 @@ class Prompts:
 
 
 def load_prompts(name: str, file: str | None = None) -> Prompts:
-    """Load our own prompts of a name, or those of a file with the same entries in their place.
+    """Load our own prompts of a name, or those of a user's `file` that has the same entries.
 
     Raises:
         InvalidValueError: the file cannot be read or is not TOML.

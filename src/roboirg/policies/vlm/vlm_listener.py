@@ -71,6 +71,7 @@ class VLMNamer:
     def __init__(
         self, options: ListenerOptions, connect: Callable[[ModelOptions], Model] = make_model
     ) -> None:
+        """Load the prompts; the model is connected at the first query."""
         self.options = options
         self.demonstration_frames: int | str = options.frames_every
         if not options.pictures:
@@ -133,7 +134,7 @@ class VLMNamer:
         return ModelQuery(texts.system, (turn,), schema.schema(reasoning))
 
     def _video(self, demonstration: Demonstration, steps: int) -> tuple[Part, ...]:
-        """Return the demonstration, of so many control steps, as a clip; none without one."""
+        """Return the demonstration, of `steps` control steps, as a clip in a tuple, or no clip."""
         if not steps:
             return ()
         frames = demonstration[f"{CAMERA}_rgb"]
@@ -162,6 +163,7 @@ class VLMListener(ScriptedPolicy):
         seed: int = 0,
         connect: Callable[[ModelOptions], Model] = make_model,
     ) -> None:
+        """Make the namer, whose needs of pictures and video become this policy's."""
         super().__init__(seed)
         self.namer = VLMNamer(options, connect)
         self.options = options
@@ -199,7 +201,10 @@ class VLMListener(ScriptedPolicy):
         super().reset(instruction, demonstration)
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
-        """Return the goal that the model names; None if it names none, or one not in this scene."""
+        """Return the goal that the model names; None if it names none, or one not in this scene.
+
+        Called once an episode, when all has been said. Keeps the goal for the records in any case.
+        """
         given = SaidAndShown(
             task=env.episode.task,
             text=instruction,

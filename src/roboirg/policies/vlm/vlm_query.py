@@ -16,7 +16,7 @@ from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, ModelReply, make_model
 from roboirg.policies.vlm.models.model import tokens_of
 from roboirg.policies.vlm.models.reply_store import ReplyStore, current_store, digest
-from roboirg.util.reply_reading import UnparsableReplyError, answer_of
+from roboirg.util.reply_reading import UnparsableReplyError, answer_of, check_whole
 
 Value = TypeVar("Value")
 
@@ -54,7 +54,13 @@ class VLMQuery:
     def ask(self, query: ModelQuery, parse: Callable[[str], Value]) -> Value | None:
         """Return the parsed answer of the model; None if `parse` rejects `TRIES` answers.
 
-        After a rejected one the model is asked again, with the answer and why it was rejected.
+        After a rejected one the model is asked again, with the answer and why it was rejected, as
+        further turns of the conversation.
+
+        Args:
+            query: to send first.
+            parse: returns what an answer means; raises UnparsableReplyError with words for the
+                model.
 
         Raises:
             PolicyConnectionError: the service cannot be reached or is overloaded.
@@ -63,8 +69,10 @@ class VLMQuery:
             BudgetError: the run has spent what it may.
         """
         for _ in range(TRIES):
-            answer = answer_of(self._request(query).text)
+            reply = self._request(query).text
+            answer = answer_of(reply)
             try:
+                check_whole(reply)
                 return parse(answer)
             except UnparsableReplyError as error:
                 rejected = ChatTurn("model", (answer or SILENCE,))
@@ -121,6 +129,8 @@ class VLMQuery:
         """Return the stored reply to a query, or send it and store the reply.
 
         A new reply is stored before anything sees it, so that an interrupted run repeats nothing.
+        Either way the store's number of calls goes up by one: it must count the same when the
+        episode is played again.
         """
         store = current_store()
         if store is None:
@@ -139,10 +149,10 @@ class VLMQuery:
         return reply
 
     def _send(self, query: ModelQuery, store: ReplyStore | None) -> ModelReply:
-        """Send a query until there is a reply.
+        """Send a query until there is a reply, and return it.
 
         It is sent again while the service is busy, for `patience_s` in all, and `retries` times if
-        it cannot be reached. Any other error is raised.
+        it cannot be reached. Any other error is raised at once.
 
         Args:
             query: for the model.

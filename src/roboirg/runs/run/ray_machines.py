@@ -117,8 +117,10 @@ class MachineAgent:
     """
 
     def __init__(self, folder: Path, settings: HostSettings | None) -> None:
-        for pid_file in folder.glob(f"*{_PID_SUFFIX}"):
-            self.end(int(pid_file.stem))  # Ray does not kill what is frozen
+        # In a folder of another user the numbers could be those of any process.
+        if folder.is_dir() and folder.lstat().st_uid == os.getuid():
+            for pid_file in folder.glob(f"[0-9]*{_PID_SUFFIX}"):
+                self.end(int(pid_file.stem))  # Ray does not kill what is frozen
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(mode=0o700)
         _register(folder)

@@ -54,7 +54,7 @@ def draw_number(rng: np.random.Generator, bounds: Bounds) -> int:
 def counted_goals(scene: Scene, kind: ObjectKind, most: int) -> tuple[Goal, ...]:
     """Return a goal for every object of a kind, by color, for once to `most` times.
 
-    A red cube, at most twice -> *red once* and *red twice*.
+    A red cube, at most twice -> *red once* and *red twice*, ``Goal.of(color="red", repeats=2)``.
     """
     return goals_by_color(scene, kind, "repeats", range(1, most + 1))
 
@@ -62,7 +62,11 @@ def counted_goals(scene: Scene, kind: ObjectKind, most: int) -> tuple[Goal, ...]
 def goals_by_color(
     scene: Scene, kind: ObjectKind, slot: str, values: Iterable[SlotValue]
 ) -> tuple[Goal, ...]:
-    """Return a goal for every object of a kind, by color, with each value of another slot."""
+    """Return a goal for every object of a kind, by color, with each value of another slot.
+
+    A slot is a named part of a goal. A red cube, slot ``"relation"``, values ``("before",
+    "after")`` -> ``Goal.of(color="red", relation="before")`` and the same with ``"after"``.
+    """
     goals: list[Goal] = []
     for item in scene.of_kind(kind):
         goals += [Goal.of(color=str(item.color), **{slot: value}) for value in values]
@@ -86,7 +90,7 @@ class ButtonAndCubes(NamedTuple):
 
 
 def draw_button(rng: np.random.Generator, region: Region, name: str = "button") -> SceneObject:
-    """Draw a button anywhere in the region; it is placed first and needs no clearance."""
+    """Draw a button with its center in the region; it is placed first and needs no clearance."""
     x, y = region.draw(rng)
     return SceneObject(name, "button", Point(x, y, object_sizes.BUTTON_HEIGHT))
 
@@ -112,8 +116,9 @@ def cube_obstacle(cube: SceneObject) -> Rectangle | Line:
     """Return what keeps later objects away from a cube: its square, or a line instead.
 
     RoboMME fits a box to each cube and projects the box's first two axes; rounding decides which
-    axes these are. For every other cube one of them is vertical, and only a line through the
-    middle of two sides remains. Here the digits of the yaw decide.
+    axes these are. For every other cube one of them is vertical, and only a line through the middle
+    of two sides remains. Here the cube's yaw in whole millionths of a radian, modulo 4, chooses one
+    of `LINE_TURNS`, two of which stand for the square.
     """
     turn = LINE_TURNS[int(cube.yaw * YAW_DIGITS) % len(LINE_TURNS)]
     if turn is None:
@@ -132,7 +137,8 @@ def draw_cube(
 ) -> SceneObject:
     """Draw a cube that lies in the region, with any yaw, at least `gap` meters from all obstacles.
 
-    Draws again until there is room; see `placed`.
+    Draws place and yaw, in this order, again until there is room. Raises SceneRejectedError after
+    256 draws without any.
     """
 
     def draw() -> SceneObject:
@@ -150,7 +156,10 @@ def draw_cubes(
     gap: float,
     obstacles: Sequence[Obstacle],
 ) -> list[SceneObject]:
-    """Draw the planned cubes one after the other, each away from those before it."""
+    """Draw the planned cubes one after the other, each away from those before it.
+
+    Returns them in the order of `plans`. `gap` is in meters; `obstacles` is not changed.
+    """
     taken = list(obstacles)
     drawn: list[SceneObject] = []
     for plan in plans:
@@ -180,9 +189,14 @@ def draw_button_and_cubes(
     gap: float,
     button_region: Region = BUTTON_REGION,
 ) -> ButtonAndCubes:
-    """Draw a button, then `CUBES` away from it as `draw_colored_cubes` does.
+    """Draw a button, then one cube or three of different colors around it.
 
-    `region` and `gap` are those of the cubes.
+    Args:
+        rng: the button is drawn first.
+        difficulty: decides the number of cubes.
+        region: of the cubes.
+        gap: between a cube and what was drawn before, m.
+        button_region: of the button's center.
     """
     button = draw_button(rng, button_region)
     keep_out = button_keep_out(button)
@@ -202,7 +216,8 @@ def draw_target(
 ) -> SceneObject:
     """Draw a target disc of `radius` meters, at least `gap` meters from all obstacles.
 
-    Draws again until there is room; see `placed`.
+    Draws again until there is room; raises SceneRejectedError after 256 draws without any. `rgb`,
+    each from 0 to 1, is the color of its rings; None for the usual one.
     """
 
     def draw() -> SceneObject:
@@ -221,7 +236,10 @@ def draw_targets(
     obstacles: Sequence[Obstacle],
     rgb: tuple[float, float, float] | None = None,
 ) -> list[SceneObject]:
-    """Draw a target disc in each region, by its name, away from those before it."""
+    """Draw a target disc in each region, away from those before it; the keys name the discs.
+
+    Returns them in the order of `regions`. `radius` and `gap` are in meters, `rgb` is from 0 to 1.
+    """
     taken = list(obstacles)
     targets: list[SceneObject] = []
     for name, region in regions.items():
@@ -242,10 +260,14 @@ def marker_over(target: SceneObject, name: str) -> SceneObject:
 def draw_bin(
     rng: np.random.Generator, region: Region, obstacles: Sequence[Obstacle]
 ) -> SceneObject:
-    """Draw a bin whose center is in the region and whose walls touch no obstacle."""
+    """Draw a bin whose center is in the region and whose walls touch no obstacle.
+
+    It is turned by at most `BIN_YAW` to either side. Draws again until there is room; see `placed`.
+    """
 
     def draw() -> SceneObject:
         x, y = region.draw(rng)
+        # Uniform, to either side.
         yaw = (2.0 * rng.random() - 1.0) * BIN_YAW
         position = Point(x, y, object_sizes.BIN_HEIGHT / 2)
         return SceneObject("bin", "bin", position, yaw)

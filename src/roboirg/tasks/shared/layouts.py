@@ -23,9 +23,10 @@ PATTERNS: dict[int, tuple[tuple[PlanePoint, ...], ...]] = {3: (TRIANGLE, LINE), 
 
 
 def layout_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ...]:
-    """Draw a pattern of `count` points, turned about the origin by any angle of the full circle.
+    """Draw a pattern of three or four points, turned about the origin by any angle.
 
-    The order of the points is that of the pattern; it decides which object stands where.
+    Returns `count` points (x, y) in meters. Their order is that of the pattern; it decides which
+    object stands where.
     """
     pattern = draw(rng, PATTERNS[count])
     angle = 2.0 * math.pi * rng.random()

@@ -28,7 +28,9 @@ def draw_regions(
 ) -> dict[Color, Region]:
     """Draw which of two colors is on the robot's left, and return the region of each.
 
-    The region on the right is the mirror image of that on the left.
+    `left` is the region on the left (positive y); that on the right is its mirror image.
+    ``("green", "purple")`` -> ``{"green": right, "purple": left}``, for example; keys are in the
+    order of `colors`.
     """
     right = left._replace(y=-left.y)
     on_left = shuffled(rng, colors)[0]
@@ -38,7 +40,10 @@ def draw_regions(
 
 
 def left_to_right(scene: Scene, kind: ObjectKind) -> tuple[Color, ...]:
-    """Return the colors of the objects of a kind, from the robot's left to its right."""
+    """Return the colors of the objects of a kind, from the robot's left to its right.
+
+    The robot's left is at larger y. Objects without a color are passed over.
+    """
     items = sorted(scene.of_kind(kind), key=lambda item: -item.position.y)
     return tuple(item.color for item in items if item.color is not None)
 
@@ -46,6 +51,7 @@ def left_to_right(scene: Scene, kind: ObjectKind) -> tuple[Color, ...]:
 def draw_box(rng: np.random.Generator, name: str, color: Color, region: Region) -> SceneObject:
     """Draw a box whose center is in the region; the region must keep it clear of other objects."""
     x, y = region.draw(rng)
+    # Uniform, to either side.
     yaw = (2.0 * rng.random() - 1.0) * BOX_YAW
     position = Point(x, y, object_sizes.BOX_HEIGHT / 2)
     return SceneObject(name, "box", position, yaw, color)

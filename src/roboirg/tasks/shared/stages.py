@@ -28,7 +28,11 @@ def facts_of_others(kind: FactKind, objects: Iterable[SceneObject], right: str) 
 def pick_stage(
     name: str, subgoal: str = "pick up the cube {at}", timer: str | None = None
 ) -> Stage:
-    """Return the stage in which a cube or tape is picked up."""
+    """Return the stage in which a cube or tape, given its name, is picked up.
+
+    In `subgoal`, ``{at}`` stands for the object's point in the picture. With `timer`, a clock of
+    that name starts with the stage; rules can ask for its time.
+    """
     return Stage(
         expects=Fact("picked", name),
         primitive=Primitive("pick_cube", name),
@@ -39,7 +43,7 @@ def pick_stage(
 
 
 def place_stage(name: str, place: str, subgoal: str) -> Stage:
-    """Return the stage in which a cube or tape is placed on a target."""
+    """Return the stage in which a cube or tape `name` is placed on the target `place`."""
     return Stage(
         expects=Fact("placed", name, place),
         primitive=Primitive("place_on", name, place),
@@ -49,7 +53,10 @@ def place_stage(name: str, place: str, subgoal: str) -> Stage:
 
 
 def put_down_stage(put_down: Primitive, subgoal: str, timer: str | None = None) -> Stage:
-    """Return the stage in which a cube is put down on the table by a movement."""
+    """Return the stage in which a cube is put down on the table; `put_down` is the movement.
+
+    It is complete when the cube lies on the table. With `timer`, a clock of that name starts.
+    """
     return Stage(
         expects=Fact("lying", put_down.subject),
         primitive=put_down,
@@ -59,7 +66,10 @@ def put_down_stage(put_down: Primitive, subgoal: str, timer: str | None = None) 
 
 
 def placing_stages(kind: str, color: str, repeats: int) -> list[Stage]:
-    """Return the stages in which a cube or tape is placed on the target a number of times."""
+    """Return the stages in which a cube or tape is placed on the target a number of times.
+
+    ``("cube", "red", 2)`` -> pick up ``cube_red``, place it, pick it up again, place it again.
+    """
     name = f"{kind}_{color}"
     plan: list[Stage] = []
     for ordinal in ORDINALS[:repeats]:
@@ -73,7 +83,10 @@ def placing_stages(kind: str, color: str, repeats: int) -> list[Stage]:
 def press_stage(
     subgoal: str = "press the button {at}", expects: Condition = PRESSED, button: str = "button"
 ) -> Stage:
-    """Return the stage in which a button is pressed."""
+    """Return the stage in which a button is pressed, until `expects` holds.
+
+    By default the scene has one button, and any press of it completes the stage.
+    """
     return Stage(
         expects=expects,
         primitive=Primitive("press", button),
@@ -93,7 +106,7 @@ def hold_still(steps: int) -> Stage:
 
 
 def _static(primitive: Primitive) -> Stage:
-    """Return the stage of a movement that ends at rest, and lasts as long as it says."""
+    """Return the stage of a movement that ends at rest and lasts `primitive.steps` steps."""
     return Stage(
         expects=Fact("still", "robot"),
         primitive=primitive,
@@ -103,7 +116,10 @@ def _static(primitive: Primitive) -> Stage:
 
 
 def go_home() -> Stage:
-    """Return the stage after the video in which the robot goes to the policy's start pose."""
+    """Return the stage after the video in which the robot goes to the policy's start pose.
+
+    It is played, but no part of the recorded video.
+    """
     return Stage(
         expects=Fact("home", "robot"),
         primitive=Primitive("go_home", "robot"),

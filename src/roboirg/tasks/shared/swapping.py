@@ -56,7 +56,10 @@ def plan_swaps(
 
 
 def places_at_last(scene: Scene) -> dict[str, Point]:
-    """Return where each object of a scene stands after the last swap."""
+    """Return where each object of a scene stands after all of its swaps, by name.
+
+    Swaps are applied in the scene's order; the scene itself is not changed.
+    """
     places = {item.name: item.position for item in scene.objects}
     for swap in scene.motions_of(Swap):
         _exchange(places, swap)
@@ -64,14 +67,14 @@ def places_at_last(scene: Scene) -> dict[str, Point]:
 
 
 def _exchange(places: dict[str, Point], swap: Swap) -> None:
-    """Give the two objects of a swap each other's places."""
+    """Give the two objects of a swap each other's places, by changing `places`."""
     place = places[swap.first]
     places[swap.first] = places[swap.second]
     places[swap.second] = place
 
 
 def last_step(motions: Iterable[Motion]) -> int:
-    """Return the step at which the last swap is complete; 0 if there is none."""
+    """Return the control step at which the last swap is complete; 0 if no motion is a swap."""
     last = 0
     for motion in motions:
         if isinstance(motion, Swap):
@@ -80,7 +83,10 @@ def last_step(motions: Iterable[Motion]) -> int:
 
 
 def nearest(places: dict[str, Point], name: str) -> str:
-    """Return the object nearest to a named one in the plane."""
+    """Return the name of the object nearest to the named one, by distance in the plane.
+
+    `places` has all objects' places by name. Of two at the same distance, the first is returned.
+    """
     here = places[name]
 
     def distance(other: str) -> float:

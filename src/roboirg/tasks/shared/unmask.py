@@ -41,9 +41,10 @@ GAP = 0.04
 def sample(
     rng: np.random.Generator, difficulty: Difficulty, buttons: Sequence[SceneObject] = ()
 ) -> SceneAndGoal:
-    """Draw containers that stay in their places, three over a cube; the first are to be lifted.
+    """Draw containers that stay in their places, three of them over a cube.
 
-    `buttons` are on the table already, and keep containers away.
+    The goal is the containers over the first cube, in hard episodes over the first two. `buttons`
+    are on the table already, and keep containers away.
     """
     regions = [REGION] * CONTAINERS[difficulty]
     obstacles = [button_keep_out(button) for button in buttons]
@@ -57,7 +58,10 @@ def sample(
 
 
 def goal_of(cubes: Sequence[SceneObject]) -> Goal:
-    """Return the goal of lifting the containers over some cubes, in order."""
+    """Return the goal of lifting the containers over some cubes, in order.
+
+    The red cube, then the blue one -> ``Goal.of(colors=("red", "blue"))``.
+    """
     return Goal.of(colors=tuple(str(cube.color) for cube in cubes))
 
 
@@ -67,10 +71,11 @@ def draw_containers_in(
     gap: float,
     obstacles: Sequence[Footprint] = (),
 ) -> list[SceneObject]:
-    """Draw a container in each region, until one has no free place.
+    """Draw a container in each region, until one has no free place; the rest are left out.
 
     As in RoboMME, the gap in meters counts twice: around the new container and around each placed
-    one.
+    one. Returns ``container_0``, ``container_1`` and so on. For each, the place is drawn first,
+    then the yaw.
     """
     taken = list(obstacles)
     containers: list[SceneObject] = []
@@ -89,7 +94,7 @@ def draw_containers_in(
 def _free_spot(
     rng: np.random.Generator, region: Region, gap: float, obstacles: Sequence[Footprint]
 ) -> PlanePoint | None:
-    """Draw where a container can stand in a region; None without a free place."""
+    """Draw where a container can stand in a region (x, y; meters); None without a free place."""
 
     def draw() -> PlanePoint:
         return region.draw(rng, inset=object_sizes.CONTAINER_HALF)
@@ -103,7 +108,11 @@ def _free_spot(
 def hide_cubes(
     rng: np.random.Generator, containers: Sequence[SceneObject]
 ) -> tuple[SceneObject, ...]:
-    """Draw a red, a green and a blue cube, in random order under the first three containers."""
+    """Draw a red, a green and a blue cube, in random order under the first three containers.
+
+    Returns the cubes in the order of the containers. Raises SceneRejectedError with fewer than
+    three.
+    """
     if len(containers) < len(COLORS):
         raise SceneRejectedError("fewer than three containers fit")
     pairs = zip(shuffled(rng, COLORS), containers, strict=False)
@@ -111,14 +120,17 @@ def hide_cubes(
 
 
 def hidden_cube(color: Color, container: SceneObject) -> SceneObject:
-    """Return the cube of a color under a container."""
+    """Return the cube of a color that stands under a container, which its `inside` names."""
     x, y, _ = container.position
     position = Point(x, y, object_sizes.HIDDEN_CUBE_HALF)
     return SceneObject(f"cube_{color}", "hidden_cube", position, 0.0, color, container.name)
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Return a goal for every hidden cube, and for every two of them in order."""
+    """Return a goal for every hidden cube, and for every two of them in order.
+
+    Three cubes give nine goals: *red*, *green*, …, *red then green*, *green then red*, …
+    """
     cubes = scene.of_kind("hidden_cube")
     choices = [*itertools.permutations(cubes, 1), *itertools.permutations(cubes, 2)]
     return tuple(goal_of(choice) for choice in choices)
@@ -128,7 +140,7 @@ def pick_stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Return the stages: lift the container over each goal cube in turn, put it down in between.
 
     Red, then blue -> lift the container over the red cube, put it down, lift that over the blue
-    one, which stays in the hand.
+    one, which stays in the hand. Lifting any other container is forbidden: it fails the episode.
     """
     container_over = {str(cube.color): str(cube.inside) for cube in scene.of_kind("hidden_cube")}
     containers = scene.of_kind("container")
@@ -150,7 +162,10 @@ def pick_stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 def _put_down(held: str, containers: Sequence[SceneObject]) -> Stage:
-    """Return the stage in which the container in the hand is put down."""
+    """Return the stage in which the container in the hand, named `held`, is put down.
+
+    Meanwhile, lifting any other one fails the episode.
+    """
     return Stage(
         expects=Fact("put_down", held),
         forbids=facts_of_others("lifted", containers, held),

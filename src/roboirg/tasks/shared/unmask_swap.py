@@ -44,8 +44,10 @@ def sample(
 ) -> SceneAndGoal:
     """Draw hidden cubes, swaps and goal for containers that have been placed.
 
-    The cubes are out of the world while the containers move, and return under their own ones. As in
-    RoboMME, two swaps may cancel out.
+    The order of the draws decides which scene a seed gives: the order of the first three
+    containers, the cubes under them, the containers that swap, the number of picks. The cubes are
+    out of the world while the containers move, and return under their own ones. As in RoboMME, two
+    swaps may cancel out.
     """
     covers = shuffled(rng, containers[: len(COLORS)])
     cubes = hide_cubes(rng, covers)
@@ -63,7 +65,8 @@ def plan_motions(
 ) -> tuple[Motion, ...]:
     """Return all motions: containers appear and swap, the cubes under them are away meanwhile.
 
-    `initiators` are the names of the containers that start a swap, in order.
+    `initiators` are the names of the containers that start a swap, in order; each changes places
+    with the nearest other container.
     """
     swaps = plan_swaps(containers, initiators, start=START, lane=LANE)
     end = last_step(swaps)
@@ -78,7 +81,7 @@ def _draw_initiators(
     """Draw the names of the containers that start a swap: two with a cube, then any other one.
 
     Three are drawn always, and as many of them returned as there are swaps, so that the number of
-    swaps changes no draw.
+    swaps changes no later draw.
     """
     swap_count = draw_number(rng, SWAPS[difficulty])
     names = [container.name for container in containers]

@@ -60,6 +60,7 @@ def draw_table(
     """Draw site, button, cubes of different colors and target discs, and choose one of the cubes.
 
     The site is the round place for the cube at the end of the video; its radius is in meters.
+    `discs` is the number of target discs.
     """
     site = _draw_site(rng, site_radius)
     placed = draw_button_and_cubes(rng, difficulty, WORK_REGION, GAP, BUTTON_REGION)
@@ -82,9 +83,10 @@ def _draw_site(rng: np.random.Generator, radius: float) -> SceneObject:
 def draw_scene(
     rng: np.random.Generator, difficulty: Difficulty, table: PlaceTable, past: tuple[Fact, ...]
 ) -> Scene:
-    """Return a table with what its video shows; in hard episodes, draw the two discs that swap.
+    """Return the scene of a table and the acts of its video; in hard episodes two discs swap.
 
-    `past` are the acts of the video, in order.
+    `past` are the acts of the video, in order, as facts: *placed cube_red on target_0*, *pressed*.
+    Only in hard episodes is anything drawn: which two discs change places.
     """
     if difficulty != "hard":
         return Scene(table.objects, past=past)
@@ -94,7 +96,11 @@ def draw_scene(
 
 
 def plan_swap(first: str, second: str, others: Sequence[str], past: Sequence[Fact]) -> Swap:
-    """Return the swap of two discs at the end of the video, while the others stay."""
+    """Return the swap of two discs at the end of the video, while the `others` stay.
+
+    It starts with the video's holding stage, whose number follows from the acts of the video,
+    `past`.
+    """
     kinds = [stage.primitive.kind for stage in _demonstration_of(past)]
     hold = kinds.index("hold")
     return Swap(
@@ -109,7 +115,10 @@ def plan_swap(first: str, second: str, others: Sequence[str], past: Sequence[Fac
 
 
 def visited(scene: Scene) -> tuple[str, ...]:
-    """Return the names of the discs on which the video shows the cube placed, in order."""
+    """Return the names of the discs on which the video shows the cube placed, in order.
+
+    ``("target_2", "target_0")``, for example; the site where it ends is not among them.
+    """
     return tuple(str(fact.place) for fact in scene.past if fact.kind == "placed")
 
 
@@ -151,7 +160,8 @@ def _demonstration_of(past: Sequence[Fact]) -> tuple[Stage, ...]:
 def place_stages(scene: Scene, color: str, answer: str) -> tuple[Stage, ...]:
     """Return the stages: pick the cube of a color, and place it on the right disc only.
 
-    `answer` is the name of that disc.
+    `answer` is the name of that disc. Picking another cube, or placing it on another disc, fails
+    the episode.
     """
     cube = f"cube_{color}"
     discs = [item.name for item in scene.of_kind("target")]

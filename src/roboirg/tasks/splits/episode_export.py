@@ -12,10 +12,10 @@ from roboirg.util.atomic_write import write_atomically
 
 
 def episode_row(episode: Episode) -> dict[str, Json]:
-    """Return an episode as JSON values.
+    """Return an episode as JSON values, one line of an exported file.
 
     Positions are meters in the world frame, angles radians, steps 1/20 s. `motions` and `past` name
-    their type; what has its default value is left out there.
+    their type; fields with their default value are left out there.
     """
     scene = episode.scene
     return {

@@ -40,7 +40,8 @@ def plain(value: object) -> Plain:
     """Convert nested dataclasses and named tuples to data for JSON, with their type names.
 
     ``Fact("pressed", "button")`` -> ``{"type": "Fact", "kind": "pressed", "subject": "button",
-    "place": None}``. Any change of the outcome changes every hash in ``splits.json``.
+    "place": None}``. Any change of what this returns changes every hash in ``splits.json``. Named
+    tuples must come before tuples: they are tuples, too.
     """
     if type(value) is float:
         return round(value, DECIMALS)

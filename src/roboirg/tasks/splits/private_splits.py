@@ -32,19 +32,26 @@ class MissingSaltError(InvalidValueError):
 
 
 def use_salt(salt: str) -> Split:
-    """Give a salt to this process and its children; return the name of its split."""
+    """Give a salt, the secret of a private split, to this process and its children.
+
+    Sets the environment variable `SALT_VARIABLE`. Returns the name of the split,
+    ``"random@1a2b3c4d5e6f"``. Raises InvalidValueError if the salt is short.
+    """
     name = _split_of(salt)
     os.environ[SALT_VARIABLE] = salt
     return name
 
 
 def known_salt() -> str | None:
-    """Return the salt that this process was given."""
+    """Return the salt that this process was given; None without any."""
     return os.environ.get(SALT_VARIABLE) or None
 
 
 def drawn_split(split: str) -> str:
-    """Return the split that is meant: if a salt is known, ``random`` is the private split of it."""
+    """Return the split that is meant: if a salt is known, ``random`` is the private split of it.
+
+    With a salt, ``"random"`` -> ``"random@1a2b3c4d5e6f"``; every other name stays as it is.
+    """
     salt = known_salt()
     if salt is None or split != RANDOM:
         return split
@@ -52,12 +59,15 @@ def drawn_split(split: str) -> str:
 
 
 def is_private(split: str) -> bool:
-    """Return whether a name is that of a private split."""
+    """Return whether a name is that of a private split, such as ``"random@1a2b3c4d5e6f"``."""
     return _NAME.fullmatch(split) is not None
 
 
 def check_salt(split: str) -> None:
-    """Check that this process can draw the episodes of a split; it can those of public ones."""
+    """Raise MissingSaltError if this process cannot draw the episodes of a split.
+
+    Those of a private split need its salt in the environment; public ones need nothing.
+    """
     if not is_private(split):
         return
     salt = known_salt()
@@ -70,7 +80,11 @@ def check_salt(split: str) -> None:
 
 
 def private_seed(task: str, split: Split, index: int, passed_over: int) -> int:
-    """Return the seed to try for a private episode after some that give no scene."""
+    """Return the seed to try for a private episode after `passed_over` seeds that give no scene.
+
+    A hash keyed with the salt, 48 bits, above all public seeds: who lacks the salt cannot predict
+    it.
+    """
     check_salt(split)
     message = f"{task}/{index}/{passed_over}".encode()
     digest = hmac.digest(_key(os.environ[SALT_VARIABLE]), message, "sha256")
@@ -78,6 +92,7 @@ def private_seed(task: str, split: Split, index: int, passed_over: int) -> int:
 
 
 def _split_of(salt: str) -> Split:
+    """Return the name of a salt's private split: ``random@``, then 12 digits of a keyed hash."""
     name = hmac.digest(_key(salt), b"name", "sha256").hex()
     return f"{RANDOM}@{name[:12]}"
 

@@ -43,7 +43,10 @@ class PublishedEpisode(NamedTuple):
 
 
 def published_episode(task: str, split: str, index: int) -> PublishedEpisode | None:
-    """Return an episode, or None if RoboMME has none there: it is sampled."""
+    """Return an episode that RoboMME has published, or None if it has none of that number.
+
+    None means for the caller: sample the episode instead.
+    """
     line = _lines().get(_Key(task, split, index))
     if line is None:
         return None
@@ -57,13 +60,20 @@ def published_episode(task: str, split: str, index: int) -> PublishedEpisode | N
 
 
 def published_goals(task: str) -> tuple[Goal, ...]:
-    """Return the goals of all published episodes of a task, in the order of the file."""
+    """Return the goals of all published episodes of a task, in the order of the file.
+
+    Equal goals are repeated, one for each episode.
+    """
     lines = (line for key, line in _lines().items() if key.task == task)
     return tuple(cast("Goal", decode(json.loads(line)["goal"])) for line in lines)
 
 
 def published_text() -> str:
-    """Return the text of the shipped file, checked."""
+    """Return the text of the shipped file, one JSON object a line.
+
+    Raises:
+        RoboIRGError: the file's hash is another one: it is damaged.
+    """
     packed = resources.files("roboirg.tasks.splits").joinpath(FILE).read_bytes()
     text = gzip.decompress(packed).decode()
     found = hashlib.sha256(text.encode()).hexdigest()

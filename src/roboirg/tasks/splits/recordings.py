@@ -65,6 +65,7 @@ contacts between crowded cubes go another way. The scripted expert plans their v
 
 
 def _file(task: str, split: str) -> Traversable:
+    """Return the place of a split's archive, ``VideoRepick-train.npz``; there need not be one."""
     return resources.files("roboirg.tasks.splits").joinpath(FOLDER, f"{task}-{split}.npz")
 
 

@@ -35,10 +35,11 @@ class FieldValue(NamedTuple):
 
 
 def encode(value: object) -> Json:
-    """Return a scene, a goal or a part of one as JSON values.
+    """Return a scene, a goal or a part of one as JSON values; `decode` is the way back.
 
-    ``Point(0.1, 0.0, 0.02)`` -> ``{"type": "Point", "x": 0.1, "y": 0.0, "z": 0.02}``. The order of
-    the cases matters: a named tuple such as `Point` is a tuple, too.
+    ``Point(0.1, 0.0, 0.02)`` -> ``{"type": "Point", "x": 0.1, "y": 0.0, "z": 0.02}``. Fields with
+    their default value are left out. The order of the cases matters: a named tuple such as `Point`
+    is a tuple, too.
     """
     if type(value) is float:
         return round(value, DECIMALS) + 0.0  # which makes 0 of -0
@@ -56,7 +57,7 @@ def encode(value: object) -> Json:
 
 
 def decode(value: Json) -> object:
-    """Return what `encode` was given, floats rounded."""
+    """Return what `encode` was given, floats rounded to `DECIMALS`; lists become tuples."""
     if isinstance(value, dict):
         fields = {name: decode(field) for name, field in value.items() if name != _TYPE}
         return _TYPES[str(value[_TYPE])](**fields)
@@ -66,7 +67,7 @@ def decode(value: Json) -> object:
 
 
 def fields_of(value: object) -> Iterator[FieldValue]:
-    """Yield the fields of a dataclass or named tuple; nothing for other values."""
+    """Yield the fields of a dataclass or named tuple in their order; nothing for other values."""
     if dataclasses.is_dataclass(value):
         for field in dataclasses.fields(value):
             yield FieldValue(field.name, getattr(value, field.name), field.default)

@@ -62,13 +62,19 @@ class TaskSplits(NamedTuple):
 
 
 def slot_seed(task: Task, split: Split, index: int) -> int:
-    """Return the first seed to try for a sampled episode."""
+    """Return the first seed to try for a sampled episode of a public split.
+
+    The next `MAX_REJECTED` seeds also belong to this episode, in case the first ones give no scene.
+    """
     base, by_code = BASE_SEEDS[split]
     return base + by_code * task.code + SEED_STRIDE * index
 
 
 def slot_difficulty(index: int) -> Difficulty:
-    """Return the difficulty of a sampled episode; all splits share the cycle."""
+    """Return the difficulty of sampled episode number `index`; all splits share the cycle.
+
+    Episodes 0 to 3 -> easy, easy, medium, hard; then again.
+    """
     return CYCLE[index % len(CYCLE)]
 
 
@@ -78,13 +84,18 @@ def slot_key(split: Split, index: int) -> str:
 
 
 def check_split(split: str) -> Split:
-    """Return the name as a split whose episodes this process can draw."""
+    """Return the name as a split whose episodes this process can draw, or raise an error.
+
+    Raises:
+        UnknownNameError: there is no such split.
+        MissingSaltError: it is private, and its salt is not known here.
+    """
     check_salt(split)
     return split if is_private(split) else known_name("split", split, tuple(SIZES))
 
 
 def split_size(split: str) -> int:
-    """Return the number of episodes in a split."""
+    """Return the number of episodes in a split: ``"test"`` -> 50, a private split -> 1,000,000."""
     checked = check_split(split)
     return SIZES[RANDOM if is_private(checked) else checked]
 
@@ -97,7 +108,10 @@ def check_fixed_split(split: str) -> Split:
 def make_episode(
     task_name: str, seed: int, difficulty: Difficulty, split: Split = "random", index: int = 0
 ) -> Episode:
-    """Make the episode of a seed, whether or not it belongs to a split."""
+    """Make the episode of a seed, whether or not it belongs to a split.
+
+    `split` and `index` only label it. Raises SceneRejectedError if the seed gives no scene.
+    """
     task = get_task(task_name)
     scene, goal = task.sample(np.random.default_rng(seed), difficulty)
     return assemble_episode(task, seed, difficulty, scene, goal, split=split, index=index)
@@ -114,7 +128,11 @@ def assemble_episode(
     index: int,
     recorded: bool = False,
 ) -> Episode:
-    """Return the episode of a scene and a goal, with the stages that follow from them."""
+    """Return the episode of a scene and a goal, with the stages that follow from them.
+
+    `recorded` says that its video is played from a shipped recording. Raises InvalidValueError if
+    the task's stages name a fact that can never hold in the scene.
+    """
     stages = task.stages(scene, goal)
     demonstration = task.demonstration(scene)
     check_stages(task.name, scene, (*demonstration, *stages))
@@ -141,7 +159,7 @@ def shipped_splits() -> Mapping[str, TaskSplits]:
 
 
 def splits_text(splits: Mapping[str, TaskSplits]) -> str:
-    """Return the text of ``splits.json``: JSON with a line for each task."""
+    """Return the text of ``splits.json``: JSON with a line for each task; see `shipped_splits`."""
     lines: list[str] = []
     for task, entry in splits.items():
         numbers = json.dumps(entry._asdict())
@@ -167,20 +185,28 @@ def get_episode(task_name: str, split: str, index: SupportsIndex) -> Episode:
 
 
 def split_episodes(tasks: Iterable[str], splits: Iterable[Split]) -> Iterator[Episode]:
-    """Yield all episodes of tasks in splits."""
+    """Yield all episodes of tasks in splits: task by task, and for each split by split."""
     for task, split in itertools.product(tasks, splits):
         for index in range(split_size(split)):
             yield get_episode(task, split, index)
 
 
 def fingerprint_of(task_name: str, passed_over: Mapping[str, int]) -> str:
-    """Return the fingerprint of all episodes of a task, given the numbers of seeds passed over."""
+    """Return the fingerprint of all episodes of a task, a hash that changes if any of them does.
+
+    `passed_over` has the numbers of seeds passed over by episode, ``{"train/3": 1}``, without
+    zeros.
+    """
     task = get_task(task_name)
     return fingerprint(_fixed_episodes(task, passed_over))
 
 
 def _fixed_episodes(task: Task, passed_over: Mapping[str, int]) -> Iterator[Episode]:
-    """Yield the episodes of train, val and test, given the numbers of seeds passed over."""
+    """Yield the episodes of train, val and test, in this order.
+
+    `passed_over` has the numbers of seeds passed over by episode, ``{"train/3": 1}``, without
+    zeros.
+    """
     for split in SPLITS:
         for index in range(SIZES[split]):
             number = passed_over.get(slot_key(split, index), 0)
@@ -188,7 +214,10 @@ def _fixed_episodes(task: Task, passed_over: Mapping[str, int]) -> Iterator[Epis
 
 
 def _check_index(split: Split, index: SupportsIndex) -> int:
-    """Return a number as that of an episode of a split; True and 1.0 are none."""
+    """Return a number as that of an episode of a split; True and 1.0 are none.
+
+    Accepted is all that can stand in an index, also NumPy's integers. Raises InvalidValueError.
+    """
     size = split_size(split)
     number = -1  # is refused below, as any index that is no whole number
     if not isinstance(index, bool):
@@ -222,7 +251,7 @@ def _episode(task_name: str, split: Split, index: int) -> Episode:
 
 
 def _published(task: Task, split: Split, index: int) -> Episode | None:
-    """Return an episode of RoboMME's; None if it has not published it."""
+    """Return an episode that RoboMME has published; None if it has not published this one."""
     found = published_episode(task.name, split, index)
     if found is None:
         return None
@@ -240,7 +269,7 @@ def _sampled(task: Task, split: Split, index: int, passed_over: int) -> Episode:
 
 
 def check_stages(task: str, scene: Scene, stages: Iterable[Stage]) -> None:
-    """Check that each fact that stages expect or forbid is one that can hold in a scene.
+    """Raise InvalidValueError if stages expect or forbid a fact that cannot hold in a scene.
 
     A task that expects *picked button* has a mistake, which no policy could reveal.
     """
@@ -274,7 +303,11 @@ def _problem_of(fact: Fact, kinds: Mapping[str, str]) -> str | None:
 
 
 def _name_problem(name: str, fitting: Sequence[str], kinds: Mapping[str, str]) -> str | None:
-    """Return why an object of a name is none of the fitting kinds; None if it is."""
+    """Return why an object of a name is none of the fitting kinds; None if it is.
+
+    `kinds` has the kind of each object by name. ``"button"``, ``("cube", "tape")`` -> *'button' is
+    a button, not a cube or a tape*.
+    """
     if name not in kinds:
         return f"the scene has no {name!r}; it has {', '.join(kinds)}"
     if kinds[name] not in fitting:

@@ -113,7 +113,7 @@ class RequestGuard:
         self._headers = {"X-Content-Type-Options": "nosniff", **headers}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request, or refuse it; either answer gets the headers of this guard."""
+        """Answer a request (ASGI), or refuse it; either answer gets the headers of this guard."""
 
         async def send_with_headers(message: Message) -> None:
             """Send a part of the answer; its first part gets the headers that it lacks."""
@@ -146,5 +146,5 @@ async def read_body(request: Request, limit: int) -> bytes:
 
 
 def error_handler(status: int) -> Callable[[Request, Exception], Response]:
-    """Return the handler of errors whose message is the response."""
+    """Return Starlette's handler of errors that answers with the error's message as plain text."""
     return lambda _, error: PlainTextResponse(f"{error}\n", status)

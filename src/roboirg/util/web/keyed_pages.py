@@ -61,6 +61,7 @@ class KeyedPageServer(AppServer):
     """
 
     def __init__(self, routes: Sequence[BaseRoute], key: str, port: int = 0) -> None:
+        """Build the application: routes behind the check of the key; our errors give status 400."""
         self.key = key
         self._names = names_of_this_machine()
         handlers = {RoboIRGError: error_handler(400)}
@@ -78,10 +79,10 @@ class KeyedPageServer(AppServer):
         return f"roboirg_{self.port}"
 
     def _refuse(self, request: Request) -> Response | None:
-        """Return None for a request with the cookie; else an answer that sets it, or refuses.
+        """Return None to let a request pass; else an answer that sets the cookie, or refuses.
 
-        The address that is printed has the key. It is exchanged for a cookie and left out of the
-        address, so that it is in no browser history.
+        A request with the cookie passes. The address that is printed has the key. It is exchanged
+        for a cookie and left out of the address, so that it is in no browser history.
         """
         if self._is_own(request):
             is_first = request.method == "GET" and request.url.path == "/"
@@ -102,6 +103,10 @@ class KeyedPageServer(AppServer):
         return is_own_request(hosts, http_origins, self._names)
 
     def _is_key(self, text: str) -> bool:
+        """Return whether a text is the key.
+
+        Takes equally long for every text, as the time of an early end would give letters away.
+        """
         return hmac.compare_digest(text.encode(), self.key.encode())
 
 

@@ -32,7 +32,7 @@ def is_own_request(hosts: Sequence[str], origins: Sequence[str], names: Collecti
 
 
 def is_own_host(host: str, names: Collection[str]) -> bool:
-    """Return whether ``name:port`` of a request names this machine."""
+    """Return whether ``name:port`` of a request names this machine: by a name or any IP address."""
     try:
         parts = urlsplit(f"//{host}")
         name = parts.hostname or ""
@@ -57,7 +57,7 @@ def names_of_this_machine() -> frozenset[str]:
 
 
 def _is_address(name: str) -> bool:
-    """Return whether a name is an IP address."""
+    """Return whether a name is an IP address, such as ``10.0.0.3`` or ``::1``."""
     import ipaddress
 
     try:

@@ -17,17 +17,17 @@ from roboirg.apps.demonstrations.dataset_part import (
     CHUNK_SIZE,
     EPISODE_TABLE,
     DatasetPart,
-    RecordedTexts,
+    RecordedInstructions,
     all_texts,
     episode_row,
-    place_texts,
+    place_instructions,
     read_episodes,
 )
 from roboirg.apps.demonstrations.export_format import ExportFormat
 from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.apps.demonstrations.feature_stats import FeatureStats, vector_stats
 from roboirg.apps.demonstrations.formats.lerobot_tables import INFO, read_tables
-from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
+from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedInstruction
 from roboirg.apps.demonstrations.parquet_tables import (
     number_column,
     picture_column,
@@ -77,20 +77,21 @@ _PYAV = " --dataset.video_backend=pyav"
 
 
 def make_parts(
-    plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts]
+    plan: ExportPlan, root: Path, recorded: Sequence[RecordedInstructions]
 ) -> list[DatasetPart]:
-    """Return a part for each trajectory."""
+    """Return a part for each trajectory, numbered from 0; files are named after the numbers."""
     columns = FrameColumns(plan)
     return [
         DatasetPart(number, root, columns, (episode,))
-        for number, episode in enumerate(place_texts(recorded))
+        for number, episode in enumerate(place_instructions(recorded))
     ]
 
 
 def write_part(part: DatasetPart) -> None:
     """Write one trajectory as a Parquet file, with its videos: LeRobot's format 3.0.
 
-    The file has the trajectory's frames once for each of its instructions.
+    The file has the trajectory's frames once for each of its instructions; the videos are stored
+    once. Makes only files of this part, so parts can be written by several processes.
     """
     (episode,) = part.episodes
     columns = part.columns
@@ -99,7 +100,7 @@ def write_part(part: DatasetPart) -> None:
     if columns.has_videos:
         write_videos(part, partial(_VIDEO.format, **place))
     shared = frame_columns(columns, trajectory)
-    own = [own_columns(placed, trajectory.facts.frames) for placed in episode.texts]
+    own = [own_columns(placed, trajectory.facts.frames) for placed in episode.instructions]
     path = part.root / _DATA.format(**place)
     write_frames(path, columns.table_features(), shared, own)
 
@@ -113,9 +114,10 @@ def write_videos(part: DatasetPart, name_of: Callable[..., str]) -> None:
 
 
 def frame_columns(columns: FrameColumns, trajectory: Trajectory) -> dict[str, Any]:
-    """Return a trajectory's columns, as Parquet holds them, without those of single instructions.
+    """Return a trajectory's columns of Parquet that all its instructions share, by name.
 
     They are numbers such as states and actions, texts, and pictures if these are not in videos.
+    `own_columns` returns the others.
     """
     arrow_columns = {}
     for name, numbers in columns.numbers(trajectory).items():
@@ -128,8 +130,8 @@ def frame_columns(columns: FrameColumns, trajectory: Trajectory) -> dict[str, An
     return arrow_columns
 
 
-def own_columns(placed: PlacedText, length: int) -> dict[str, Any]:
-    """Return the columns that differ between the instructions of a trajectory."""
+def own_columns(placed: PlacedInstruction, length: int) -> dict[str, Any]:
+    """Return the columns that differ between the instructions of a trajectory: its indices."""
     indices = FrameColumns.indices(placed, length)
     return {name: number_column(values) for name, values in indices.items()}
 
@@ -137,14 +139,15 @@ def own_columns(placed: PlacedText, length: int) -> dict[str, Any]:
 def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the metadata of a complete dataset: episodes, texts, statistics, and ``info.json``.
 
-    The latter comes last, because nothing reads the dataset without it.
+    The latter comes last, because nothing reads the dataset without it. Episodes are added in the
+    order of their numbers, on which LeRobot's tables rely.
     """
     columns = parts[0].columns
     stats = StatsCollector(columns)
     episodes = []
     facts = []
     for part, episode, trajectory in read_episodes(parts):
-        for placed in episode.texts:
+        for placed in episode.instructions:
             entry = _episode_entry(part, placed, trajectory.facts.frames)
             entry |= _flat(stats.add(trajectory, placed))
             episodes.append(entry)
@@ -154,19 +157,26 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     _write_tasks(root / "meta/tasks.parquet", texts)
     write_rows(root / EPISODE_TABLE, facts)
     write_json(root / "meta/stats.json", stats.result())
-    info = common_info(parts, texts)
-    info["codebase_version"] = "v3.0"
-    info["data_files_size_in_mb"] = 100
-    info["video_files_size_in_mb"] = 200
-    info["data_path"] = _DATA
-    info["video_path"] = _VIDEO if columns.has_videos else None
+    info = {
+        **common_info(parts, texts),
+        "codebase_version": "v3.0",
+        "data_files_size_in_mb": 100,
+        "video_files_size_in_mb": 200,
+        "data_path": _DATA,
+        "video_path": _VIDEO if columns.has_videos else None,
+    }
     write_json(root / INFO, info)
 
 
 class StatsCollector:
-    """Collects the statistics of single episodes and of all."""
+    """Collects the statistics of single episodes and of the whole dataset, in one pass.
+
+    Call `add` for each episode, then `result`. All instructions of a trajectory must be added one
+    after the other: what they share is computed once and kept until another trajectory comes.
+    """
 
     def __init__(self, columns: FrameColumns) -> None:
+        """Begin with no episodes; `columns` says which columns there are."""
         self._columns = columns
         # By column: the numbers of each episode, (frames, size), and of pictures (3, 256) how often
         # each value of a color channel occurs.
@@ -176,12 +186,15 @@ class StatsCollector:
         self._last_path: Path | None = None
         self._shared_stats: dict[str, FeatureStats] = {}
 
-    def add(self, trajectory: Trajectory, placed: PlacedText) -> dict[str, FeatureStats]:
+    def add(self, trajectory: Trajectory, placed: PlacedInstruction) -> dict[str, FeatureStats]:
         """Add an episode to the statistics of the dataset; return those of the episode alone.
 
         Args:
             trajectory: what the robot did.
             placed: the episode's instruction, with its numbers in the dataset.
+
+        Returns:
+            By column the statistics, ``{"action": {"min": […], "max": […], …}, …}``.
         """
         shared = self._columns.numbers(trajectory)
         indices = self._columns.indices(placed, trajectory.facts.frames)
@@ -218,7 +231,7 @@ class StatsCollector:
         return self._columns.stats(self._numbers, self._counts)
 
 
-def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[str, Any]:
+def _episode_entry(part: DatasetPart, placed: PlacedInstruction, length: int) -> dict[str, Any]:
     """Return a row of LeRobot's table of episodes: where an episode's frames are stored.
 
     Args:
@@ -229,7 +242,7 @@ def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[s
     chunk, file = part.place
     entry: dict[str, Any] = {
         "episode_index": placed.episode_index,
-        "tasks": [placed.words.text],
+        "tasks": [placed.instruction.text],
         "length": length,
         "data/chunk_index": chunk,
         "data/file_index": file,
@@ -260,8 +273,9 @@ def _flat(stats: Mapping[str, FeatureStats]) -> dict[str, Any]:
 def _write_tasks(path: Path, texts: Sequence[str]) -> None:
     """Write the distinct texts of instructions with their indices, as LeRobot expects them.
 
-    It reads the file with pandas, and wants the texts as the index of the data frame; this is said
-    by the metadata that pandas itself would write.
+    LeRobot reads the file with pandas, and wants the texts as the index of the data frame; this is
+    said by the metadata that pandas itself would write. `texts` are in the order of their indices
+    from 0.
     """
     import pyarrow as pa
     from pyarrow import parquet
@@ -310,7 +324,7 @@ def common_info(parts: Sequence[DatasetPart], texts: Sequence[str]) -> dict[str,
         texts: the distinct instructions.
     """
     last = parts[-1].episodes[-1]
-    placed = last.texts[-1]
+    placed = last.instructions[-1]
     count = placed.episode_index + 1
     return {
         "robot_type": "panda",

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.dataset_part import EPISODE_TABLE
 from roboirg.apps.demonstrations.frame_columns import EXECUTED
@@ -30,7 +31,8 @@ def read_tables(root: Path) -> Iterator[ReplayableTrajectory]:
     """Read the trajectories of a dataset that was exported in LeRobot's format, to replay them.
 
     A trajectory is in the dataset once for each instruction, of which the first is read. Frames of
-    the video that the policy was shown are left out. A folder without an export has none.
+    the video that the policy was shown are left out. Yields nothing if the folder holds no such
+    export.
     """
     path = root / INFO
     if not path.is_file() or not (root / EPISODE_TABLE).is_file():
@@ -46,27 +48,39 @@ def read_tables(root: Path) -> Iterator[ReplayableTrajectory]:
     rows: dict[str, dict[str, Any]] = {}
     for row in read_rows(root / EPISODE_TABLE):
         rows.setdefault(row["trajectory"], row)  # that of its first instruction
-    for name, row in rows.items():
+    for row in rows.values():
         after_video = row["from_index"] + row["video_length"]
         own = frames.slice(after_video, row["length"] - row["video_length"])
         states = np.array(own[state].to_pylist())
         actions = np.array(own[action].to_pylist())
-        final = np.array(row["final_state"])
-        yield ReplayableTrajectory(
-            name=name,
-            task=row["task"],
-            seed=row["seed"],
-            split=row["split"],
-            index=row["episode"],
-            actions=actions.astype(np.float64),
-            # After each action; frames have states before it. Of the final one, a single finger.
-            states=np.concatenate([states[1:], final[None, : _JOINTS + 1]]),
-            final_state=final,
-            status=row["status"],
-            space=row.get("actions", JOINT_ANGLE.name),
-        )
+        yield _trajectory(row, states, actions.astype(np.float64))
+
+
+def _trajectory(
+    row: Mapping[str, Any], states: NDArray[np.float64], actions: NDArray[np.float64]
+) -> ReplayableTrajectory:
+    """Return a trajectory from its row in the table of facts and its frames without the video.
+
+    Args:
+        row: with the names of `episode_row`.
+        states: before each action, (n, 8); those of the result are after it, the last from `row`.
+        actions: (n, size).
+    """
+    final = np.array(row["final_state"])  # with both fingers; frames have one
+    return ReplayableTrajectory(
+        name=row["trajectory"],
+        task=row["task"],
+        seed=row["seed"],
+        split=row["split"],
+        index=row["episode"],
+        actions=actions,
+        states=np.concatenate([states[1:], final[None, : _JOINTS + 1]]),
+        final_state=final,
+        status=row["status"],
+        space=row.get("actions", JOINT_ANGLE.name),
+    )
 
 
 def _present(names: Iterable[str], info: Mapping[str, Any]) -> str:
-    """Return the first name that is one of a column."""
+    """Return the first of some names that is a column of the dataset, by its ``info.json``."""
     return next(name for name in names if name in info["features"])

@@ -109,13 +109,14 @@ GR00T reads `meta/modality.json`; it needs videos, so export with `--pictures lo
 def write_part(part: DatasetPart) -> None:
     """Write the episodes of one trajectory in LeRobot's format 2.1, each as a Parquet file.
 
-    An episode is the trajectory with one of its instructions.
+    An episode is the trajectory with one of its instructions; each gets a copy of frames and
+    videos. Makes only files of this part, so parts can be written by several processes.
     """
     (episode,) = part.episodes
     columns = part.columns
     trajectory = load_trajectory(episode.path)
     shared = frame_columns(columns, trajectory)
-    for placed in episode.texts:
+    for placed in episode.instructions:
         index = placed.episode_index
         place = {"episode_chunk": index // CHUNK_SIZE, "episode_index": index}
         if columns.has_videos:
@@ -128,7 +129,8 @@ def write_part(part: DatasetPart) -> None:
 def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the metadata of a complete dataset: episodes, texts, statistics, and ``info.json``.
 
-    The latter comes last, because nothing reads the dataset without it.
+    The latter comes last, because nothing reads the dataset without it. Episodes are added in the
+    order of their numbers.
     """
     columns = parts[0].columns
     collector = StatsCollector(columns)
@@ -136,9 +138,9 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     stats = []
     facts = []
     for _, episode, trajectory in read_episodes(parts):
-        for placed in episode.texts:
+        for placed in episode.instructions:
             index = placed.episode_index
-            tasks = [placed.words.text]
+            tasks = [placed.instruction.text]
             length = trajectory.facts.frames
             episodes.append({"episode_index": index, "tasks": tasks, "length": length})
             stats.append({"episode_index": index, "stats": collector.add(trajectory, placed)})
@@ -164,12 +166,14 @@ def _info(parts: Sequence[DatasetPart], texts: Sequence[str]) -> dict[str, Any]:
     columns = parts[0].columns
     info = common_info(parts, texts)
     episodes = info["total_episodes"]
-    info["codebase_version"] = "v2.1"
-    info["total_videos"] = episodes * len(columns.cameras) if columns.has_videos else 0
-    info["total_chunks"] = (episodes - 1) // CHUNK_SIZE + 1
-    info["data_path"] = _DATA
-    info["video_path"] = _VIDEO if columns.has_videos else None
-    return info
+    return {
+        **info,
+        "codebase_version": "v2.1",
+        "total_videos": episodes * len(columns.cameras) if columns.has_videos else 0,
+        "total_chunks": (episodes - 1) // CHUNK_SIZE + 1,
+        "data_path": _DATA,
+        "video_path": _VIDEO if columns.has_videos else None,
+    }
 
 
 def modality(columns: FrameColumns) -> dict[str, Any]:

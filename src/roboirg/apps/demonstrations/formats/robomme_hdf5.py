@@ -19,14 +19,14 @@ from roboirg.apps.demonstrations.dataset_part import (
     EPISODE_TABLE,
     DatasetPart,
     RecordedEpisode,
-    RecordedTexts,
+    RecordedInstructions,
     episode_row,
-    place_texts,
+    place_instructions,
     read_episodes,
 )
 from roboirg.apps.demonstrations.export_format import ExportFormat
-from roboirg.apps.demonstrations.export_plan import ExportPlan, TaskText
-from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
+from roboirg.apps.demonstrations.export_plan import ExportedInstruction, ExportPlan
+from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedInstruction
 from roboirg.apps.demonstrations.parquet_tables import write_rows
 from roboirg.apps.demonstrations.replayable_trajectory import ReplayableTrajectory
 from roboirg.apps.demonstrations.trajectory import (
@@ -72,13 +72,13 @@ def check_hdf5_support() -> None:
         import h5py  # noqa: F401
 
 
-def words_of(words: TaskText) -> str:
-    """Return the name of the folder of a setting and form."""
-    return f"{words.options.setting}-{words.options.form}"
+def folder_of(instruction: ExportedInstruction) -> str:
+    """Return the name of the folder of a setting and form, such as ``"spatial-implicit"``."""
+    return f"{instruction.options.setting}-{instruction.options.form}"
 
 
 def make_parts(
-    plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts]
+    plan: ExportPlan, root: Path, recorded: Sequence[RecordedInstructions]
 ) -> list[DatasetPart]:
     """Divide a dataset into parts, one for each task, as RoboMME has a file for each.
 
@@ -89,7 +89,7 @@ def make_parts(
     """
     columns = FrameColumns(plan)
     by_task: dict[str, list[RecordedEpisode]] = {}
-    for episode in place_texts(recorded):
+    for episode in place_instructions(recorded):
         by_task.setdefault(_task(episode), []).append(episode)
     parts = []
     for number, episodes in enumerate(by_task.values()):
@@ -99,14 +99,15 @@ def make_parts(
 
 def _task(episode: RecordedEpisode) -> str:
     """Return the name of an episode's task."""
-    return str(episode.texts[0].words.facts["task"])
+    return str(episode.instructions[0].instruction.facts["task"])
 
 
 def write_part(part: DatasetPart) -> None:
     """Write the demonstrations of one task as RoboMME's HDF5 files.
 
-    With one setting and form, this is one file. With several, each has a folder with a file of its
-    words, whose time steps are links to a common file, as they do not depend on words.
+    With one setting and form, this is the file ``record_dataset_TASK.h5``. With several, each has a
+    folder with such a file of its words, whose time steps are links to a common file in
+    `SHARED_FOLDER`, as they do not depend on words.
     """
     import h5py
 
@@ -125,19 +126,23 @@ def write_part(part: DatasetPart) -> None:
 
 
 def _folders(part: DatasetPart) -> list[str]:
-    """Return the folders of a part: one for each setting and form of its instructions."""
+    """Return the folders of a part, each once: one for each setting and form of instructions."""
     folders: dict[str, None] = {}
     for episode in part.episodes:
-        for placed in episode.texts:
-            folders[words_of(placed.words)] = None
+        for placed in episode.instructions:
+            folders[folder_of(placed.instruction)] = None
     return list(folders)
 
 
 def _write_episode(file: Any, episode: RecordedEpisode) -> None:  # noqa: ANN401
-    """Write an episode into an open HDF5 file: its time steps and its first instruction."""
+    """Write an episode into an open HDF5 file: its time steps and its first instruction.
+
+    The group is called ``episode_N`` by the number in the split, its steps ``timestep_0`` and so
+    on.
+    """
     trajectory = load_trajectory(episode.path)
     group = file.create_group(f"episode_{trajectory.facts.episode}")
-    _write_setup(group, trajectory, episode.texts[0])
+    _write_setup(group, trajectory, episode.instructions[0])
     with zipfile.ZipFile(episode.path) as archive:
         for step, row in enumerate(time_steps(trajectory)):
             _write_step(group.create_group(f"timestep_{step}"), trajectory, row, archive)
@@ -146,16 +151,18 @@ def _write_episode(file: Any, episode: RecordedEpisode) -> None:  # noqa: ANN401
 def _link_episode(file: Any, episode: RecordedEpisode, folder: str, home: str) -> None:  # noqa: ANN401
     """Write an episode's words in one setting and form, and links to its time steps.
 
+    Nothing is written if the episode has no instruction in them.
+
     Args:
         file: open HDF5 file of the setting and form.
         episode: with its instructions.
-        folder: name of the setting and form.
+        folder: name of the setting and form, such as ``"spatial-implicit"``.
         home: path of the file with the time steps, from the folder.
     """
     import h5py
 
-    for placed in episode.texts:
-        if words_of(placed.words) != folder:
+    for placed in episode.instructions:
+        if folder_of(placed.instruction) != folder:
             continue
         trajectory = load_trajectory(episode.path)
         name = f"episode_{trajectory.facts.episode}"
@@ -166,20 +173,30 @@ def _link_episode(file: Any, episode: RecordedEpisode, folder: str, home: str) -
 
 
 def time_steps(trajectory: Trajectory) -> list[int]:
-    """Return the rows that are time steps: all but the policy's first observation."""
+    """Return the rows of a trajectory that are time steps of RoboMME, in order.
+
+    All but the policy's first observation, whose action, a step at home, RoboMME does not store.
+    Video of 3 rows, 2 steps of the policy -> ``[0, 1, 2, 4, 5]``.
+    """
     facts = trajectory.facts
     return [row for row in range(facts.frames + 1) if row != facts.video_length]
 
 
-def _write_setup(group: Any, trajectory: Trajectory, placed: PlacedText) -> None:  # noqa: ANN401
-    """Write the group ``setup`` of an episode: seed, difficulty, instruction, camera intrinsics."""
+def _write_setup(group: Any, trajectory: Trajectory, placed: PlacedInstruction) -> None:  # noqa: ANN401
+    """Write the group ``setup`` of an episode: seed, difficulty, instruction, camera intrinsics.
+
+    Args:
+        group: of HDF5, for the episode.
+        trajectory: what the robot did.
+        placed: its instruction, with its numbers in the dataset.
+    """
     import h5py
 
     facts = trajectory.facts
     setup = group.create_group("setup")
     setup["seed"] = np.int64(facts.seed)
     setup["difficulty"] = facts.difficulty
-    setup.create_dataset("task_goal", data=[placed.words.text], dtype=h5py.string_dtype())
+    setup.create_dataset("task_goal", data=[placed.instruction.text], dtype=h5py.string_dtype())
     for camera in CAMERAS:
         name = f"{camera}_intrinsic"
         setup[f"{camera}_camera_intrinsic"] = trajectory.calibration[name]
@@ -245,7 +262,10 @@ def _write_observation(
 
 
 def _is_boundary(trajectory: Trajectory, row: int) -> bool:
-    """Return whether a row is the first of its subgoal among the time steps."""
+    """Return whether a row is the first of its subgoal among the time steps; see `time_steps`.
+
+    The first time step and the policy's first one always are.
+    """
     first_observation = trajectory.facts.video_length  # which is no time step
     if row in (0, first_observation + 1):
         return True
@@ -256,7 +276,7 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the table of facts."""
     rows = []
     for _, episode, trajectory in read_episodes(parts):
-        rows += [episode_row(trajectory, placed) for placed in episode.texts]
+        rows += [episode_row(trajectory, placed) for placed in episode.instructions]
     write_rows(root / EPISODE_TABLE, rows)
 
 
@@ -266,10 +286,11 @@ def training_text(_plan: ExportPlan, root: Path) -> str:
 
 
 def read(path: Path) -> Iterator[ReplayableTrajectory]:
-    """Read the trajectories of RoboMME's HDF5 files, to replay them.
+    """Read the trajectories of RoboMME's HDF5 files, ours or its own, to replay them.
 
     Args:
-        path: a folder of files, each of one task, or one such file; anything else has none.
+        path: a folder of files, each of one task, or one such file; of anything else, nothing is
+            yielded.
     """
     for file_path in _hdf5_files(path):
         check_hdf5_support()
@@ -282,7 +303,7 @@ def read(path: Path) -> Iterator[ReplayableTrajectory]:
 
 
 def _hdf5_files(path: Path) -> list[Path]:
-    """Return the HDF5 files that hold time steps, not links to them."""
+    """Return the HDF5 files that hold time steps, not links to them; none for other paths."""
     if path.is_file() and path.match(_FILES):
         return [path]
     return sorted(path.glob(_FILES)) or sorted((path / SHARED_FOLDER).glob(_FILES))

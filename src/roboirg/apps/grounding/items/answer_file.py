@@ -70,7 +70,7 @@ def read_answers(path: Path, items: Sequence[GroundingItem]) -> list[Answer]:
 
 
 def _bad_line(path: Path, number: int, problem: str) -> InvalidValueError:
-    """Return the error of a line."""
+    """Return (not raise) the error of a line of the file, with its number from 1."""
     return InvalidValueError(f"{path}, line {number}: {problem}")
 
 

@@ -40,7 +40,7 @@ def draw_choices(episode: Episode, instruction: Instruction, identity: str) -> G
     Args:
         episode: whose goal is meant.
         instruction: what is said.
-        identity: of the item; equal identities have equal choices.
+        identity: id of the item; equal ids have equal choices.
     """
     wrong = _wrong_goals(episode, instruction)
     drawn = _generator("goals", identity).permutation(len(wrong))[: MOST - 1]
@@ -51,7 +51,11 @@ def draw_choices(episode: Episode, instruction: Instruction, identity: str) -> G
 
 
 def _place_of_right(episode: Episode, instruction: Instruction, count: int) -> int:
-    """Return the place of the goal that is meant among some choices."""
+    """Return the place, from 0, of the goal that is meant among `count` choices.
+
+    Among each `_BLOCK` neighboring episodes every place is used equally often, so that always
+    choosing the same letter is right no more often than chance. The goal has no influence.
+    """
     block, place = divmod(episode.index, _BLOCK)
     setting = repr(instruction.setting)
     rng = _generator("place", episode.task, episode.split, setting, instruction.form, str(block))
@@ -59,9 +63,10 @@ def _place_of_right(episode: Episode, instruction: Instruction, count: int) -> i
 
 
 def _wrong_goals(episode: Episode, instruction: Instruction) -> Sequence[Goal]:
-    """Return the wrong goals that are hardest to tell from the right one.
+    """Return the wrong goals of the scene that are hardest to tell from the right one.
 
-    They fit the command without its context or, if none does, have as many values; else any.
+    The first of these groups that is not empty: goals that fit the command without its context;
+    goals with as many values; all.
     """
     wrong = [goal for goal in goals_of(episode) if not is_right(goal, episode)]
     fit_command = set(blind_goals(instruction, episode))
@@ -71,7 +76,7 @@ def _wrong_goals(episode: Episode, instruction: Instruction) -> Sequence[Goal]:
 
 
 def _shape(goal: Goal) -> list[int]:
-    """Return how many values each slot has."""
+    """Return how many values each slot of a goal has: red and blue, then a number -> ``[2, 1]``."""
     counts = []
     for _, value in goal.slots:
         counts.append(len(value) if isinstance(value, tuple) else 1)
@@ -79,6 +84,6 @@ def _shape(goal: Goal) -> list[int]:
 
 
 def _generator(*parts: str) -> np.random.Generator:
-    """Return random numbers that depend on the parts alone."""
+    """Return a random generator whose numbers depend on the texts alone, on every machine."""
     digest = hashlib.sha256("\n".join(parts).encode()).digest()
     return np.random.default_rng(int.from_bytes(digest[:16]))

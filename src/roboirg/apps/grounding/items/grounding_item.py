@@ -110,6 +110,7 @@ class GroundingItem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         return InstructionOptions(**given)
 
     def system_prompt(self, kind: QuestionKind) -> str:
+        """Return the system prompt for a question of a kind; that for slots is the listener's."""
         return self.slots_system if kind == "slots" else self.system
 
     def question(self, kind: QuestionKind) -> str:
@@ -118,7 +119,11 @@ class GroundingItem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 def encode_mask(mask: Mask) -> list[int]:
-    """Return the run lengths of a mask, column after column, pixels outside first."""
+    """Return the run lengths of a mask, column after column, pixels outside first.
+
+    A column of outside, inside, inside -> ``[1, 2]``; one that begins inside -> ``[0, …]``.
+    `decode_mask` is the way back.
+    """
     flat = np.concatenate([[False], mask.ravel(order="F")])
     changes = np.flatnonzero(flat[1:] != flat[:-1])
     counts: list[int] = np.diff(np.concatenate([[0], changes, [mask.size]])).tolist()
@@ -158,7 +163,12 @@ def write_items(items: list[GroundingItem], folder: Path) -> bytes:
 def decode_lines(content: bytes, kind: type[T], origin: Path) -> Iterator[tuple[int, T]]:
     """Yield the objects in a file of JSON lines, each with the number of its line, from 1.
 
-    Empty lines are left out.
+    Empty lines are left out, but counted.
+
+    Args:
+        content: of the file.
+        kind: type that a line must have.
+        origin: path of the file, for messages.
 
     Raises:
         InvalidValueError: a line is no such object.

@@ -67,12 +67,12 @@ def wanted_options(
 def _options_of(
     name: str, forms: Sequence[str], options: InstructionOptions, *, every_variant: bool
 ) -> Iterator[InstructionOptions]:
-    """Yield the instruction options for which a setting gets questions, some of them maybe twice.
+    """Yield the instruction options for which a setting gets questions; some may come twice.
 
     Args:
         name: of the setting.
         forms: implicit, resolved or both; explicit has one form.
-        options: values that are used, of those that the setting reads.
+        options: values that are used, of those that the setting reads; others keep their defaults.
         every_variant: whether to add every combination of options that changes the words.
     """
     setting = all_settings()[name]
@@ -96,7 +96,11 @@ def make_items(
 
 
 def item_id(episode: Episode, options: InstructionOptions) -> str:
-    """Return the name of an item. It is a hash, which gives nothing away about the answer."""
+    """Return the name of an item, such as ``g1a2b3c4d5e6f7a8b``.
+
+    A hash of episode, options and versions, which gives nothing away about the answer. Any change
+    of what is hashed renames all items, so that old answers do not fit the new questions.
+    """
     pool = pool_of(episode.split, options.wordings)
     content = (
         episode.key,
@@ -108,6 +112,7 @@ def item_id(episode: Episode, options: InstructionOptions) -> str:
 
 
 def _make_item(episode: Episode, media: EpisodeMedia, options: InstructionOptions) -> GroundingItem:
+    """Return the item, questions and right answers, of one instruction of an episode."""
     instruction = instruct_with(episode, options)
     name = item_id(episode, options)
     choices = draw_choices(episode, instruction, name)
@@ -163,8 +168,9 @@ def _instruction_fields(
 ) -> dict[str, Any]:
     """Return the fields of an item on its instruction: its words, and what the command leaves open.
 
-    ``command_chance`` is the success of a guess among the goals that fit the command alone, 0 to 1;
-    ``hidden_slots`` are the values of the goal that only the command's context names.
+    The command is the last utterance. ``command_chance`` is the success of a guess among the goals
+    that fit the command alone, 0 to 1, or None; ``hidden_slots`` are the goal's values that only
+    the words before the command name.
     """
     hidden: list[str] = []
     if options.form != "resolved":  # a resolved command leaves none to its context
@@ -222,7 +228,8 @@ def _choice_question(
 def _points_question(episode: Episode) -> dict[str, Any]:
     """Return the question to point at the things that are meant, and whether they have an order.
 
-    They have one where things are handled one after the other, and none where the goal is amounts.
+    *the cube, then the target*: they have one where things are handled one after the other, and
+    none where the goal is how many of each color.
     """
     questions = load_prompts(QUESTIONS)
     is_sequence = is_ordered(episode.goal)

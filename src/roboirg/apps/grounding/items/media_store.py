@@ -97,7 +97,8 @@ def _store_frames(folder: Path, clip: Clip, most: int) -> tuple[str, ...]:
 def _points(env: RoboIRGEnv, episode: Episode) -> tuple[PointTarget, ...]:
     """Return where the things that the instruction means are seen in the first picture.
 
-    Each has a pixel and a mask.
+    Each has a pixel and a mask. A thing may be several objects that are equally right, such as all
+    red cubes; its mask has the pixels of all.
 
     Raises:
         RoboIRGError: one of them cannot be seen.
@@ -138,14 +139,17 @@ def store_content(folder: Path, kind: str, content: bytes, suffix: str) -> str:
 
 
 def _target(kind: str, mask: Mask) -> PointTarget:
-    """Return the thing of a mask with a pixel that is surely right."""
+    """Return the place of a thing: its mask, and one pixel of it near its middle."""
     y, x = nearest_to_center(mask)
     height, width = mask.shape
     return PointTarget(kind=kind, x=x, y=y, size=(height, width), counts=encode_mask(mask))
 
 
 def nearest_to_center(mask: Mask) -> tuple[int, int]:
-    """Return row and column of the pixel of a mask that is nearest to the mean of all of them."""
+    """Return row and column of the pixel of a mask that is nearest to the mean of all of them.
+
+    The mean itself may lie outside the mask, as in a ring. The mask must not be empty.
+    """
     places = np.argwhere(mask)
     distances = np.square(places - places.mean(axis=0)).sum(axis=1)
     row, column = places[int(distances.argmin())]

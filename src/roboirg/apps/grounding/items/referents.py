@@ -45,7 +45,8 @@ def pointed_kinds(task_name: str) -> tuple[ObjectKind, ...]:
 
     These are the kinds of which different goals of a scene need different objects, so that pointing
     shows which goal was understood. If there are none, as where goals differ in a number only, it
-    is the kind that the robot handles first. They are in the order of the task's stages.
+    is the kind that the robot handles first. They are found by looking at all scenes of the
+    training split, and are in the order in which the stages first name them.
     """
     task = get_task(task_name)
     all_kinds: list[ObjectKind] = []
@@ -66,7 +67,7 @@ def pointed_kinds(task_name: str) -> tuple[ObjectKind, ...]:
 
 
 def _first_handled(scene: Scene, names: Sequence[str]) -> list[ObjectKind]:
-    """Return the kind of the first object but a button; none if there is none."""
+    """Return the kind of the first object that is no button, in a list; empty without any."""
     for name in names:
         if scene[name].kind != BUTTON:
             return [scene[name].kind]
@@ -76,9 +77,10 @@ def _first_handled(scene: Scene, names: Sequence[str]) -> list[ObjectKind]:
 def find_referents(episode: Episode) -> tuple[Referent, ...]:
     """Return the things in the first picture that an instruction means: those to point at.
 
-    They are in the order in which they are handled; if the goal is amounts, there is one for each
-    color, as any object of a color is right. Things that are not there yet when the words are said,
-    such as containers that appear later, are replaced by the cubes in their places.
+    Red, then blue -> the red cube, the blue cube. They are in the order in which they are handled;
+    if the goal says how many of each color, there is one for each color, as any object of a color
+    is right. Things that are not there yet when the words are said, such as containers that appear
+    later, are replaced by the cubes in their places.
     """
     task = get_task(episode.task)
     scene = episode.scene
@@ -94,7 +96,11 @@ def find_referents(episode: Episode) -> tuple[Referent, ...]:
 
 
 def noun(task_name: str, kind: ObjectKind) -> str:
-    """Return the word for a kind of object to point at."""
+    """Return the word for a kind of object to point at: ``"hidden_cube"`` -> ``"cube"``.
+
+    Containers that are not there yet when the words are said go by the word for what they will
+    cover.
+    """
     task = get_task(task_name)
     if kind == task.things.handled and task.things.pointed != task.things.handled:
         kind = task.things.pointed
@@ -102,7 +108,10 @@ def noun(task_name: str, kind: ObjectKind) -> str:
 
 
 def _pointed(task: Task, scene: Scene, goal: Goal) -> list[str]:
-    """Return the names of the objects that the stages of a goal are about, each once, in order."""
+    """Return the names of the objects that the stages of a goal point at, each once, in order.
+
+    Red, twice, in PickXtimes -> ``["cube_red", "target", "button"]``.
+    """
     names: list[str] = []
     for stage in task.stages(scene, goal):
         name = stage.points_at
@@ -112,7 +121,7 @@ def _pointed(task: Task, scene: Scene, goal: Goal) -> list[str]:
 
 
 def _seen_instead(task: Task, scene: Scene, name: str) -> str:
-    """Return the object itself; of one that appears later, the cube in its place."""
+    """Return the name of the object; of a container that appears later, of the cube below it."""
     things = task.things
     appears_later = scene[name].kind == things.handled and things.handled != things.pointed
     inside = scene.hidden_in(name) if appears_later else None

@@ -62,7 +62,8 @@ def guess_chance(item: GroundingItem, kind: QuestionKind) -> float:
     """Return the probability, 0 to 1, that a random answer to a question is right.
 
     For slots the answer is a random goal of the scene, for a choice a random letter, for points
-    random pixels, as many as there are things to point at.
+    random pixels, as many as there are things to point at. So for two things without an order that
+    cover 1 % of the picture each, it is 0.01 * 0.01 * 2.
     """
     if kind == "slots":
         return len(item.answers) / len(item.goals)
@@ -90,7 +91,8 @@ def right_reply(item: GroundingItem, kind: QuestionKind) -> str:
 def _judge_slots(item: GroundingItem, reply: str) -> ReplyVerdict:
     """Judge a reply that gives a goal's values as JSON: as a whole, and value by value.
 
-    Several goals may be right; single values are compared with those of the goal that is meant.
+    Several goals may be right as a whole; single values are compared with those of the goal that is
+    meant. Where cubes are counted, the values are the counts of colors.
     """
     schema = goal_schema(item.task)
     wanted = json.loads(item.answer)
@@ -104,6 +106,7 @@ def _judge_slots(item: GroundingItem, reply: str) -> ReplyVerdict:
 
 
 def _judge_choice(item: GroundingItem, reply: str) -> ReplyVerdict:
+    """Judge a reply that names a letter; it has no parts."""
     try:
         letter = chosen_letter(reply, LETTERS[: len(item.choices)])
     except UnparsableReplyError:
@@ -114,7 +117,8 @@ def _judge_choice(item: GroundingItem, reply: str) -> ReplyVerdict:
 def _judge_points(item: GroundingItem, reply: str) -> ReplyVerdict:
     """Judge a reply of pixels: right if each thing that is meant is hit, and there are no others.
 
-    If the things have an order, the first pixel must hit the first of them, and so on.
+    If the things have an order, the first pixel must hit the first of them, and so on; else any
+    pixel may hit any thing. A reply without readable pixels is not understood.
     """
     points = _read_points(reply)
     parts = {}

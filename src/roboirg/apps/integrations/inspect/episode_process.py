@@ -45,7 +45,11 @@ class PipeModel:
         self._options = options
 
     def answer(self, query: ModelQuery) -> ModelReply:
-        """Return the parent's reply; see `Model`."""
+        """Send a query to the parent process, and return its reply; see `Model`.
+
+        Raises:
+            PolicyConnectionError: the parent has ended the episode.
+        """
         messages = chat_messages(query, self._options)
         self._pipe.send(ModelRequest(messages, query.schema))
         try:

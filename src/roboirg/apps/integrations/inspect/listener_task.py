@@ -40,6 +40,7 @@ from roboirg.records.record import Job
 from roboirg.tasks import find_tasks
 from roboirg.tasks.splits.splits import split_size
 from roboirg.util.child_process import ChildExit, ChildProcess
+from roboirg.util.reply_reading import CUT_OFF
 
 RECORD = "record"
 """Under this key the metadata of a score hold our record."""
@@ -120,6 +121,7 @@ def play_with_model(frames: int = 16, think: bool = False, structured: bool = Tr
     """
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001
+        """Play the sample's job; store the record, and return the goal as the state's output."""
         model = get_model()
         model_options = ModelOptions(
             model=str(model), base_url=VIA, structured=structured, clip_frames=frames
@@ -143,7 +145,11 @@ async def _play(
 ) -> dict[str, Any]:
     """Play an episode in a process of its own and return its record.
 
-    The process sends requests to the model, each of which is answered, and at last the record.
+    The process sends requests to the model, each of which is answered here, and at last the record.
+    Whatever happens, the process is ended.
+
+    Raises:
+        RoboIRGError: the process was lost.
     """
     # The kernel ends the child with the thread that started it, so that must be this one.
     child = ChildProcess.spawn(play, job, options)
@@ -164,9 +170,10 @@ async def _play(
 async def _ask(
     model: Model, request: ModelRequest, options: ListenerOptions, state: TaskState
 ) -> ModelReply:
-    """Return the model's reply; Inspect keeps its thoughts apart.
+    """Return the model's reply to a request of the playing process.
 
-    The state's messages become those of this request and the reply.
+    The state's messages become those of this request and the reply. Inspect keeps a model's
+    thoughts apart, so the reply has none.
     """
     config = GenerateConfig()
     if request.schema is not None and options.model.structured:
@@ -176,16 +183,22 @@ async def _ask(
     messages = [_chat_message(message) for message in request.messages]
     output = await model.generate(messages, config=config)
     state.messages = messages
+    text = output.completion
     if output.choices:
         state.messages = [*messages, output.message]
+        if output.stop_reason == "max_tokens":
+            text += CUT_OFF
     usage = output.usage
     if usage is None:
-        return ModelReply(output.completion)
-    return ModelReply(output.completion, usage.input_tokens, usage.output_tokens)
+        return ModelReply(text)
+    return ModelReply(text, usage.input_tokens, usage.output_tokens)
 
 
 def _chat_message(message: dict[str, Any]) -> ChatMessage:
-    """Return a message, given as OpenAI's chat completions take it, as Inspect's."""
+    """Return a message of OpenAI's chat completions as Inspect's.
+
+    ``{"role": "system", "content": "…"}``; a user's content is a list of texts and pictures.
+    """
     content = message["content"]
     if message["role"] == "system":
         return ChatMessageSystem(content=content)
@@ -195,7 +208,7 @@ def _chat_message(message: dict[str, Any]) -> ChatMessage:
 
 
 def _contents(pieces: list[dict[str, Any]]) -> Iterator[Content]:
-    """Yield the texts and pictures of a message."""
+    """Yield the texts and pictures of a user's message as Inspect's, in order."""
     for piece in pieces:
         if piece["type"] == "text":
             yield ContentText(text=piece["text"])
@@ -210,6 +223,7 @@ def grounds_reference() -> Scorer:
     """Score 1 if the episode succeeded, else 0; the explanation says why it failed."""
 
     async def score(state: TaskState, target: Target) -> Score:  # noqa: ARG001
+        """Score the record that the solver has stored; 0 without one."""
         record = state.store.get(RECORD)
         if record is None:
             return Score(value=0, explanation="The episode was not played.")

@@ -57,7 +57,11 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
     features_map: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Declare the features."""
+        """Declare the features: the action, the robot's state, and a picture for each camera.
+
+        Each has the environment's name, ``pixels/front``, with type and shape, and LeRobot's name
+        for it, ``observation.images.front``.
+        """
         size = find_action_space(self.actions).size
         self.features |= {
             "action": PolicyFeature(type=FeatureType.ACTION, shape=(size,)),
@@ -106,7 +110,10 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
         return environments
 
     def _create(self, task: str, n_envs: int, use_async: bool) -> VectorEnv[Any, Any, Any]:
-        """Return the vector environment of a task; its processes start when it is first used."""
+        """Return the vector environment of a task; its processes start when it is first used.
+
+        With `use_async`, each of several episodes has a process; else all are played in this one.
+        """
         options = self.gym_kwargs
         example = LeRobotSubEnvironment(task, **options)  # checks the options; builds no world
         if not use_async or n_envs == 1:

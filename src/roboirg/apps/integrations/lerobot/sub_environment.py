@@ -70,6 +70,11 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
         size: int = PICTURE_SIZE,
         **options: Unpack[EnvOptions],
     ) -> None:
+        """Check the options, and make the environment; no world is built before the first reset.
+
+        With `video`, LeRobot's limit of steps is raised by `LONGEST_VIDEO`, as it counts the
+        frames, too.
+        """
         if not options.get("cameras", CAMERAS):
             raise InvalidValueError("cameras is empty; LeRobot needs at least one picture.")
         check_whole("size", size, most=PICTURE_SIZE)
@@ -100,7 +105,12 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
         return self.task_description
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Moment:
-        """Start an episode; repeat the end of the last one if LeRobot does not mean this reset."""
+        """Start an episode; repeat the end of the last one if LeRobot does not mean this reset.
+
+        A vector environment resets what has ended, while LeRobot steps on until the last of a batch
+        has ended. A reset is meant if it comes with a seed or an option, or if no episode has
+        ended.
+        """
         chosen = dict(options or {})
         is_new_rollout = chosen.pop(NEW_ROLLOUT, False)
         is_meant = is_new_rollout or seed is not None or bool(chosen)
@@ -120,7 +130,10 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
         return self._observe(), self._info(success=False)
 
     def step(self, action: Actions) -> StepResult:
-        """Execute one action; while the video is streamed, show its next frame instead."""
+        """Execute one action; while the video is streamed, ignore it and show the next frame.
+
+        After the end, the last transition is repeated, with reward 0.
+        """
         if self._end is not None:
             return self._end
         if self._is_video_on:
@@ -149,7 +162,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
         self._env.close()
 
     def _make_space(self) -> spaces.Dict:
-        """Return the space of observations."""
+        """Return the space of observations: pictures of each camera, and the robot's state."""
         shape = (self._size, self._size, 3)
         picture: spaces.Space[Any] = spaces.Box(0, 255, shape, np.uint8)
         pictures = dict.fromkeys(self._env.cameras, picture)
@@ -162,7 +175,10 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
         return self._next_frame < self._length
 
     def _observe(self) -> dict[str, Any]:
-        """Return what is seen in LeRobot's form: a frame of the video while it is played."""
+        """Return what is seen in LeRobot's form: a frame of the video while it is played.
+
+        Keeps the first camera's picture for `render`.
+        """
         seen = self._seen
         if self._is_video_on:
             seen = {field: array[self._next_frame] for field, array in self._video.items()}
@@ -175,4 +191,5 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
         return {"pixels": pixels, "agent_pos": state}
 
     def _info(self, *, success: bool) -> dict[str, Any]:
+        """Return the info of a step, which shows nothing of setting, episode or goal."""
         return {"is_success": success, "is_video_demo": self._is_video_on}

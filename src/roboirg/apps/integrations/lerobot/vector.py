@@ -43,5 +43,5 @@ def make_batch(
 def sub_environments(
     task: str, n_envs: int, options: Mapping[str, Any]
 ) -> list[MakeSubEnvironment]:
-    """Return a function for each sub-environment, which makes it."""
+    """Return a function for each sub-environment, which makes it where it is called."""
     return [partial(LeRobotSubEnvironment, task, **options)] * n_envs

@@ -73,6 +73,7 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         send_state: bool = True,
         send_video_history: bool = True,
     ) -> None:
+        """Check tasks and action space, and keep the options; nothing is played or imported yet."""
         super().__init__()
         self.tasks = find_tasks(tasks or [ALL])
         self.setting = setting
@@ -146,7 +147,7 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         return StepResult(observation, reward, terminated or truncated, info)
 
     def make_obs(self, raw_obs: Mapping[str, Any], task: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG002
-        """Return what the policy is shown; the video only once."""
+        """Return what the policy is shown; the video only with an episode's first observation."""
         shown: dict[str, Any] = {
             "images": {"agentview": raw_obs["front_rgb"]},
             "task_description": raw_obs["instruction"],
@@ -171,10 +172,12 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         return {"max_steps": self.max_steps, "max_episodes_per_task": episodes}
 
     def get_action_spec(self) -> dict[str, DimSpec]:
+        """Return the size and meaning of an action, in vla-eval's terms."""
         space = self.action_space
         return {"action": DimSpec("action", space.size, _ACTION_FORMATS[space.name])}
 
     def get_observation_spec(self) -> dict[str, DimSpec]:
+        """Return which pictures, texts and numbers an observation holds, in vla-eval's terms."""
         fields = {"agentview": IMAGE_RGB, "language": LANGUAGE}
         if self._sends_wrist:
             fields["wrist"] = IMAGE_RGB
@@ -183,7 +186,10 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         return fields
 
     def get_hold_action(self, last_action: dict[str, Any] | None) -> dict[str, Any]:
-        """Return the last action again, or at first one that keeps the joints where they are."""
+        """Return an action that keeps the robot at rest: the last one again.
+
+        At first, one that keeps the joints where they are, with the gripper open.
+        """
         if last_action is None and self.action_space.name == JOINT_ANGLE.name:
             joints = self._last_result.obs["joint_positions"]
             at_rest = np.append(joints, OPEN_GRIPPER)

@@ -145,11 +145,12 @@ def check_scenario(
 def length_complaint(text: str) -> str:
     """Return a complaint if a text has more tokens than usual policies read; empty if it has not.
 
-    ``needs 71 tokens; only 64 are heard``.
+    ``needs 71 tokens; only 64 are heard``. A bound, which is not a number alone, is none.
     """
-    if tokens_of(text) <= USUAL_LIMIT:
+    shown = tokens_shown(text)
+    if tokens_of(text) <= USUAL_LIMIT or not shown.isdecimal():
         return ""
-    return f"needs {tokens_shown(text)} tokens; only {USUAL_LIMIT} are heard"
+    return f"needs {shown} tokens; only {USUAL_LIMIT} are heard"
 
 
 class _SceneChecker:

@@ -30,7 +30,10 @@ INTRODUCTION = "The table from above, the robot at the bottom."
 
 
 def draw_svg(scene: Scene) -> str:
-    """Return the picture; its title describes it in words."""
+    """Return the picture of an arrangement as SVG text, the robot at the bottom.
+
+    Its title describes it in words.
+    """
     width = 2 * HALF_WIDTH * SCALE
     table = (FARTHEST - NEAREST) * SCALE
     height = table + ROBOT_ROW
@@ -53,12 +56,15 @@ def draw_svg(scene: Scene) -> str:
 
 
 def _to_svg(x: float, y: float) -> tuple[float, float]:
-    """Convert from the robot base frame, m, to the picture."""
+    """Convert a point from the robot base frame (m; x forward, y left) to the picture's units.
+
+    The picture's x grows to the right and its y downwards.
+    """
     return (HALF_WIDTH - y) * SCALE, (FARTHEST - x) * SCALE
 
 
 def _draw(shape: Shape) -> str:
-    """Return a shape at its place, with its hole above it."""
+    """Return a shape at its place as SVG, with its hole drawn over it."""
     x, y = _to_svg(shape.x, shape.y)
     outer = _outline(shape, shape.half, shape.fill)
     hole = _outline(shape, shape.hole, HOLE_FILL)
@@ -68,7 +74,10 @@ def _draw(shape: Shape) -> str:
 
 
 def _outline(shape: Shape, half: float, fill: str) -> str:
-    """Return a square or circle around the origin; `half` is half its size, m."""
+    """Return a square or circle around the origin as SVG; `half` is half its size, m.
+
+    An object's hole is drawn by the same function; without a hole, `half` is 0 and nothing shows.
+    """
     length = half * SCALE
     if shape.form == "square":
         size = f'width="{2 * length:.1f}" height="{2 * length:.1f}"'
@@ -86,5 +95,6 @@ def _label(shape: Shape) -> str:
 
 
 def _text(text: str, x: float, y: float, anchor: str) -> str:
+    """Return a text as SVG at a point of the picture; `anchor` is start, middle or end."""
     position = f'x="{x:.1f}" y="{y:.1f}" font-size="{FONT_SIZE:g}" text-anchor="{anchor}"'
     return f"<text {position}>{escape(text)}</text>"

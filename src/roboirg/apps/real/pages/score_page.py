@@ -41,12 +41,12 @@ class VerdictButton(NamedTuple):
 
 
 def render_trial(trial_log: TrialLog, trial: PlannedTrial, *, nonce: str, message: str = "") -> str:
-    """Render the page of a trial.
+    """Return the HTML page of a trial: what to arrange and say, and a button for every verdict.
 
     Args:
         trial_log: with the records of the study.
         trial: to show.
-        nonce: allows the page's own style and script.
+        nonce: random text that allows the page's own style and script (Content-Security-Policy).
         message: result of the last click.
     """
     names = [planned.name for planned in trial_log.plan.trials]
@@ -85,7 +85,11 @@ def _name_at(names: Sequence[str], index: int) -> str:
 def verdict_buttons(
     trial: PlannedTrial, record: Record | None, state: str
 ) -> tuple[VerdictButton, ...]:
-    """Return a button for every verdict of a trial, with its key."""
+    """Return a button for every verdict of a trial, with its key: success, failures, void.
+
+    Failures have the keys 1, 2, … in the order of `failure_choices`. `record` is the trial's
+    newest, or None; `state` is open, scored or void.
+    """
     chosen = _present_choice(trial, record, state)
     done = "the robot did what was meant"
     buttons = [VerdictButton(SUCCESS, SUCCESS_KEY, done, SUCCESS, chosen == SUCCESS)]
@@ -101,7 +105,10 @@ def verdict_buttons(
 
 
 def _present_choice(trial: PlannedTrial, record: Record | None, state: str) -> str:
-    """Return the choice of the present verdict; empty if there is none."""
+    """Return the choice of the present verdict, for `TrialLog.score`; empty if there is none.
+
+    For example ``"success"``, ``"void"``, or ``"wrong_place:box_green"``.
+    """
     if record is None or state not in ("scored", "void"):
         return ""
     if state == "void":
@@ -117,6 +124,7 @@ def _present_choice(trial: PlannedTrial, record: Record | None, state: str) -> s
 
 @functools.cache
 def _template() -> jinja2.Template:
+    """Return the page's template, loaded once; its filter `svg` lets drawings pass unescaped."""
     from markupsafe import Markup
 
     def svg(text: str) -> Markup:

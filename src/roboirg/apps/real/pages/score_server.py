@@ -41,6 +41,7 @@ class ScoreServer(KeyedPageServer):
     """
 
     def __init__(self, plan: StudyPlan, folder: Path, operator: str, port: int = 0) -> None:
+        """Listen at the port, with a new key; answer once `serve_forever` is called."""
         check_page_support("The page")
         self.plan = plan
         self.folder = folder
@@ -57,7 +58,10 @@ class ScoreServer(KeyedPageServer):
         return TrialLog.read(self.plan, self.folder)
 
     def score(self, form: dict[str, str]) -> str:
-        """Store a verdict; returns the message for the operator.
+        """Store a verdict from the page's form; returns the message for the operator.
+
+        The form's ``revision`` must be the trial's present one, so that two open pages cannot
+        overwrite each other's verdicts; a lock keeps requests apart.
 
         Raises:
             UnknownNameError: the plan has no such trial.
@@ -87,7 +91,10 @@ class ScoreServer(KeyedPageServer):
         return message
 
     def _find_video(self, name: str) -> str:
-        """Return the path of a video in the folder; empty if it does not exist there."""
+        """Return the path of a video in the study's folder; empty if there is no such file in it.
+
+        Paths that lead out of the folder count as missing.
+        """
         path = PurePosixPath(name)
         is_inside = not path.is_absolute() and ".." not in path.parts
         if is_inside and (self.folder / path).is_file():
@@ -95,6 +102,7 @@ class ScoreServer(KeyedPageServer):
         return ""
 
     def _page(self, request: Request) -> Response:
+        """Answer a request for the page of a trial, rendered anew from the records on the disk."""
         trial_log = self.read_trial_log()
         trial = _select_trial(trial_log, request.query_params.get("trial", ""))
         message = request.query_params.get("message", "")
@@ -103,7 +111,11 @@ class ScoreServer(KeyedPageServer):
         )
 
     async def _take_form(self, request: Request) -> Response:
-        """Store a verdict, then redirect: reloading the page must not repeat it."""
+        """Store a verdict, then redirect: reloading the page must not repeat it.
+
+        An error of ours becomes the message on the trial's page; after success the next trial is
+        shown.
+        """
         body = await read_body(request, MAX_BODY_BYTES)
         form = dict(parse_qsl(body.decode("utf-8", "replace"), keep_blank_values=True))
         try:

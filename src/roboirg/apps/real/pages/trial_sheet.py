@@ -35,7 +35,10 @@ svg { float: left; height: 60mm; margin-right: 6mm; }
 
 
 def sheet_text(plan: StudyPlan) -> str:
-    """Return the page: each block and the demonstrations begin on paper of their own."""
+    """Return the sheet as HTML: each block, and the demonstrations, begin on paper of their own.
+
+    Trials are numbered over all blocks, in the order of the plan.
+    """
     page = _HEAD
     number = 1
     for block, trials in _by_block(plan).items():
@@ -63,7 +66,10 @@ def _section(plan: StudyPlan, title: str, content: Iterable[str]) -> str:
 
 
 def _block(trials: list[PlannedTrial], first_number: int) -> Iterator[str]:
-    """Yield what is to be arranged and meant in all trials of a block, and each trial."""
+    """Yield HTML: first what is to be arranged and meant in all trials of a block, then each trial.
+
+    `first_number` is that of the first trial in the whole study.
+    """
     first = trials[0]
     yield (
         f"{draw_svg(first.episode.scene)}\n"
@@ -108,5 +114,6 @@ def _demonstration(planned: PlannedDemonstration) -> str:
 
 
 def _listed(lines: Iterable[str]) -> str:
+    """Return lines of text as an HTML list, escaped."""
     items = [f"<li>{escape(line)}</li>" for line in lines]
     return f"<ul>{''.join(items)}</ul>\n"

@@ -76,7 +76,7 @@ def _shape(item: SceneObject) -> Shape:
 
 
 def _outline(item: SceneObject) -> tuple[Form, float, float]:
-    """Return form, half and hole of an object's shape."""
+    """Return form, half size (m) and half size of the hole (m; 0 for none) of an object's shape."""
     if item.kind == "box":
         return "square", object_sizes.BOX_HALF, object_sizes.BOX_HALF - object_sizes.BOX_WALL
     if item.kind == "tape":

@@ -65,7 +65,8 @@ def counterbalanced_order(task: str) -> tuple[Arrangement, ...]:
     Pairs of neighbors are opposites in all factors. So, for any number of trials, each factor is as
     even as possible: target colors, left colors, numbers and arrangements differ by at most one,
     and the target's sides by at most two. (Color and left color decide the side: of ten trials,
-    only two of the three can be even.)
+    only two of the three can be even.) Two colors, no number -> four arrangements: green target,
+    green left; purple, purple; green, purple; purple, green.
     """
     episode = get_episode(task, "train", 0)
     first, second = sorted(left_to_right(episode.scene, target_kind(task)))
@@ -81,13 +82,15 @@ def counterbalanced_order(task: str) -> tuple[Arrangement, ...]:
 
 
 def _numbers(episode: Episode) -> list[int | None]:
-    """Return the numbers of times that goals of a scene have; only None without a number."""
+    """Return how often goals of a scene may ask to handle the target: ``[1, 2]``, or ``[None]``."""
     numbers = {goal.as_mapping().get("repeats") for goal in goals_of(episode)}
     return cast("list[int | None]", sorted(numbers, key=str))
 
 
 def counterbalanced_episodes(task: str, split: str, count: int) -> tuple[int, ...]:
     """Return the indices of a split's first episodes whose arrangements are as even as possible.
+
+    The order of arrangements repeats; each repetition uses the next episode of an arrangement.
 
     Args:
         task: a task for a real robot.

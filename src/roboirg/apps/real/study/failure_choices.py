@@ -50,7 +50,11 @@ class FailureChoice(NamedTuple):
 
 
 def failure_choices(episode: Episode) -> tuple[FailureChoice, ...]:
-    """Return the failures of a trial: grounding failures by the task's rules, then the others."""
+    """Return the failures of a trial among which an operator chooses.
+
+    First those by the task's rules, such as *put the tape into the purple box*; then the others,
+    which are the same for all tasks. Pages number them in this order.
+    """
     choices = []
     for rule in _rules_of(episode):
         if rule.failure is not None:
@@ -64,7 +68,7 @@ def failure_choices(episode: Episode) -> tuple[FailureChoice, ...]:
 
 
 def _rules_of(episode: Episode) -> list[Rule]:
-    """Return the rules that stages forbid to break, each once."""
+    """Return the rules that stages forbid to break, each once, in the order of the stages."""
     found: dict[Rule, None] = {}
     for stage in episode.stages:
         for condition in stage.forbids:

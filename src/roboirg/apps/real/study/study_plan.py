@@ -126,7 +126,10 @@ class StudyPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     @property
     def twin_plans(self) -> dict[str, Plan]:
-        """For each task the plan with which ``roboirg run`` plays its trials in simulation."""
+        """For each task the plan with which ``roboirg run`` plays its trials in simulation.
+
+        It has the policies, settings and episodes of the task's trials, sorted.
+        """
         jobs: dict[str, list[Job]] = {}
         for trial in self.trials:
             jobs.setdefault(trial.job.task, []).append(trial.job)
@@ -181,6 +184,9 @@ def make_study(
 ) -> StudyPlan:
     """Return a balanced plan in a random order.
 
+    The same arguments give the same plan: blocks and the orders of their trials are drawn in turns,
+    then the demonstrations.
+
     Args:
         policies: specs, ``NAME=SPEC``, or labels of policies that other software runs.
         tasks: for a real robot.
@@ -188,6 +194,9 @@ def make_study(
         trials: arrangements per task; each policy meets each of them in every setting.
         demonstrations: per task.
         seed: of the orders.
+
+    Raises:
+        InvalidValueError: a name is missing, unknown or given twice, or a number is out of range.
     """
     policies_named = [name_and_spec(policy) for policy in policies]
     names = tuple(name for name, _ in policies_named)
@@ -252,7 +261,11 @@ class _Block(NamedTuple):
 
 
 def _blocks(tasks: Sequence[str], trials: int, rng: np.random.Generator) -> Iterator[_Block]:
-    """Yield the blocks: tasks alternate, their episodes in random order."""
+    """Yield the blocks, one arrangement each: tasks alternate, their episodes in random order.
+
+    A generator on purpose: `_trials` draws from the same `rng` between two blocks, so making it a
+    list changes all plans.
+    """
     episodes = {}
     for task in tasks:
         chosen = counterbalanced_episodes(task, TRIAL_SPLIT, trials)
@@ -270,7 +283,8 @@ def _trials(
 ) -> tuple[PlannedTrial, ...]:
     """Return a trial of each policy in each setting for every block, in a random order there.
 
-    The policies are unread, as they may be labels of what other software runs.
+    Drawing is lazy: the next block is drawn after the order of the trials of the one before. The
+    policies are unread, as they may be labels of what other software runs.
     """
     conditions = list(product(settings, range(len(refs))))
     planned = []
@@ -292,7 +306,10 @@ def _trials(
 def _demonstrations(
     tasks: Sequence[str], count: int, rng: np.random.Generator
 ) -> tuple[PlannedDemonstration, ...]:
-    """Return the demonstrations: tasks alternate, their episodes in random order."""
+    """Return the demonstrations: tasks alternate, their episodes in random order.
+
+    Draws one order for each task, in the order of `tasks`; `count` are those of each task.
+    """
     episodes = {}
     for task in tasks:
         chosen = counterbalanced_episodes(task, DEMONSTRATION_SPLIT, count)
@@ -318,7 +335,11 @@ def _shared_settings(tasks: Sequence[str]) -> tuple[str, ...]:
 def _check_each_once(
     policies: Sequence[str], tasks: Sequence[str], settings: Sequence[str]
 ) -> None:
-    """Check that there are names of each kind, each once, and a letter for each policy."""
+    """Check that there are names of each kind, each once, and a letter for each policy.
+
+    Raises:
+        InvalidValueError: a kind has none, a name is given twice, or there are over 26 policies.
+    """
     for kind, names in (("policy", policies), ("task", tasks), ("setting", settings)):
         if not names:
             raise InvalidValueError(f"No {kind} was given.")

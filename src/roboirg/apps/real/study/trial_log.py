@@ -51,7 +51,9 @@ class TrialLog:
 
     @classmethod
     def read(cls, plan: StudyPlan, folder: Path) -> TrialLog:
-        """Read the records of a folder, but for simulated ones.
+        """Read the records of a folder that are of this plan's trials and of a real robot.
+
+        Records of simulated episodes, which may be in the same folder, are passed over.
 
         Raises:
             StoreError: the records cannot be read.
@@ -74,7 +76,7 @@ class TrialLog:
         return len(self._history.get(name, ()))
 
     def state(self, name: str) -> State:
-        """Return the state of a trial."""
+        """Return the state of a trial: open, scored or void; its newest record decides."""
         record = self.newest(name)
         if record is None:
             return "open"
@@ -92,12 +94,15 @@ class TrialLog:
     ) -> Record:
         """Store an operator's verdict and return its record, which is then on the disk.
 
+        A trial may be scored again: the new record replaces the old one in tables, and keeps its
+        video and other fields.
+
         Args:
             trial: to score.
             choice: ``success``, ``void``, or the key of one of the trial's failures.
             operator: name of the operator.
             note: free text.
-            video: path of a video, relative to the folder.
+            video: path of a video, relative to the folder; empty keeps that of the last record.
 
         Raises:
             InvalidValueError: the trial has no such failure.
@@ -126,23 +131,27 @@ class TrialLog:
 
 
 def _verdict(trial: PlannedTrial, choice: str, note: str) -> dict[str, Any]:
-    """Return the fields of a record that a choice decides."""
-    fields: dict[str, Any] = {"outcome": "success", "error": None, "cause": None}
-    fields["attribution"] = None
+    """Return the fields of a record that a choice decides: outcome, error, cause and attribution.
+
+    `choice` is `SUCCESS`, `VOID_CHOICE` or the key of a failure.
+    """
+    cleared = {"error": None, "cause": None, "attribution": None}  # of an earlier verdict
+    if choice == SUCCESS:
+        return {**cleared, "outcome": "success"}
     if choice == VOID_CHOICE:
-        fields["outcome"] = "error"
-        fields["error"] = "infrastructure"
-        fields["cause"] = f"{VOID}; {note}" if note else VOID
-    elif choice != SUCCESS:
-        attribution = _failure(trial, choice).attribution(note)
-        fields["outcome"] = "failure"
-        fields["cause"] = attribution.sentence
-        fields["attribution"] = attribution
-    return fields
+        cause = f"{VOID}; {note}" if note else VOID
+        return {**cleared, "outcome": "error", "error": "infrastructure", "cause": cause}
+    failure = _failure(trial, choice).attribution(note)
+    return {
+        **cleared,
+        "outcome": "failure",
+        "cause": failure.sentence,
+        "attribution": failure,
+    }
 
 
 def _failure(trial: PlannedTrial, key: str) -> FailureChoice:
-    """Return the failure of a key.
+    """Return the failure of a key, such as ``"wrong_place:box_green"``.
 
     Raises:
         InvalidValueError: the trial has no such failure.

@@ -57,6 +57,7 @@ class ChallengePolicy(RemotePolicy):
     observe_every: ClassVar[int] = 1
 
     def __init__(self, url: str, seed: int = 0) -> None:
+        """Check URL and options; choose the fields that requests have."""
         super().__init__(url, seed)
         self.depth = self.options.depth
         self.calibration = self.options.calibration
@@ -106,7 +107,7 @@ class ChallengeService(Service):
         """Return the reply to a reset or a request for actions.
 
         The first request of an episode has the demonstration before its newest observation; later
-        ones have what was seen since the last request.
+        ones have what was seen since the last request, which becomes the observation's history.
         """
         if message.get("reset"):
             self.forget()
@@ -163,6 +164,9 @@ def _read_columns(message: Message) -> dict[str, list[Any]]:
     """Return the lists in a request by our names of the fields, all of the same length.
 
     ``front_rgb_list`` becomes ``front_rgb``. Depth and matrices are optional.
+
+    Raises:
+        ValueError: a field is missing, no list, empty, or of another length.
     """
     fields = dict(FIELDS)
     for name, field in (DEPTH_FIELDS | EXTRINSIC_FIELDS).items():
@@ -177,7 +181,10 @@ def _read_columns(message: Message) -> dict[str, list[Any]]:
 
 
 def _stack(observations: list[Observation]) -> dict[str, Any]:
-    """Return all observations but the last as a demonstration: by field, an array of all."""
+    """Return all observations but the last as a demonstration: by field, an array (T, …).
+
+    Without any before the last, T is 0.
+    """
     demonstration: dict[str, Any] = {}
     for field in observations[0]:
         if field != "instruction":

@@ -78,6 +78,7 @@ class MmeVlaPolicy(RemotePolicy):
     lowers_prompt: ClassVar[bool] = True
 
     def __init__(self, url: str, seed: int = 0) -> None:
+        """Check URL and options; with `history`, every frame is required, and the whole video."""
         super().__init__(url, seed)
         self.demonstration_frames = "none"
         self.observe_every: int | None = None
@@ -108,7 +109,7 @@ class MmeVlaPolicy(RemotePolicy):
         self._subgoal = subgoal.lower()
 
     def request_actions(self, observation: Observation) -> Actions:
-        """Send the frames since the last call, then request actions."""
+        """Send the frames since the last call, then request actions; return the first `execute`."""
         if self.options.history:
             self._send_frames(observation)
         message = {
@@ -124,15 +125,15 @@ class MmeVlaPolicy(RemotePolicy):
     def _send_frames(self, observation: Observation) -> None:
         """Add the new frames to the server's memory, in messages of at most `part` frames.
 
-        In the first call these are the T frames of the video and the first one of the policy's
-        turn, which has the number T (``exec_start_idx``); later, one after each action since then.
+        In the first call of an episode these are the T frames of the video and the first one of the
+        policy's turn, which has the number T (``exec_start_idx``); later, one after each action
+        since then.
         """
         demonstration = self._demonstration
         self._demonstration = None
         frames = _new_frames(demonstration, observation)
         start = 0 if demonstration is None else len(demonstration["joint_positions"])
-        part = list(itertools.islice(frames, self.options.part))
-        while part:
+        while part := list(itertools.islice(frames, self.options.part)):
             pictures = np.stack([frame.picture for frame in part])
             message = {
                 "add_buffer": True,
@@ -142,7 +143,6 @@ class MmeVlaPolicy(RemotePolicy):
             }
             self.request_confirmed(message, "add_buffer_finished")
             start = 0  # only the first message needs it: the server keeps the first that is not 0
-            part = list(itertools.islice(frames, self.options.part))
 
 
 @dataclass
@@ -160,7 +160,10 @@ class _SentFrames:
     turn_start: int = 0
 
     def add(self, message: Message) -> None:
-        """Add the frames in a message, and the number of the first one of the policy's turn."""
+        """Add the frames in a message, and the number of the first one of the policy's turn.
+
+        The first number that is not 0 counts, as the published server keeps it.
+        """
         images = read_array(message, "images", "uint8", ("T", 1, "H", "W", 3))
         states = read_array(message, "state", "real numbers", ("T", 8))
         self.count += len(images)
@@ -183,7 +186,10 @@ class MmeVlaService(Service):
         self._sent = _SentFrames()
 
     def handle(self, message: Message) -> dict[str, Any]:
-        """Return the reply to a reset, to frames for the memory, or to a request for actions."""
+        """Return the reply to a reset, to frames for the memory, or to a request for actions.
+
+        A message with ``reset`` is a reset whatever else it has; then ``add_buffer`` counts.
+        """
         begin = time.perf_counter()
         if message.get("reset"):
             self.forget()
@@ -201,7 +207,7 @@ class MmeVlaService(Service):
         """Return the policy's actions and their milliseconds; the first request begins its episode.
 
         Of the kept frames, those before the policy's turn are then its demonstration; what comes
-        between two requests is its history.
+        between two requests is its history. Kept frames are dropped.
         """
         observation = read_request(message)
         instruction = observation["instruction"]
@@ -226,7 +232,8 @@ class MmeVlaService(Service):
 def _new_frames(demonstration: Demonstration | None, observation: Observation) -> Iterator[_Frame]:
     """Yield the frames of the video, if there is one to send, then those of the policy's turn.
 
-    The video's length is that of its joints: to read its pictures would draw them.
+    The video's length is that of its joints: to read its pictures would draw them. `demonstration`
+    is None for all but the first request of an episode.
     """
     if demonstration is not None and len(demonstration["joint_positions"]):
         states = proprioception(demonstration["joint_positions"], demonstration["gripper"])
@@ -237,13 +244,18 @@ def _new_frames(demonstration: Demonstration | None, observation: Observation) -
 
 
 def _state(observation: Observation) -> NDArray[np.float32]:
+    """Return what the server calls the state: seven joints (rad) and the first finger (m), (8,)."""
     return proprioception(observation["joint_positions"], observation["gripper"])
 
 
 def _demonstration(
     frames: Sequence[dict[str, NDArray[Any]]], observation: Observation
 ) -> Demonstration:
-    """Return the frames before the policy's turn; the protocol has no wrist pictures of them."""
+    """Return the frames before the policy's turn as a demonstration, by field, arrays (T, …).
+
+    The protocol has no wrist pictures of them. Without frames T is 0; `observation` gives the
+    shapes.
+    """
     demonstration: dict[str, NDArray[Any]] = {}
     for name in ("front_rgb", "joint_positions", "gripper"):
         if frames:

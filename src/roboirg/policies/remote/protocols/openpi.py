@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from roboirg.core.actions import Actions
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.policies.contract.base import close_policy
 from roboirg.policies.contract.option_checking import NOT_COMPARED
@@ -53,6 +54,7 @@ class OpenpiPolicy(RemotePolicy):
     deterministic: ClassVar[bool] = False
 
     def __init__(self, url: str, seed: int = 0) -> None:
+        """Check URL and options; pictures without a key are not required."""
         super().__init__(url, seed)
         self._keys: dict[str, str] = {}
         """The keys of the pictures, by the camera."""
@@ -61,12 +63,21 @@ class OpenpiPolicy(RemotePolicy):
         if self.options.wrist:
             self._keys["wrist"] = self.options.wrist
         self.cameras = tuple(self._keys)
+        names = [self.options.state, self.options.prompt, *self._keys.values()]
+        if len(set(names)) < len(names):
+            raise InvalidValueError(
+                f"Policy {url!r} has the key of one entry of its requests for another, too; front, "
+                "wrist, state and prompt must differ."
+            )
 
     def begin_episode(self, demonstration: Demonstration) -> None:
         """Do nothing: the protocol has neither a reset nor a memory."""
 
     def request_actions(self, observation: Observation) -> Actions:
-        """Send the observation; return the rows of the reply to execute."""
+        """Send the observation; return the first `execute` rows of the reply, or all.
+
+        The names of the message's entries are those that the URL's options give.
+        """
         message: dict[str, Any] = {}
         for camera, key in self._keys.items():
             message[key] = observation[f"{camera}_rgb"]  # type: ignore[literal-required]
@@ -86,7 +97,10 @@ class OpenpiService(Service):
         return OpenpiService(self.make_policy)
 
     def handle(self, message: Message) -> dict[str, Any]:
-        """Return the reply to a request for actions."""
+        """Return the reply to a request: the policy's actions, and how long they took.
+
+        Another prompt than the last one begins a new episode, as the protocol has no sign of it.
+        """
         observation = read_request(message)
         # The protocol has no beginning of an episode: another prompt is taken for one.
         if self.policy is None or observation["instruction"] != self.said:
@@ -97,6 +111,7 @@ class OpenpiService(Service):
 
 
 def _empty_video(shape: tuple[int, ...]) -> dict[str, Any]:
+    """Return a demonstration without frames, given the shape of a picture."""
     return {
         "front_rgb": np.zeros((0, *shape), np.uint8),
         "wrist_rgb": np.zeros((0, *shape), np.uint8),

@@ -16,6 +16,7 @@ from roboirg.core.actions import Actions
 from roboirg.core.errors import InvalidValueError, PolicyReplyError, RoboIRGError
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.core.version import __version__
+from roboirg.policies.contract.json_values import as_json
 from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
 from roboirg.policies.remote.protocols import Protocol
 from roboirg.policies.remote.remote_policy import RemotePolicy
@@ -52,6 +53,7 @@ class VlaEvalPolicy(RemotePolicy):
     deterministic: ClassVar[bool] = False
 
     def __init__(self, url: str, seed: int = 0) -> None:
+        """Check URL and options; the observations have what these ask for."""
         super().__init__(url, seed)
         self.cameras = ("front", "wrist") if self.options.wrist else ("front",)
         self.demonstration_frames = "all" if self.options.video else "none"
@@ -69,9 +71,10 @@ class VlaEvalPolicy(RemotePolicy):
         self._number = 0
         ours = {"harness_version": f"roboirg {__version__}", "protocol_version": PROTOCOL_VERSION}
         hello = self._send("hello", ours, awaited="hello")
-        if hello.get("protocol_version") != PROTOCOL_VERSION:
+        protocol_version = as_json(hello.get("protocol_version"))
+        if protocol_version != PROTOCOL_VERSION:
             raise PolicyReplyError(
-                f"{self.connection} speaks version {_clipped(hello.get('protocol_version'))} of "
+                f"{self.connection} speaks version {_clipped(protocol_version)} of "
                 f"vla-eval's protocol; this client speaks version {PROTOCOL_VERSION}."
             )
         # Such as "openvla, vla-eval 0.8".
@@ -79,7 +82,10 @@ class VlaEvalPolicy(RemotePolicy):
         return {"version": version, **hello}
 
     def begin_episode(self, demonstration: Demonstration) -> None:
-        """Begin an episode; the demonstration goes with the first observation."""
+        """Begin an episode; the demonstration goes with the first observation, if it is wanted.
+
+        The URL and the server must both want it.
+        """
         self._check_params()
         self._subgoal = None
         sends_video = self.options.video and self._wants("send_video_history")
@@ -148,8 +154,8 @@ class VlaEvalPolicy(RemotePolicy):
             self.connection.exchange(data, "", is_numbered=True)
             return {}
         answer = self.connection.exchange(data, is_numbered=True)
-        answer_kind = answer.get("type")
-        number = answer.get("seq")
+        answer_kind = as_json(answer.get("type"))  # arrays cannot be compared
+        number = as_json(answer.get("seq"))
         content = answer.get("payload")
         if answer_kind == awaited and number == self._number and isinstance(content, dict):
             return content
@@ -163,15 +169,19 @@ class VlaEvalPolicy(RemotePolicy):
             f"{_clipped(number)}, where {awaited!r} with number {self._number} was expected."
         )
 
+    @property
+    def _server_params(self) -> Mapping[str, Any]:
+        """What the server's hello says about observations, by name; empty if it says nothing."""
+        params = self.metadata.get("observation_params")
+        return params if isinstance(params, Mapping) else {}
+
     def _wants(self, name: str) -> bool:
         """Return whether the server wants to be shown something; by default it does."""
-        params = self.metadata.get("observation_params")
-        return not isinstance(params, Mapping) or bool(params.get(name, True))
+        return bool(self._server_params.get(name, True))
 
     def _check_params(self) -> None:
         """Raise if the server acts in another action space than the URL gives."""
-        params = self.metadata.get("observation_params")
-        wanted = params.get("action_space") if isinstance(params, Mapping) else None
+        wanted = self._server_params.get("action_space")
         if wanted not in (None, self.actions):
             raise InvalidValueError(
                 f"The server acts in the action space {_clipped(wanted)!r}, but the policy's URL "

@@ -58,17 +58,21 @@ class HttpModel:
     """
 
     def __init__(self, options: ModelOptions) -> None:
+        """Read the key and the proxy from the environment; nothing is sent yet."""
         self.options = options
         self._key = options.key()
         proxy = proxy_of(options.url)
         self._name = f"Model {options.model!r} at {options.address()}{proxy.words}"
-        # The library itself takes a proxy for this machine, too, and does not name it.
-        transport = httpx.HTTPTransport(proxy=proxy.url)
-        self._client = httpx.Client(transport=transport, timeout=options.timeout_s)
-        weakref.finalize(self, self._client.close)  # the connection ends with this object
+        self._proxy_url = proxy.url
+        self._client = self._new_client()
 
     def answer(self, query: ModelQuery) -> ModelReply:
-        """Send a query and return the reply; errors become those that `Model` names."""
+        """Send a query and return the reply; errors become those that `Model` names.
+
+        Status 200 with JSON of the provider's form is a reply. JSON of another form may have been
+        paid for (UnknownCostError); of other statuses, some mean *later* (ModelBusyError), the rest
+        are refusals.
+        """
         if not self.options.structured:
             query = query._replace(schema=None)
         service = self.options.service
@@ -107,22 +111,36 @@ class HttpModel:
             )
         raise PolicyReplyError(f"{self._name} refused or failed: {words}")
 
+    def _new_client(self) -> httpx.Client:
+        """Return a client without connections, which end with this object at the latest."""
+        # The library itself takes a proxy for this machine, too, and does not name it.
+        transport = httpx.HTTPTransport(proxy=self._proxy_url)
+        client = httpx.Client(transport=transport, timeout=self.options.timeout_s)
+        weakref.finalize(self, client.close)
+        return client
+
     def _post(self, request: HttpRequest) -> _Response:
         """Post a request and return the response; raise what `_fetch` has raised.
 
         The client's limits are those of single reads, which begin again with every byte; so a
-        thread reads, and the time until it is done is limited here.
+        thread reads, and the time until it is done is limited here. A connection whose time is over
+        is closed, so that the thread ends, even if the service sends for ever.
         """
         fetched: Future[_Response] = Future()
         thread = threading.Thread(target=self._fetch, args=(request, fetched), daemon=True)
         with waiting(f"the reply of {self._name}"):
             thread.start()
-            return fetched.result(timeout=self.options.timeout_s)
+            try:
+                return fetched.result(timeout=self.options.timeout_s)
+            except TimeoutError:
+                self._client.close()
+                self._client = self._new_client()
+                raise
 
     def _fetch(self, request: HttpRequest, fetched: Future[_Response]) -> None:
         """Post a request; put the response, or any error, where another thread waits.
 
-        The error is a `ValueError` if the content is too large.
+        Runs in a thread of its own. The error is a `ValueError` if the content is too large.
         """
         # A few compressed kilobytes may become gigabytes: nothing is unpacked.
         plain = {"Content-Type": "application/json", "Accept-Encoding": "identity"}

@@ -137,7 +137,7 @@ class ModelOptions(BaseModel):
     @field_validator("base_url")
     @classmethod
     def _has_no_secret(cls, url: str | None) -> str | None:
-        """Refuse an address that could hold a secret, or that is none."""
+        """Refuse an address that could hold a secret, or that is none; None is the provider's."""
         parts = urlsplit(url or "http://provider")
         if parts.scheme not in ("http", "https") or not parts.hostname:
             raise ValueError("an address must begin with http:// or https:// and name a host")
@@ -209,7 +209,10 @@ class ModelOptions(BaseModel):
         return self.prices != TokenPrices()
 
     def cost_usd(self, reply: ModelReply) -> float:
-        """Return what a reply costs: 0 without prices, NaN if tokens with a price are unknown."""
+        """Return what a reply costs in US dollars: 0 without prices.
+
+        NaN if tokens that have a price are not known; such a cost is unknown, not 0.
+        """
         cost = 0.0
         prices = self.prices
         if prices.input:
@@ -259,17 +262,19 @@ def tokens_of(count: object) -> float:
 
 
 def given(**entries: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
-    """Return the entries that are not None."""
+    """Return the entries that are not None: ``given(a=1, b=None)`` -> ``{"a": 1}``."""
     return {name: value for name, value in entries.items() if value is not None}
 
 
 def reported_count(usage: object, name: str, absent: int | None = None) -> float:
     """Return a count of tokens from what a service reports; NaN if it is unknown.
 
+    ``{"prompt_tokens": 12}``, ``"prompt_tokens"`` -> 12.
+
     Args:
         usage: the counts by name, or anything else.
         name: of the count.
-        absent: the count if there is none of that name.
+        absent: the count if there is none of that name; None for unknown.
     """
     if not isinstance(usage, dict):
         return math.nan
@@ -293,7 +298,11 @@ class Model(Protocol):
 def config_version(model: ModelOptions, about: Mapping[str, Any]) -> str:
     """Return the model's name and a fingerprint of all else that may change its answers.
 
-    The address is left out: a model at another port is the same model.
+    ``"gpt-4o 1a2b3c4d5e6f"``. The address is left out: a model at another port is the same model.
+
+    Args:
+        model: the model and its options.
+        about: what else counts, such as the listener's options and prompts, as JSON values.
     """
     about_model = model.about()
     del about_model["address"]

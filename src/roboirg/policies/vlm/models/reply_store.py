@@ -19,7 +19,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from roboirg.core.errors import BudgetError
+from roboirg.core.errors import BudgetError, EndOfRunError
+from roboirg.core.field_types import MOST_SECONDS
 from roboirg.core.handed_keys import without_keys
 from roboirg.core.plain_text import counted
 from roboirg.core.waiting import waiting
@@ -46,17 +47,26 @@ CREATE TABLE IF NOT EXISTS services (name TEXT PRIMARY KEY, next_at REAL) WITHOU
 
 _REPLIES = """
 SELECT sent, text, input_tokens, output_tokens
-FROM replies WHERE episode = ? AND call = ? AND sent NOT LIKE 'unread %'
+FROM replies
+WHERE episode = ? AND call = ? AND sent NOT LIKE 'unread %' AND typeof(text) = 'text'
 """
-# Older stores may hold costs that cannot be, which are unknown.
+# Older stores may hold costs that cannot be, which are unknown. SQLite compares a text with a
+# number, too.
 _SPENT = """
-SELECT total(cost_usd), count(*) - count(CASE WHEN cost_usd >= 0 THEN 1 END) FROM replies
+SELECT total(cost_usd), count(*) - count(CASE WHEN typeof(cost_usd) = 'real' AND cost_usd >= 0
+THEN 1 END) FROM replies
 """
+_CODE = "SELECT count(*) FROM sqlite_master WHERE type IN ('view', 'trigger')"
+"""Counts what can compute something, maybe without end, in a stranger's file."""
 
 _POSTPONE = """
 INSERT INTO services VALUES (?, ?)
 ON CONFLICT (name) DO UPDATE SET next_at = max(next_at, excluded.next_at)
 """
+
+
+class ReplyFileError(EndOfRunError):
+    """The file with a run's replies cannot be read or written, so no episode could be played."""
 
 
 class ReplySettings(NamedTuple):
@@ -75,14 +85,16 @@ class ReplySettings(NamedTuple):
 
 @dataclass
 class ReplyStore:
-    """The store during one episode; the file is opened when it is first used.
+    """The store of a run's replies during one episode; the file is opened when it is first used.
+
+    A reply is found by episode, number of the call in it, and digest of what was sent.
 
     Args:
         settings: of the run.
         episode: name of the episode, policy and words, the same when it is played again.
 
     Attributes:
-        calls: number of the episode's next call.
+        calls: number of the episode's next call; whoever has used a reply adds 1.
     """
 
     settings: ReplySettings
@@ -91,7 +103,10 @@ class ReplyStore:
 
     @functools.cached_property
     def _database(self) -> sqlite3.Connection:
-        """The run's file of replies, opened and if need be made when it is first used."""
+        """The run's file of replies, opened and if need be made when it is first used.
+
+        Every statement is a transaction of its own, unless one is begun (isolation level None).
+        """
         self.settings.folder.mkdir(parents=True, exist_ok=True)
         database = sqlite3.connect(
             self.settings.folder / REPLIES_FILE, timeout=_LOCK_S, isolation_level=None
@@ -99,7 +114,25 @@ class ReplyStore:
         # What is committed is on disk, and survives a kill at any moment.
         database.execute("PRAGMA synchronous = FULL")
         database.executescript(_TABLES)
+        (count,) = database.execute(_CODE).fetchone()
+        if count:
+            raise sqlite3.DatabaseError("it holds views or triggers")
         return database
+
+    def _execute(self, statement: str, *values: object) -> list[tuple[Any, ...]]:
+        """Carry out a statement, and return the rows that it finds.
+
+        Raises:
+            ReplyFileError: the file is damaged, foreign or locked, or the disk is full.
+        """
+        try:
+            return self._database.execute(statement, values).fetchall()
+        except sqlite3.Error as error:
+            path = self.settings.folder / REPLIES_FILE
+            raise ReplyFileError(
+                f"The replies of models in {path} cannot be read or written ({error}); if the file "
+                "is damaged, move it away, and the models are asked anew."
+            ) from error
 
     def close(self) -> None:
         """Close the file if it has been opened."""
@@ -114,7 +147,7 @@ class ReplyStore:
         """
         if self.settings.anew:
             return {}
-        rows = self._database.execute(_REPLIES, (self.episode, self.calls))
+        rows = self._execute(_REPLIES, self.episode, self.calls)
         replies: dict[str, ModelReply] = {}
         for sent, text, input_tokens, output_tokens in rows:
             replies[sent] = ModelReply(
@@ -127,10 +160,8 @@ class ReplyStore:
 
         SQLite stores NULL for NaN, which is unknown.
         """
-        self._database.execute(
-            "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?, ?, ?, ?)",
-            (self.episode, self.calls, sent, *reply, cost_usd),
-        )
+        insert = "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?, ?, ?, ?)"
+        self._execute(insert, self.episode, self.calls, sent, *reply, cost_usd)
 
     def keep_unread(self) -> None:
         """Store that a reply to the next call could not be read: what it cost is unknown."""
@@ -150,7 +181,7 @@ class ReplyStore:
                 f"--max-cost needs the prices of model {model.model!r}; give input_price and "
                 "output_price, in US dollars per million tokens."
             )
-        spent, unknown = self._database.execute(_SPENT).fetchone()
+        ((spent, unknown),) = self._execute(_SPENT)
         if unknown:
             raise BudgetError(
                 f"--max-cost cannot be kept: what {counted(unknown, 'reply', 'replies')} cost is "
@@ -167,31 +198,36 @@ class ReplyStore:
     def wait_for_turn(self, service: str, per_minute: float | None) -> None:
         """Wait until a service may be asked, of all processes of the run.
 
+        The file has the time at which each service is free again; this call moves it on by the gap
+        between requests, in one transaction, and then sleeps until its own turn.
+
         Args:
             service: its address and model.
             per_minute: requests that it takes; None for as many as there are.
         """
         gap = 0.0 if per_minute is None else 60.0 / per_minute
+        self._execute("BEGIN IMMEDIATE")
         with self._database:  # which commits
-            self._database.execute("BEGIN IMMEDIATE")
-            (next_at,) = self._database.execute(
-                "SELECT total(next_at) FROM services WHERE name = ?", (service,)
-            ).fetchone()
             now = time.time()
+            # No turn is so far away: a clock was wrong, or the file is a stranger's.
+            self._execute("DELETE FROM services WHERE next_at > ?", now + MOST_SECONDS)
+            ((next_at,),) = self._execute(
+                "SELECT total(next_at) FROM services WHERE name = ?", service
+            )
             # The first to come may ask now, each other one `gap` seconds after the one before.
             turn = max(now, next_at)
-            self._database.execute(_POSTPONE, (service, turn + gap))
+            self._execute(_POSTPONE, service, turn + gap)
         if turn > now:
             with waiting(f"its turn at {service}", is_queue=True):
                 time.sleep(turn - now)
 
     def pause(self, service: str, seconds: float) -> None:
         """Let no process of the run ask a service anything for some seconds."""
-        self._database.execute(_POSTPONE, (service, time.time() + seconds))
+        self._execute(_POSTPONE, service, time.time() + seconds)
 
 
 def digest(query: ModelQuery, options: ModelOptions) -> str:
-    """Return a digest of everything that is sent to a model and may change its reply.
+    """Return a digest (SHA-256) of everything that is sent to a model and may change its reply.
 
     Each part leads with its kind and size, so that no two different queries give the same bytes.
     Stored replies are found by it, so that a change here makes runs ask again.
@@ -224,7 +260,7 @@ _stores: list[ReplyStore] = []
 def use_replies(settings: ReplySettings | None, episode: str) -> Iterator[None]:
     """Let the models of an episode use the run's store while the block runs.
 
-    The file is not made before a model is asked.
+    The file is not made before a model is asked. None for `settings`: the run keeps no replies.
     """
     if settings is None:
         yield

@@ -18,14 +18,18 @@ from roboirg.policies.vlm.models.model import (
     reported_count,
 )
 from roboirg.util.media import Picture, encode_png, sample_evenly
-from roboirg.util.reply_reading import with_thoughts
+from roboirg.util.reply_reading import CUT_OFF, with_thoughts
 
 _ANSWERS = frozenset({"text", "output_text"})
 """Types of parts that are answers; all others are thoughts, or nothing that can be read."""
 
 
 def write(query: ModelQuery, options: ModelOptions, key: str) -> HttpRequest:
-    """Return the HTTP request for a query, in the form of OpenAI's chat completions."""
+    """Return the HTTP request for a query, in the form of OpenAI's chat completions.
+
+    Options that are None are left out of the body, so that the service's defaults count. The bytes
+    for equal queries are equal.
+    """
     response_format = None
     if query.schema:
         form = {"name": "answer", "strict": True, "schema": query.schema}
@@ -47,7 +51,8 @@ def read(reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server
 
     Servers differ: a text comes whole or in parts, and thoughts as parts or in a field apart.
     """
-    message = reply["choices"][0]["message"]
+    choice = reply["choices"][0]
+    message = choice["message"]
     parts = message.get("content") or ""
     if isinstance(parts, str):
         parts = [{"type": "text", "text": parts}]
@@ -56,9 +61,12 @@ def read(reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server
     said_apart = message.get("reasoning_content") or message.get("reasoning")
     if said_apart:
         thoughts.append(said_apart)
+    text = with_thoughts(answer, thoughts)
+    if choice.get("finish_reason") == "length":
+        text += CUT_OFF
     usage = reply.get("usage")
     return ModelReply(
-        with_thoughts(answer, thoughts),
+        text,
         reported_count(usage, "prompt_tokens"),
         reported_count(usage, "completion_tokens"),
     )
@@ -73,7 +81,10 @@ def chat_messages(query: ModelQuery, options: ModelOptions) -> list[dict[str, An
 
 
 def _message(turn: ChatTurn, options: ModelOptions) -> dict[str, Any]:
-    """Return a turn of the conversation as a message; those of the model are texts only."""
+    """Return a turn of the conversation as a message; those of the model are texts only.
+
+    ``{"role": "user", "content": [{"type": "text", "text": "…"}, …]}``
+    """
     if turn.role == "model":
         return {"role": "assistant", "content": "".join(map(str, turn.parts))}
     pieces: list[dict[str, Any]] = []
@@ -83,7 +94,10 @@ def _message(turn: ChatTurn, options: ModelOptions) -> dict[str, Any]:
 
 
 def _pieces(part: Part, options: ModelOptions) -> Iterator[dict[str, Any]]:
-    """Yield the pieces of a message that hold a part: a clip may be several pictures."""
+    """Yield the pieces of a message that hold a part: a text, a picture, or a clip.
+
+    A clip is one video, or several pictures, as the options say.
+    """
     if isinstance(part, str):
         yield {"type": "text", "text": part}
     elif isinstance(part, Picture):
@@ -96,10 +110,12 @@ def _pieces(part: Part, options: ModelOptions) -> Iterator[dict[str, Any]]:
 
 
 def _image(picture: Picture) -> dict[str, Any]:
+    """Return a picture as a piece of a message, with the PNG inside."""
     return {"type": "image_url", "image_url": {"url": _data_url("image/png", encode_png(picture))}}
 
 
 def _data_url(kind: str, content: bytes) -> str:
+    """Return a file as a URL that holds it: ``"data:image/png;base64,iVBOR…"``."""
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 

@@ -19,7 +19,7 @@ from roboirg.policies.vlm.models.model import (
     reported_count,
 )
 from roboirg.util.media import Picture, encode_png
-from roboirg.util.reply_reading import with_thoughts
+from roboirg.util.reply_reading import CUT_OFF, with_thoughts
 
 
 def write(query: ModelQuery, options: ModelOptions, key: str) -> HttpRequest:
@@ -66,11 +66,16 @@ def read(reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server
     output_tokens = reported_count(usage, "candidatesTokenCount", absent=0)
     output_tokens += reported_count(usage, "thoughtsTokenCount", absent=0)
     text = with_thoughts(answer, thoughts)
+    if first.get("finishReason") == "MAX_TOKENS":
+        text += CUT_OFF
     return ModelReply(text, reported_count(usage, "promptTokenCount"), output_tokens)
 
 
 def _part(part: Part, options: ModelOptions) -> dict[str, Any]:
-    """Return a text, picture or clip as a part of the request."""
+    """Return a text, picture or clip as a part of Gemini's request.
+
+    ``{"text": "…"}``, or ``{"inlineData": …}`` with the file inside.
+    """
     if isinstance(part, str):
         return {"text": part}
     if isinstance(part, Picture):
@@ -82,6 +87,7 @@ def _part(part: Part, options: ModelOptions) -> dict[str, Any]:
 
 
 def _blob(content: bytes, kind: str) -> dict[str, str]:
+    """Return a file as Gemini's API takes it within a request, in URL-safe Base64."""
     return {"data": base64.urlsafe_b64encode(content).decode(), "mime_type": kind}
 
 

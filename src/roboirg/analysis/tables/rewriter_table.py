@@ -1,0 +1,145 @@
+"""Table of rewriters: the share of the gap to explicit that each closes for its policy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.results.option_labels import (
+    REFERENCE_OPTIONS,
+    options_label,
+    options_sort_key,
+)
+from roboirg.analysis.results.policy_run import PolicyRun
+from roboirg.analysis.tables.table import Row, Table, named_columns
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.policy_ref import BEHIND, RESOLVE
+from roboirg.core.versions import POLICY, makeup_text
+from roboirg.stats.cells import ByTask, Cell, Key, gather
+from roboirg.stats.intervals import TaskRates, share_interval
+from roboirg.stats.rates import NOT_APPLICABLE, whole_percent
+
+NO_SHARE = "no clear gap"
+"""Printed in place of a share where the gap's interval has 0."""
+_NOTE = (
+    "Rates in percent, means over tasks, on the episodes that all three have: the policy alone "
+    "with what was said, behind the rewriter, and alone with explicit words. Share: how much of "
+    "the way from the first to the third the rewriter goes; below 0 it harms. "
+    f"There is none ({NO_SHARE}) where the interval of the gap does not lie above 0."
+)
+
+
+class _Rewritten(NamedTuple):
+    """A policy run behind a rewriter, and that of the same policy alone."""
+
+    behind: PolicyRun
+    alone: PolicyRun
+
+
+def make_rewriter_table(data: RunData) -> Table:
+    """Make the table of rewriters, with a row for each setting that both policies played.
+
+    Raises:
+        InvalidValueError: no policy was played both alone and behind a rewriter.
+    """
+    frame = data.without_control_arms.frame
+    cells = gather(frame, ("run", "options"))
+    names = frame.names
+    rows: list[Row] = []
+    for behind, alone in _pairs(list(names)):
+        explicit = cells.get((alone, REFERENCE_OPTIONS))
+        for options in _shared_options(cells, behind, alone):
+            said = cells[alone, options]
+            rewritten = cells[behind, options]
+            if explicit is not None and options != REFERENCE_OPTIONS:
+                words = _words(rewritten, said, explicit)
+                rows.append(Row(options_label(options), names[behind], words))
+    if not rows:
+        raise InvalidValueError(
+            "No policy was played alone and behind a rewriter, in the same settings and in "
+            f"explicit words; play SPEC and {RESOLVE}:NAMER?policy=SPEC in one run."
+        )
+    return Table(
+        key="rewriters",
+        title="Share of the gap that rewriters close",
+        heads=("setting", "policy"),
+        columns=named_columns(
+            "episodes", "as said, %", "rewritten, %", "explicit, %", "share, %", "95 % interval"
+        ),
+        rows=rows,
+        notes=(_NOTE,),
+    )
+
+
+def _pairs(policy_runs: Sequence[PolicyRun]) -> Iterator[_Rewritten]:
+    """Yield each policy run behind a rewriter with that of the same policy alone."""
+    for behind in policy_runs:
+        makeup = dict(behind.versions.makeup)
+        if not makeup.get(POLICY, "").startswith(f"{RESOLVE}:"):
+            continue
+        for alone in policy_runs:
+            is_same_policy = makeup_text(alone.versions.makeup) == makeup[BEHIND]
+            if is_same_policy and alone.conditions == behind.conditions:
+                yield _Rewritten(behind, alone)
+
+
+def _shared_options(
+    cells: Mapping[Key, ByTask], behind: PolicyRun, alone: PolicyRun
+) -> list[InstructionOptions]:
+    """Return the instruction options that both policy runs played, in the order of tables."""
+    shared = []
+    for policy_run, options in cells:
+        if policy_run == behind and (alone, options) in cells:
+            shared.append(options)
+    return sorted(shared, key=options_sort_key)
+
+
+def _words(rewritten: ByTask, said: ByTask, explicit: ByTask) -> list[str]:
+    """Return the cells of a row: episodes, the three rates, the share and its interval."""
+    tasks: list[TaskRates] = []
+    episodes = 0
+    rates = []
+    for task in rewritten:
+        if task not in said or task not in explicit:
+            continue
+        rows = _joint_rows([rewritten[task], said[task], explicit[task]])
+        if rows:
+            counts = np.array(rows, dtype=np.int64)
+            totals = counts.sum(axis=0)
+            rates.append(totals[0::2] / totals[1::2])
+            tasks.append(TaskRates.of(counts))
+            episodes += len(rows)
+    if not tasks:
+        return ["0", *[NOT_APPLICABLE] * 5]
+
+    after, before, best = np.mean(rates, axis=0).tolist()
+    interval = share_interval(tasks)
+    share = NO_SHARE
+    ends = NOT_APPLICABLE
+    if interval is not None:
+        share = whole_percent((after - before) / (best - before))
+        ends = f"{whole_percent(interval.low)} to {whole_percent(interval.high)}"
+    shown_rates = [whole_percent(rate) for rate in (before, after, best)]
+    return [str(episodes), *shown_rates, share, ends]
+
+
+def _joint_rows(cells: Sequence[Cell]) -> list[list[int]]:
+    """Return successes and trials in each cell, side by side, of the episodes that all have.
+
+    With one seed, an episode that only the second of three cells solved has the row
+    ``[0, 1, 1, 1, 0, 1]``.
+    """
+    by_episode = [cell.by_episode() for cell in cells]
+    shared = set.intersection(*(set(episodes) for episodes in by_episode))
+    rows = []
+    for episode in sorted(shared):
+        row: list[int] = []
+        for episodes in by_episode:
+            verdicts = episodes[episode]
+            row += [sum(verdicts.values()), len(verdicts)]
+        rows.append(row)
+    return rows

@@ -1,0 +1,85 @@
+"""The share of the gap to explicit that a rewriter closes, of made-up results."""
+
+from __future__ import annotations
+
+import pytest
+from flat_jobs import frame_of, make_results
+from msgspec.structs import replace
+
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.tables.rewriter_table import NO_SHARE, make_rewriter_table
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.policy_ref import PolicyRef
+from roboirg.policies.by_name.finding import read_policy
+from roboirg.records.record import Summary
+
+SERVED = "openpi://localhost:8000"
+ALONE = read_policy(SERVED, "alone")
+RULES = read_policy(f"resolve:surface?policy={SERVED}", "rules")
+OTHER = read_policy("resolve:surface?policy=mme-vla://localhost:8000", "other")
+
+
+def results(ref: PolicyRef, outcomes: str, setting: str, task: str = "PickXtimes") -> list[Summary]:
+    """One result of a policy a letter: 1 for a success, 0 for a failure."""
+    made = make_results(outcomes, setting, policy=ref.name, task=task)
+    return [replace(result, ref=ref) for result in made]
+
+
+def rows_of(*made: list[Summary]) -> list[tuple[str, str, list[str]]]:
+    table = make_rewriter_table(RunData(frame_of(*made)))
+    return [(row.group, row.name, list(row.cells)) for row in table.rows]
+
+
+def test_half_of_a_gap_is_closed_if_half_of_the_lost_episodes_are_won_back():
+    found = rows_of(
+        results(ALONE, "1" * 20, "explicit"),
+        results(ALONE, "1" * 4 + "0" * 16, "direct"),
+        results(RULES, "1" * 12 + "0" * 8, "direct"),
+    )
+
+    ((setting, policy, cells),) = found
+    assert (setting, policy) == ("direct", "rules")
+    assert cells[:5] == ["20", "20", "60", "100", "50"]
+
+
+def test_only_episodes_count_that_all_three_have():
+    found = rows_of(
+        results(ALONE, "1" * 20, "explicit"),
+        results(ALONE, "0" * 18, "direct"),
+        results(RULES, "1" * 30, "direct"),
+    )
+
+    assert found[0][2][:5] == ["18", "0", "100", "100", "100"]
+
+
+def test_rates_are_means_over_the_tasks_that_all_three_have():
+    found = rows_of(
+        results(ALONE, "1" * 20, "explicit"),
+        results(ALONE, "0" * 20, "direct"),
+        results(RULES, "1" * 20, "direct"),
+        results(ALONE, "1" * 10, "explicit", "BinFill"),
+        results(ALONE, "0" * 10, "direct", "BinFill"),
+        results(RULES, "0" * 10, "direct", "BinFill"),
+        results(RULES, "0" * 10, "direct", "StopCube"),
+    )
+
+    assert found[0][2][:5] == ["30", "0", "50", "100", "50"]
+
+
+def test_without_a_clear_gap_there_is_no_share():
+    found = rows_of(
+        results(ALONE, "1" * 20, "explicit"),
+        results(ALONE, "1" * 19 + "0", "direct"),
+        results(RULES, "1" * 20, "direct"),
+    )
+
+    assert found[0][2] == ["20", "95", "100", "100", NO_SHARE, "–"]
+
+
+def test_a_rewriter_is_compared_with_its_own_policy_alone():
+    with pytest.raises(InvalidValueError, match="alone and behind a rewriter"):
+        rows_of(
+            results(ALONE, "1" * 20, "explicit"),
+            results(ALONE, "0" * 20, "direct"),
+            results(OTHER, "1" * 20, "direct"),
+        )

@@ -1,0 +1,71 @@
+"""What a policy declares and reports as records have it, and made-up episodes to try it with."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import CAMERAS, PICTURE_SIZE
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.policies.contract.json_values import as_json
+from roboirg.policies.contract.policy_version import read_version
+from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes
+
+
+@pytest.mark.parametrize(
+    ("value", "stored"),
+    [
+        (2**63 - 1, 2**63 - 1),
+        (1 - 2**63, 1 - 2**63),
+        (2**63, "9223372036854775808"),
+        (Path("a/b"), "a/b"),
+        ({Path("a"): 1, 2: None}, {"a": 1, "2": None}),
+    ],
+)
+def test_numbers_of_more_than_63_bits_paths_and_keys_are_reported_as_texts(value, stored):
+    assert as_json([value], "the metadata") == [stored]
+
+
+def test_what_is_neither_text_nor_number_is_refused_by_its_key():
+    with pytest.raises(InvalidValueError, match=r"the metadata: 'sizes\[1\]' is b'x'; it must be"):
+        as_json({"sizes": [0, b"x"]}, "the metadata")
+
+
+@pytest.mark.parametrize(
+    ("declared", "version"),
+    [("v1", "v1"), (2, "2"), (0.5, "0.5"), (np.int64(3), "3"), (Path("a.pt"), "a.pt")],
+)
+def test_a_version_is_a_text_a_number_or_a_path(declared, version):
+    assert read_version(SimpleNamespace(version=declared)) == version
+
+
+@pytest.mark.parametrize(("frames", "count"), [("all", 10), (4, 3), ("none", None)])
+def test_made_up_videos_have_the_pictures_that_a_policy_wants(frames, count):
+    needs = PolicyNeeds(cameras=("front",), demonstration_frames=frames)
+    episode = SyntheticEpisodes(needs).episode("Go.", 10)
+
+    video = episode.demonstration
+
+    assert len(video["joint_positions"]) == 10
+    assert (len(video["front_rgb"]) if "front_rgb" in video else None) == count
+    assert "wrist_rgb" not in {*video, *episode.first}
+    assert "history" not in episode.first
+
+
+def test_made_up_observations_have_depth_matrices_and_a_history_that_ends_in_the_present():
+    needs = PolicyNeeds(cameras=CAMERAS, observe_every=4, depth=True, calibration=True)
+    studio = SyntheticEpisodes(needs)
+    episode = studio.episode("Go.", 0)
+    later = studio.after(episode, 16)
+
+    for seen in (episode.first, later):
+        for camera in CAMERAS:
+            assert seen[f"{camera}_depth"].shape == (PICTURE_SIZE, PICTURE_SIZE, 1)
+            assert seen[f"{camera}_extrinsic"].shape == (3, 4)
+            assert seen[f"{camera}_intrinsic"].shape == (3, 3)
+    assert len(later["history"]) == 4
+
+    now = later["history"][-1]
+    assert all(np.array_equal(now[name], later[name]) for name in now)
