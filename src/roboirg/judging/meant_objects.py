@@ -23,7 +23,8 @@ def meant_objects(
     """Return the names of the objects with which a stage can still rightly be completed.
 
     BinFill with *two red cubes, one blue one*: at first every red and blue cube; when both red ones
-    are in the bin, every blue one.
+    are in the bin, every blue one. So objects are counted by their look, kind and color: as many
+    as the stages take of it, less those with a fact that lasts, such as being in the bin.
 
     Args:
         stages: of the policy.

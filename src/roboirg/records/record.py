@@ -404,9 +404,10 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
     def words_owner(self) -> str:
         """Which results must have the same words as this one, such as ``PickXtimes/test``.
 
-        Usually those of the task and the pool of words (train or test). For a setting with words of
-        its own it is the name of these words up to the ``@``, which begins with task and pool. A
-        wording file is named behind: ``PickXtimes/test of mine@…``.
+        Records have the identity of their words as ``NAME@DIGEST``. The name is task and pool,
+        ``PickXtimes/test@1a2b…``, or for a setting with words of its own task, pool and setting,
+        ``PickXtimes/test/grounded@3c4d…``: what stands before the ``@`` is the owner. Of a wording
+        file, whose identity has another form, the owner is ``PickXtimes/test of mine@5e6f…``.
         """
         usual = f"{self.task}/{self.pool}"
         owner, _, _ = self.words.partition("@")

@@ -89,8 +89,10 @@ class PlannerHistory:
     def context(self, look: int) -> NDArray[np.float32]:
         """Return what was named so far, as input of a planner: (`context_size`,).
 
-        How often each template was finished; 1 for the template under way, else 0; for how long it
-        has been, from 0 to 1 at `MAX_LOOKS_SINCE`; and zeros in the place of a point.
+        With T templates of subgoals, in this order: T numbers, how often each was finished; T
+        numbers, 1 for the template under way and 0 for all others; one number, for how long it has
+        been under way, from 0 to 1 at `MAX_LOOKS_SINCE` looks; and `POINT_NUMBERS` zeros, where the
+        context of hands has the point of their subgoal. Trained nets depend on this order.
 
         Args:
             look: number of the present look.

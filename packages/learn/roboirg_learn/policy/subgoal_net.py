@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from roboirg_learn.policy.body_layers import WIDTH
 from roboirg_learn.policy.memories import EmbeddedLooks, values_at_looks
 from roboirg_learn.policy.planner_history import RECENT
+from roboirg_learn.policy.subgoals import POINT_NUMBERS
 
 AWAY_SCALE = 5.0
 """Per meter from the point, so that these numbers are about as great as the others."""
@@ -50,8 +51,9 @@ class ContextInput(nn.Module):
                 0), and its x and y on the table, m.
             positions: (B, D, K, 2) x and y of the objects on the table, m.
         """
-        has_point = context[:, :, None, -3:-2]
-        from_point = positions - context[:, :, None, -2:]
+        point = context[:, :, None, -POINT_NUMBERS:]  # (B, D, 1, 3): has_point, x, y
+        has_point = point[..., :1]
+        from_point = positions - point[..., 1:]
         distance = from_point.norm(dim=-1, keepdim=True)
         nearness = (-distance * NEARNESS).exp()  # 1 at the point, 0 far away
         parts = [from_point * AWAY_SCALE, nearness, torch.ones_like(nearness)]

@@ -87,15 +87,21 @@ class ResolvingPolicy(PlannerParts):
         return self._env
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode; if all has been said, the policy hears the rewritten command."""
+        """Begin an episode; if all has been said, the policy hears the rewritten command.
+
+        The video has the frames that namer or policy need; each of the two gets those of its own.
+        """
         self._begin(instruction)
-        frames = self.needs.demonstration_frames
-        wanted = self._namer_needs.demonstration_frames
-        self._shown = DemonstrationSubset(demonstration, frames, wanted)
+        self._shown = self._frames_for(self._namer_needs, demonstration)
         if not self.env.unheard:
             self._resolve()
-        wanted = self._policy_needs.demonstration_frames
-        self.policy.reset(self._last_words, DemonstrationSubset(demonstration, frames, wanted))
+        shown_to_policy = self._frames_for(self._policy_needs, demonstration)
+        self.policy.reset(self._last_words, shown_to_policy)
+
+    def _frames_for(self, needs: PolicyNeeds, demonstration: Demonstration) -> Demonstration:
+        """Return the video with the frames that one of the two needs."""
+        available = self.needs.demonstration_frames
+        return DemonstrationSubset(demonstration, available, needs.demonstration_frames)
 
     def hear(self, text: str, step: int) -> None:
         """Pass an utterance on to the policy, the last one rewritten."""

@@ -63,7 +63,9 @@ class _LifeCheck:
     def passes(self, limit_s: float) -> bool:
         """Return whether the process answers a question in time, which it does between two calls.
 
-        Several threads may ask: an answer that comes after a thread began to wait counts for it.
+        The question is a request, the answer any byte. Several threads may ask, one after the
+        other, as they share the line: a thread that waited takes an answer that another one got
+        meanwhile as its own, and asks nothing.
 
         Args:
             limit_s: how long a call may take; a process that has not started yet gets `GRACE_S` at

@@ -100,6 +100,10 @@ class PolicyLine:
     def call(self, call: Call, answer: AnswerQuestion | None = None) -> Outcome:
         """Carry out a call in the policy's process; return its outcome, maybe the policy's error.
 
+        What goes wrong is the policy's error (EpisodeError) if the process had begun this very
+        call; before that a call of another episode may be to blame, so this episode is lost
+        (EpisodeLostError) and played again. Only not to begin in time is an error in any case.
+
         Args:
             call: of the policy.
             answer: returns the world's answer to a question of the process; None if it has none.
