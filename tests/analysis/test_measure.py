@@ -198,3 +198,17 @@ def test_p_values_are_corrected_for_both_forms_and_the_forms_are_compared():
     assert [summary.gap.value for summary in direct] == [-1] * 3
     assert direct[0].second_gap.value == -0.75
     assert direct[0].second_gap.overlap == (0, 0, 15, 5)
+
+
+def test_a_suite_with_a_single_task_does_not_raise_the_p_values_of_suites_that_are_shown():
+    """Of two tasks of counting and one of permanence, 8 explicit wins each are lost when direct."""
+    results = []
+    for task in ("PickXtimes", "BinFill", "VideoUnmask"):
+        results += make_results("1" * 8, task=task)
+        results += make_results("0" * 8, "direct", task=task)
+
+    found = summarize(cells_of(frame_of(results)))
+
+    corrected = {key.scope: summary.p_holm for key, summary in found.items() if summary.gap}
+    assert corrected["counting"] == pytest.approx(2 / 2**16)
+    assert corrected["permanence"] == pytest.approx(2 / 2**8)

@@ -36,6 +36,7 @@ from roboirg.analysis.tables.table import Table
 from roboirg.core.errors import InvalidValueError
 from roboirg.records.record import Summary
 from roboirg.stats.intervals import TOO_FEW, Interval
+from roboirg.stats.rates import points, whole_percent
 
 TASKS = ("PickXtimes", "BinFill")
 
@@ -274,3 +275,20 @@ def frame_with_outcomes(outcomes: Mapping[tuple, str]) -> Frame:
         words = {"policy": policy, "task": task, "setting": setting, "form": form, "arm": arm}
         results += make_results(letters, policy_seed=seed, **words)
     return frame_of(results)
+
+
+def test_halves_are_rounded_up_in_whole_percentages_and_away_from_0_in_gaps():
+    """As in the paper's tables; to even, 1 of 8 would be 12 % in one place and 12.5 in another."""
+    rates = [whole_percent(wins / 8) for wins in (1, 3, 5, 7)]
+    gaps = [points(0.125), points(-0.125), points(0.0625, 1), points(-0.0625, 1)]
+
+    assert rates == ["13", "38", "63", "88"]
+    assert gaps == ["+13", "−13", "+6.3", "−6.3"]
+
+
+def test_what_several_seeds_played_is_counted_in_trials_below_the_terminals_table():
+    results = [make_result(policy_seed=seed) for seed in (0, 1)]
+
+    (table,) = make_run_tables(frame_of(results))
+
+    assert "n = 2 trials per cell" in table.notes[0]

@@ -43,8 +43,8 @@ def change_text(change: Decimal) -> str:
 
 
 def whole_percent(rate: float | Fraction) -> str:
-    """Return a rate from 0 to 1 as a whole percentage."""
-    return f"{100 * float(rate):.0f}"
+    """Return a rate from 0 to 1 as a whole percentage, rounded half up: 1/8 becomes 13."""
+    return str(_half_up(100 * float(rate), 0))
 
 
 def percent_range(low: Fraction, high: Fraction) -> str:
@@ -56,7 +56,7 @@ def percent_range(low: Fraction, high: Fraction) -> str:
 
 def points(gap: float, decimals: int = 0) -> str:
     """Return a gap, -1 to 1, in signed percentage points: ``−12``, ``+3``, ``±0``."""
-    text = f"{100 * gap:+.{decimals}f}".replace("-", "−")  # the typographic minus
+    text = f"{_half_up(100 * gap, decimals):+}".replace("-", "−")  # the typographic minus
     is_zero = not text.strip("+−0.")
     return f"±{text[1:]}" if is_zero else text
 
@@ -108,3 +108,12 @@ def _rounded(value: Fraction) -> Decimal:
     # In integers, floor(100 * value + 1/2): rounding a decimal quotient would round twice.
     hundredths = (200 * value.numerator + value.denominator) // (2 * value.denominator)
     return (Decimal(hundredths) * DIGITS).quantize(DIGITS, ROUND_HALF_UP)
+
+
+def _half_up(number: float, decimals: int) -> Decimal:
+    """Round to some decimals, halves away from 0: −12.5 becomes −13.
+
+    A half may come as 12.499999999999998, so what is below nine decimals is dropped first.
+    """
+    exact = Decimal(str(round(number, 9)))
+    return exact.quantize(Decimal(1).scaleb(-decimals), ROUND_HALF_UP)

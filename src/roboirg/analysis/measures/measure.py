@@ -393,7 +393,8 @@ def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
 
     The first gap is to explicit instructions, which name the goal; the second one to the resolved
     form of the same instructions, whose references are replaced by what they mean. P-values are
-    corrected over a policy run's tasks, its suites, or its averages over all tasks.
+    corrected over a policy run's tasks, its suites, or its averages over all tasks. A suite with a
+    single task is shown nowhere, so it is in no family with others.
 
     Args:
         cells: of all policy runs.
@@ -404,6 +405,10 @@ def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
     if wanted is not None:
         groups = {key: by_task for key, by_task in scopes.items() if key.scope in wanted}
 
+    tasks: dict[str, set[str]] = defaultdict(set)
+    for key, by_task in scopes.items():
+        tasks[key.scope].update(by_task)
+
     def is_task(key: ScopeKey) -> bool:
         return key.scope in scopes[key]  # the cells of a scope are by the names of its tasks
 
@@ -412,11 +417,14 @@ def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
             return NOTHING
         return scopes.get(key._replace(options=options), NOTHING)
 
+    def read_together(key: ScopeKey) -> object:
+        has_several_tasks = len(tasks[key.scope]) > 1
+        return key.policy_run, is_task(key), key.scope == ALL_TASKS, has_several_tasks
+
     found = measure_groups(
         groups,
         lambda key: with_options(key, REFERENCE_OPTIONS),
         lambda key: with_options(key, replace(key.options, form="resolved")),
-        # What is read together: a policy run's tasks, its suites, its averages over all tasks.
-        family=lambda key: (key.policy_run, is_task(key), key.scope == ALL_TASKS),
+        family=read_together,
     )
     return {summary.key: summary for summary in found}

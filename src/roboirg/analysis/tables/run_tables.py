@@ -301,14 +301,19 @@ def _sizes(results: _RunResults) -> str:
     """Return how many trials each rate is of: those of single tasks, and the mean over all tasks.
 
     For example ``n = 10 to 20 episodes per cell, 160 episodes for all tasks, the mean over tasks``.
+    They are called episodes if each was played once.
     """
     of_cells: list[int] = []
     of_all_tasks: list[int] = []
+    noun = "episode"
     for scope, by_options in results.items():
         trials = of_all_tasks if scope == ALL_TASKS else of_cells
         for result in by_options.values():
-            trials.append(result.measured.counts.trials)
-    text = f"n = {range_text(of_cells, 'episode')} per cell"
+            counts = result.measured.counts
+            trials.append(counts.trials)
+            if counts.trials != counts.episodes:
+                noun = "trial"
+    text = f"n = {range_text(of_cells, noun)} per cell"
     if _has_several_tasks(results):
-        text += f", {range_text(of_all_tasks, 'episode')} for {ALL_TASKS}, the mean over tasks"
+        text += f", {range_text(of_all_tasks, noun)} for {ALL_TASKS}, the mean over tasks"
     return text

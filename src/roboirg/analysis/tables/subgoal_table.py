@@ -15,6 +15,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.judging import SUBGOAL_VERDICTS
 from roboirg.records.record import Record
 from roboirg.stats.cells import rows_of
+from roboirg.stats.rates import whole_percent
 
 _NOTE = (
     "Subgoals that a planner named, each counted when it or the due stage was new: right (the one "
@@ -150,7 +151,8 @@ def _words(counts: Counter[str], failures: Iterable[str], costs: Iterable[str]) 
     total = sum(counts[verdict] for verdict in SUBGOAL_VERDICTS)
     yield str(total)
     for verdict in SUBGOAL_VERDICTS:
-        yield f"{counts[verdict]} ({100 * counts[verdict] / max(total, 1):.0f} %)"
+        share = counts[verdict] / max(total, 1)
+        yield f"{counts[verdict]} ({whole_percent(share)} %)"
     for failure in failures:
         yield str(counts[failure])
     for cost in costs:
