@@ -23,6 +23,8 @@ _MAX_DEVIATIONS = 10.0
 """Standard deviations beyond which probabilities are negligible."""
 _TOLERANCE = 1e-4
 """Precision of a smallest gap: a hundredth of a point."""
+_BLOCK = 256
+"""Numbers of discordant episodes whose quantiles are computed together, and kept."""
 
 
 def mcnemar_power(episodes: int, gap: float, discordance: float) -> float:
@@ -120,14 +122,29 @@ def _rejections(episodes: int, discordance: float) -> _Rejections:
     Numbers of discordant episodes (solved by exactly one of the two) that are too improbable to
     matter, below 1e-20, are left out.
     """
-    from scipy import stats
-
     center = episodes * discordance
     reach = _MAX_DEVIATIONS * math.sqrt(center * (1 - discordance)) + _MAX_DEVIATIONS
     least = max(0, math.floor(center - reach))
     most = min(episodes, math.ceil(center + reach))
+    first_block = least // _BLOCK
+    blocks = map(_most_wins_in_block, range(first_block, most // _BLOCK + 1))
+    most_wins = np.concatenate(list(blocks))
+    start = least - first_block * _BLOCK
     discordant = np.arange(least, most + 1)
+    return _Rejections(discordant, most_wins[start : start + len(discordant)])
+
+
+@functools.cache
+def _most_wins_in_block(block: int) -> NDArray[np.float64]:
+    """Return the most wins of the rarer side with which the test rejects; -1 if it never does.
+
+    They depend on nothing but the number of discordant episodes. Block 2 has those of 512 to 767
+    discordant episodes, shape (256,).
+    """
+    from scipy import stats
+
+    discordant = np.arange(block * _BLOCK, (block + 1) * _BLOCK)
     most_wins = stats.binom.ppf(ALPHA / 2, discordant, 0.5)
     # The quantile is the first number that is not below the level; the test must not exceed it.
     most_wins -= stats.binom.cdf(most_wins, discordant, 0.5) > ALPHA / 2
-    return _Rejections(discordant, most_wins)
+    return np.asarray(most_wins)
