@@ -37,17 +37,24 @@ def mcnemar_power(episodes: int, gap: float, discordance: float) -> float:
     """
     if discordance == 0:
         return 0.0
-    from scipy import stats
-
     rejections = _rejections(episodes, discordance)
     counts = rejections.discordant
     # Share of the discordant episodes that the better one solves.
     share = (1 + abs(gap) / discordance) / 2
     # For each number of discordant episodes: the better one, or the other one, wins few enough.
-    rejected = stats.binom.cdf(rejections.most_wins, counts, share)
-    rejected += stats.binom.cdf(rejections.most_wins, counts, 1 - share)
-    chances = stats.binom.pmf(counts, episodes, discordance)
-    return float(chances @ np.minimum(rejected, 1.0))
+    rejected = _chance_of_at_most(rejections.most_wins, counts, share)
+    rejected += _chance_of_at_most(rejections.most_wins, counts, 1 - share)
+    return float(rejections.chances @ np.minimum(rejected, 1.0))
+
+
+def _chance_of_at_most(
+    wins: NDArray[np.float64], episodes: NDArray[np.int64], share: float
+) -> NDArray[np.float64]:
+    """Return how likely no more than some wins are, for each number of episodes; 0 for -1 wins."""
+    # SciPy's module of distributions does the same, but takes a second to import.
+    from scipy import special
+
+    return np.where(wins < 0, 0.0, special.bdtr(np.maximum(wins, 0), episodes, share))
 
 
 def episodes_needed(gap: float, discordance: float) -> int | None:
@@ -109,10 +116,12 @@ class _Rejections(NamedTuple):
         discordant: numbers of discordant episodes, but for those with a negligible probability.
         most_wins: for each, the most wins of the rarer side with which the test rejects; -1 if it
             never does.
+        chances: of each, by the binomial distribution.
     """
 
     discordant: NDArray[np.int64]
     most_wins: NDArray[np.float64]
+    chances: NDArray[np.float64]
 
 
 @functools.lru_cache(maxsize=64)
@@ -131,7 +140,21 @@ def _rejections(episodes: int, discordance: float) -> _Rejections:
     most_wins = np.concatenate(list(blocks))
     start = least - first_block * _BLOCK
     discordant = np.arange(least, most + 1)
-    return _Rejections(discordant, most_wins[start : start + len(discordant)])
+    most_wins = most_wins[start : start + len(discordant)]
+    return _Rejections(discordant, most_wins, _chances(discordant, episodes, discordance))
+
+
+def _chances(
+    discordant: NDArray[np.int64], episodes: int, discordance: float
+) -> NDArray[np.float64]:
+    """Return the binomial probability of each number of discordant episodes."""
+    from scipy import special
+
+    concordant = episodes - discordant
+    orders = -special.betaln(discordant + 1, concordant + 1) - math.log(episodes + 1)
+    logarithms = orders + special.xlogy(discordant, discordance)
+    logarithms += special.xlog1py(concordant, -discordance)
+    return np.asarray(np.exp(logarithms))
 
 
 @functools.cache
@@ -141,10 +164,12 @@ def _most_wins_in_block(block: int) -> NDArray[np.float64]:
     They depend on nothing but the number of discordant episodes. Block 2 has those of 512 to 767
     discordant episodes, shape (256,).
     """
-    from scipy import stats
+    from scipy import special
 
     discordant = np.arange(block * _BLOCK, (block + 1) * _BLOCK)
-    most_wins = stats.binom.ppf(ALPHA / 2, discordant, 0.5)
-    # The quantile is the first number that is not below the level; the test must not exceed it.
-    most_wins -= stats.binom.cdf(most_wins, discordant, 0.5) > ALPHA / 2
+    # No number for fewer than six, with which the test never rejects.
+    most_wins = np.floor(np.nan_to_num(special.bdtrik(ALPHA / 2, discordant, 0.5)))
+    # The quantile is between two numbers, but may be rounded to the wrong side of one.
+    most_wins -= _chance_of_at_most(most_wins, discordant, 0.5) > ALPHA / 2
+    most_wins += _chance_of_at_most(most_wins + 1, discordant, 0.5) <= ALPHA / 2
     return np.asarray(most_wins)
