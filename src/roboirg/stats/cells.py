@@ -44,9 +44,9 @@ class Counts(NamedTuple):
         return self.trials > 0 and not self.errors and not self.missing
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Cell:
-    """Trials of one task.
+    """Trials of one task. A cell equals no other, so it can be a key.
 
     Attributes:
         verdicts: for each trial with a verdict, whether it succeeded.

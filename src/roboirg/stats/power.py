@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.stats.intervals import ALPHA
+from roboirg.stats.intervals import ALPHA, critical_value
 
 POWER = 0.8
 """The usual choice of a wanted power."""
@@ -164,12 +164,18 @@ def _most_wins_in_block(block: int) -> NDArray[np.float64]:
     They depend on nothing but the number of discordant episodes. Block 2 has those of 512 to 767
     discordant episodes, shape (256,).
     """
-    from scipy import special
-
     discordant = np.arange(block * _BLOCK, (block + 1) * _BLOCK)
-    # No number for fewer than six, with which the test never rejects.
-    most_wins = np.floor(np.nan_to_num(special.bdtrik(ALPHA / 2, discordant, 0.5)))
-    # The quantile is between two numbers, but may be rounded to the wrong side of one.
-    most_wins -= _chance_of_at_most(most_wins, discordant, 0.5) > ALPHA / 2
-    most_wins += _chance_of_at_most(most_wins + 1, discordant, 0.5) <= ALPHA / 2
-    return np.asarray(most_wins)
+    # Begins with what a normal distribution has, which is off by one or two.
+    deviations = np.sqrt(discordant) / 2
+    most_wins = np.floor(discordant / 2 - critical_value() * deviations)
+    most_wins = np.maximum(most_wins, -1.0)
+    while True:
+        is_too_many = _chance_of_at_most(most_wins, discordant, 0.5) > ALPHA / 2
+        if not is_too_many.any():
+            break
+        most_wins -= is_too_many
+    while True:
+        has_room = _chance_of_at_most(most_wins + 1, discordant, 0.5) <= ALPHA / 2
+        if not has_room.any():
+            return most_wins
+        most_wins += has_room

@@ -7,6 +7,7 @@ its reference: the gap pairs trials of the same episode. A scope is a task, a su
 
 from __future__ import annotations
 
+import functools
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -308,12 +309,13 @@ def measure_groups(
             are corrected over all of them.
         with_intervals: whether rates have intervals.
     """
+    pairs_of = functools.cache(Pairs.of)  # a task is in several groups: alone, and in averages
     measured = []
     for key, cells in groups.items():
         interval = rate_interval(cells.values()) if with_intervals else None
         others = reference(key)
-        gap = measure_gap(pair(cells, others))
-        second_gap = measure_gap(pair(cells, second_reference(key)))
+        gap = measure_gap(pair(cells, others, pairs_of))
+        second_gap = measure_gap(pair(cells, second_reference(key), pairs_of))
         measured.append(Measured(key, cells, others, interval, gap, second_gap))
     return with_holm(measured, family)
 
@@ -343,12 +345,14 @@ def with_holm(
     return tuple(corrected)
 
 
-def pair(cells: ByTask, others: ByTask) -> list[Pairs]:
-    """Pair trials by episode, in each task in which both sides have some."""
+def pair(
+    cells: ByTask, others: ByTask, pairs_of: Callable[[Cell, Cell], Pairs] = Pairs.of
+) -> list[Pairs]:
+    """Pair trials by episode, in each task in which both sides have some, by a function."""
     pairs = []
     for task, cell in cells.items():
         if cell.verdicts and task in others:
-            pairs.append(Pairs.of(cell, others[task]))
+            pairs.append(pairs_of(cell, others[task]))
     return pairs
 
 
