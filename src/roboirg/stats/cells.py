@@ -44,9 +44,9 @@ class Counts(NamedTuple):
         return self.trials > 0 and not self.errors and not self.missing
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(slots=True)
 class Cell:
-    """Trials of one task. A cell equals no other, so it can be a key.
+    """Trials of one task.
 
     Attributes:
         verdicts: for each trial with a verdict, whether it succeeded.

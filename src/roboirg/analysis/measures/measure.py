@@ -7,7 +7,6 @@ its reference: the gap pairs trials of the same episode. A scope is a task, a su
 
 from __future__ import annotations
 
-import functools
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -291,6 +290,22 @@ def _no_reference(_key: Key) -> ByTask:
     return NOTHING
 
 
+class _KnownPairs:
+    """Pairs cells, each two only once: a task is in several groups, alone and in averages."""
+
+    def __init__(self) -> None:
+        self._pairs: dict[tuple[int, int], Pairs] = {}
+        self._cells: list[Cell] = []  # kept, as the keys are their identities
+
+    def __call__(self, first: Cell, second: Cell) -> Pairs:
+        """Return the trials of two cells, paired by episode."""
+        key = (id(first), id(second))
+        if key not in self._pairs:
+            self._pairs[key] = Pairs.of(first, second)
+            self._cells += (first, second)
+        return self._pairs[key]
+
+
 def measure_groups(
     groups: Mapping[K, ByTask],
     reference: Callable[[K], ByTask] = _no_reference,
@@ -309,7 +324,7 @@ def measure_groups(
             are corrected over all of them.
         with_intervals: whether rates have intervals.
     """
-    pairs_of = functools.cache(Pairs.of)  # a task is in several groups: alone, and in averages
+    pairs_of = _KnownPairs()
     measured = []
     for key, cells in groups.items():
         interval = rate_interval(cells.values()) if with_intervals else None
