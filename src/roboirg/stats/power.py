@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,7 @@ def mcnemar_power(episodes: int, gap: float, discordance: float) -> float:
 
 
 def _chance_of_at_most(
-    wins: NDArray[np.float64], episodes: NDArray[np.int64], share: float
+    wins: NDArray[Any], episodes: int | NDArray[np.int64], share: float
 ) -> NDArray[np.float64]:
     """Return how likely no more than some wins are, for each number of episodes; 0 for -1 wins."""
     # SciPy's module of distributions does the same, but takes a second to import.
@@ -141,20 +141,8 @@ def _rejections(episodes: int, discordance: float) -> _Rejections:
     start = least - first_block * _BLOCK
     discordant = np.arange(least, most + 1)
     most_wins = most_wins[start : start + len(discordant)]
-    return _Rejections(discordant, most_wins, _chances(discordant, episodes, discordance))
-
-
-def _chances(
-    discordant: NDArray[np.int64], episodes: int, discordance: float
-) -> NDArray[np.float64]:
-    """Return the binomial probability of each number of discordant episodes."""
-    from scipy import special
-
-    concordant = episodes - discordant
-    orders = -special.betaln(discordant + 1, concordant + 1) - math.log(episodes + 1)
-    logarithms = orders + special.xlogy(discordant, discordance)
-    logarithms += special.xlog1py(concordant, -discordance)
-    return np.asarray(np.exp(logarithms))
+    chances_of_at_most = _chance_of_at_most(np.arange(least - 1, most + 1), episodes, discordance)
+    return _Rejections(discordant, most_wins, np.diff(chances_of_at_most))
 
 
 @functools.cache
@@ -165,17 +153,11 @@ def _most_wins_in_block(block: int) -> NDArray[np.float64]:
     discordant episodes, shape (256,).
     """
     discordant = np.arange(block * _BLOCK, (block + 1) * _BLOCK)
-    # Begins with what a normal distribution has, which is off by one or two.
-    deviations = np.sqrt(discordant) / 2
-    most_wins = np.floor(discordant / 2 - critical_value() * deviations)
+    # Begins a little below what a normal distribution has.
+    most_wins = np.floor(discordant / 2 - critical_value() * np.sqrt(discordant) / 2) - 2
     most_wins = np.maximum(most_wins, -1.0)
-    while True:
-        is_too_many = _chance_of_at_most(most_wins, discordant, 0.5) > ALPHA / 2
-        if not is_too_many.any():
-            break
-        most_wins -= is_too_many
-    while True:
+    has_room = np.ones(_BLOCK, dtype=np.bool_)
+    while has_room.any():
         has_room = _chance_of_at_most(most_wins + 1, discordant, 0.5) <= ALPHA / 2
-        if not has_room.any():
-            return most_wins
         most_wins += has_room
+    return np.asarray(most_wins)
