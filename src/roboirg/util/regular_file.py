@@ -28,7 +28,7 @@ def open_regular(path: Path) -> BufferedReader:
     if not stat.S_ISREG(os.fstat(file).st_mode):
         os.close(file)
         raise InvalidValueError(f"{path} is not a regular file.")
-    return os.fdopen(file, "rb", buffering=_BUFFER)
+    return BufferedReader(os.fdopen(file, "rb", buffering=0), _BUFFER)
 
 
 def read_regular(path: Path, most: int = MOST_BYTES) -> bytes:
