@@ -231,6 +231,8 @@ def completed_stages(
         last_completed = judge.index - len(episode.demonstration) - 1
         if last_completed >= 0:
             steps.setdefault(last_completed, step)
+        if judge.status is not Status.ONGOING:
+            break
     return steps
 
 

@@ -135,6 +135,8 @@ class _StageWatch:
 
     def next_change(self, history: FactHistory) -> float:
         """Return the next step at which time alone may complete or violate the stage."""
+        if self._met_since is None and not self._elapsed:
+            return math.inf
         changes = [history.next_change(condition) for condition in self._elapsed]
         if self._met_since is not None:
             changes.append(self._met_since + self._stage.lasting)

@@ -21,13 +21,14 @@ class Trait(NamedTuple):
         meaning: a sentence on what it means that there are several.
         text: returns a value in words, or None if it fits all others.
         owner: returns what of a result has the value; only values of one owner should be the same.
+            None if those of all results should.
     """
 
     path: str
     plural: str
     meaning: str
     text: Callable[[Any], str | None] = str
-    owner: Callable[[Any], str] = lambda _: ""
+    owner: Callable[[Any], str] | None = None
 
 
 _UNFAIR = "They are kept apart and cannot be compared."
@@ -125,10 +126,8 @@ def differing(
         of_whom: stands behind the property in a sentence, such as `` of mine``.
     """
     for trait in traits:
-        values = map(operator.attrgetter(trait.path), results)
-        owned_values = set(zip(map(trait.owner, results), values, strict=True))
         texts: dict[str, set[str]] = {}  # values in words, by owner
-        for owner, value in owned_values:
+        for owner, value in _owned_values(results, trait):
             text = trait.text(value)
             if text is not None:
                 texts.setdefault(owner, set()).add(str(text))
@@ -136,3 +135,11 @@ def differing(
             if len(texts[owner]) > 1:
                 listed = ", ".join(sorted(texts[owner]))
                 yield f"Mixed {trait.plural}{of_whom}: {listed}. {trait.meaning}"
+
+
+def _owned_values(results: Iterable[Summary], trait: Trait) -> set[tuple[str, Any]]:
+    """Return the distinct values of a trait, each with its owner; an empty one if it has none."""
+    value_of = operator.attrgetter(trait.path)
+    if trait.owner is None:
+        return {("", value) for value in set(map(value_of, results))}
+    return {(trait.owner(result), value_of(result)) for result in results}

@@ -135,9 +135,12 @@ def gather(frame: Columns, by: Sequence[str]) -> Mapping[Key, ByTask]:
     (task, episode, policy seed, outcome), too.
     """
     groups: dict[Key, dict[str, Cell]] = {}
+    last_key = None
     for row in rows_of(frame, *by, *TRIAL):
         *key, task, episode, policy_seed, outcome = row
-        cells = groups.setdefault(tuple(key), {})
+        if key != last_key:  # rows of a group mostly follow each other, and its hash takes long
+            cells = groups.setdefault(tuple(key), {})
+            last_key = key
         if task not in cells:
             cells[task] = Cell()
         cells[task].add(Trial(episode, policy_seed), outcome)

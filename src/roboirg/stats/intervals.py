@@ -15,6 +15,7 @@ seed is hard for the next. So the unit is an episode with all of its trials, nev
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from statistics import NormalDist
@@ -62,7 +63,7 @@ class Stratum(NamedTuple):
     """What was observed of one task (a stratum), whose mean is a part of a sum.
 
     Attributes:
-        values: the different values that episodes have, such as ``(-1.0, 0.0, 1.0)`` for
+        values: the different values that episodes have, in order, such as ``(-1.0, 0.0, 1.0)`` for
             differences of two verdicts.
         shares: of the episodes that have each value; they add up to 1.
         episodes: their number; less if they differ in their weight, as Kish's effective size.
@@ -70,8 +71,8 @@ class Stratum(NamedTuple):
         high: the largest one.
     """
 
-    values: Sequence[float]
-    shares: Sequence[float]
+    values: tuple[float, ...]
+    shares: tuple[float, ...]
     episodes: float
     low: float
     high: float
@@ -92,8 +93,9 @@ class Stratum(NamedTuple):
         shares: dict[float, float] = {}
         for value, part in zip(numbers.tolist(), parts.tolist(), strict=True):
             shares[value] = shares.get(value, 0.0) + part
+        values_in_order, shares_in_order = zip(*sorted(shares.items()), strict=True)
         episodes = 1 / float(parts @ parts)
-        return cls(list(shares), list(shares.values()), episodes, low, high)
+        return cls(values_in_order, shares_in_order, episodes, low, high)
 
     @property
     def mean(self) -> float:
@@ -101,8 +103,8 @@ class Stratum(NamedTuple):
 
     def mirrored(self) -> Stratum:
         """Return the same with all signs changed, so that upper ends become lower ones."""
-        values = [-value for value in self.values]
-        return Stratum(values, self.shares, self.episodes, -self.high, -self.low)
+        values = tuple(-value for value in reversed(self.values))
+        return Stratum(values, self.shares[::-1], self.episodes, -self.high, -self.low)
 
 
 class TaskRates(NamedTuple):
@@ -161,7 +163,17 @@ def mean_interval(strata: Sequence[Stratum], alpha: float = ALPHA) -> Interval |
     """
     if _has_too_few(strata):
         return None
-    critical = critical_value(alpha)
+    return _interval_of(tuple(strata), critical_value(alpha))
+
+
+@functools.lru_cache(maxsize=65_536)
+def _interval_of(strata: tuple[Stratum, ...], critical: float) -> Interval:
+    """Return the interval of a sum of means; the same results are often met again.
+
+    Args:
+        strata: of each task.
+        critical: standard errors that it reaches to each side.
+    """
     high = _upper_end(strata, critical)
     high_of_mirrored = _upper_end([stratum.mirrored() for stratum in strata], critical)
     return Interval(0.0 - high_of_mirrored, high)  # not the negative, which of 0 is −0
@@ -368,11 +380,10 @@ def _tilted_values(stratum: Stratum, tilt: float) -> _Moments:
 def _norm(stratum: Stratum, tilt: float) -> float:
     """Return the norm with which tilted shares add up to 1, by Newton's method.
 
-    Their sum falls with the norm, ever slower, so the steps rise to the norm from one below it: the
-    one with which the largest value alone has a share of 1.
+    Their sum falls with the norm, ever slower, so the steps rise to the norm from one below it.
     """
-    largest = max(stratum.values)
-    norm = tilt * largest + stratum.shares[stratum.values.index(largest)]
+    # The norm is at least that of the largest value alone, and that of all episodes at their mean.
+    norm = max(tilt * stratum.values[-1] + stratum.shares[-1], 1 + tilt * stratum.mean)
     for _ in range(_MOST_STEPS):
         surplus = -1.0
         slope = 0.0

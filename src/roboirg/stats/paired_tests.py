@@ -43,7 +43,7 @@ class Overlap(NamedTuple):
         return (self.only_first + self.only_second) / self.trials
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Pairs:
     """Two cells of one task, paired by episode.
 
@@ -78,6 +78,11 @@ class Pairs:
             second_wins = sum(second_by_seed.values())
             rows.append((first_wins, len(first_by_seed), second_wins, len(second_by_seed)))
         return cls(np.array(rows, dtype=np.int64).reshape(-1, 4), _overlap(first, second))
+
+    @cached_property
+    def rates(self) -> TaskRates:
+        """What the episodes contribute to the success rates of the two."""
+        return TaskRates.of(self.rows)
 
     @property
     def trials(self) -> int:
@@ -180,7 +185,7 @@ def measure_gap(tasks: Sequence[Pairs]) -> Gap | None:
     if rates is None:
         return None
     part = 1 / len(paired)
-    rates_of_tasks = [TaskRates.of(pairs.rows) for pairs in paired]
+    rates_of_tasks = [pairs.rates for pairs in paired]
     strata = [task.combined(part, -part) for task in rates_of_tasks]
     differences = np.concatenate([pairs.differences for pairs in paired])
     overlaps = np.sum([pairs.overlap for pairs in paired], axis=0)

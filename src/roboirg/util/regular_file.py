@@ -12,6 +12,8 @@ from roboirg.core.errors import InvalidValueError
 
 MOST_BYTES = 1 << 30
 """Of a file of which no lower limit is known."""
+_BUFFER = 1 << 20
+"""Bytes that are read at once."""
 
 
 def open_regular(path: Path) -> BufferedReader:
@@ -26,7 +28,7 @@ def open_regular(path: Path) -> BufferedReader:
     if not stat.S_ISREG(os.fstat(file).st_mode):
         os.close(file)
         raise InvalidValueError(f"{path} is not a regular file.")
-    return os.fdopen(file, "rb")
+    return BufferedReader(os.fdopen(file, "rb", buffering=0), _BUFFER)
 
 
 def read_regular(path: Path, most: int = MOST_BYTES) -> bytes:

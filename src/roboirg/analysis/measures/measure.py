@@ -290,6 +290,22 @@ def _no_reference(_key: Key) -> ByTask:
     return NOTHING
 
 
+class _KnownPairs:
+    """Pairs cells, each two only once: a task is in several groups, alone and in averages."""
+
+    def __init__(self) -> None:
+        self._pairs: dict[tuple[int, int], Pairs] = {}
+        self._cells: list[Cell] = []  # kept, as the keys are their identities
+
+    def __call__(self, first: Cell, second: Cell) -> Pairs:
+        """Return the trials of two cells, paired by episode."""
+        key = (id(first), id(second))
+        if key not in self._pairs:
+            self._pairs[key] = Pairs.of(first, second)
+            self._cells += (first, second)
+        return self._pairs[key]
+
+
 def measure_groups(
     groups: Mapping[K, ByTask],
     reference: Callable[[K], ByTask] = _no_reference,
@@ -308,12 +324,13 @@ def measure_groups(
             are corrected over all of them.
         with_intervals: whether rates have intervals.
     """
+    pairs_of = _KnownPairs()
     measured = []
     for key, cells in groups.items():
         interval = rate_interval(cells.values()) if with_intervals else None
         others = reference(key)
-        gap = measure_gap(pair(cells, others))
-        second_gap = measure_gap(pair(cells, second_reference(key)))
+        gap = measure_gap(pair(cells, others, pairs_of))
+        second_gap = measure_gap(pair(cells, second_reference(key), pairs_of))
         measured.append(Measured(key, cells, others, interval, gap, second_gap))
     return with_holm(measured, family)
 
@@ -343,12 +360,14 @@ def with_holm(
     return tuple(corrected)
 
 
-def pair(cells: ByTask, others: ByTask) -> list[Pairs]:
-    """Pair trials by episode, in each task in which both sides have some."""
+def pair(
+    cells: ByTask, others: ByTask, pairs_of: Callable[[Cell, Cell], Pairs] = Pairs.of
+) -> list[Pairs]:
+    """Pair trials by episode, in each task in which both sides have some, by a function."""
     pairs = []
     for task, cell in cells.items():
         if cell.verdicts and task in others:
-            pairs.append(Pairs.of(cell, others[task]))
+            pairs.append(pairs_of(cell, others[task]))
     return pairs
 
 

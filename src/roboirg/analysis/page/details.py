@@ -264,7 +264,7 @@ class _PlayedScene:
 
     episode: Episode | None
     names: Mapping[str, str]
-    facts: Mapping[Fact, Fact]
+    facts: Mapping[tuple[str, str, str | None], Fact]
     acts: dict[tuple[object, ...], str | None] = field(default_factory=dict)
 
     def act(self, event: EventRecord) -> str | None:
@@ -292,7 +292,7 @@ class _PlayedScene:
         last_step = max(record.steps, *steps)
         events = []
         for event in record.events:
-            fact = self.facts.get(Fact(event.kind, event.subject, event.place))
+            fact = self.facts.get((event.kind, event.subject, event.place))
             if fact is not None:
                 events.append(Event(event.step + video_steps, fact, event.holds))
         try:
@@ -322,7 +322,7 @@ def _played_scene(task: str, split: str, number: int, arm: str) -> _PlayedScene:
         episode = arm_episode(get_episode(task, split, number), arm)
     except RoboIRGError:
         return _UNKNOWN_SCENE
-    facts: dict[Fact, Fact] = {}
+    facts: dict[tuple[str, str, str | None], Fact] = {}
     for stage in (*episode.demonstration, *episode.stages):
         for condition in (stage.expects, *stage.forbids):
             facts |= {fact: fact for fact in facts_of(condition)}

@@ -68,7 +68,10 @@ class PageEpisodes:
         """
         frames = []
         for name, source in _named(runs):
-            frames.append(make_frame([(name, source.results)], source.planned, run_name=name))
+            if name:
+                frames.append(make_frame([(name, source.results)], source.planned, run_name=name))
+            else:
+                frames.append(source.frame)
         frame = join(frames)
         return cls(runs, RunData(frame), tuple(_episodes(runs, frame, videos=videos)))
 

@@ -388,9 +388,11 @@ class _Groups(NamedTuple):
     @classmethod
     def of(cls, values: Sequence[Any], key: Callable[[Any], SortKey]) -> _Groups:
         """Return the groups of rows with some values, which are sorted by a key."""
-        distinct = sorted(dict.fromkeys(values), key=key)
-        numbers = {value: number for number, value in enumerate(distinct)}
-        return cls(as_column(distinct), [numbers[value] for value in values])
+        places: dict[Any, int] = {}  # of the values, in the order in which they occur
+        places_of_rows = [places.setdefault(value, len(places)) for value in values]
+        distinct = sorted(places, key=key)
+        numbers = {places[value]: number for number, value in enumerate(distinct)}
+        return cls(as_column(distinct), [numbers[place] for place in places_of_rows])
 
     def column(self, rows: Iterable[int]) -> Values:
         """Return the values of some rows; equal ones are the same object, found faster later."""

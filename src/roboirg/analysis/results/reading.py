@@ -102,15 +102,22 @@ def read_frame(sources: Sequence[Source], *, words: bool = False) -> Frame:
         words: whether to add columns on the words of instructions, for which the whole records are
             read.
     """
-    runs = [(str(source.path), source.results) for source in sources]
-    planned: list[Job] = []
-    for source in sources:
-        planned += source.planned
-    frame = make_frame(runs, planned)
+    frame = _frame_of(sources)
     if not words:
         return frame
     records = itertools.chain.from_iterable(source.records() for source in sources)
     return with_words(frame, records)
+
+
+def _frame_of(sources: Sequence[Source]) -> Frame:
+    """Return the results of runs as a table; that of a single run is made only once."""
+    if len(sources) == 1:
+        return sources[0].frame
+    runs = [(str(source.path), source.results) for source in sources]
+    planned: list[Job] = []
+    for source in sources:
+        planned += source.planned
+    return make_frame(runs, planned)
 
 
 def with_words(frame: Frame, records: Iterable[Record]) -> Frame:
@@ -135,7 +142,9 @@ def with_columns(
     for row, result in enumerate(results):
         rows_by_play.setdefault(_play_key(result), []).append(row)
 
-    columns = {name: as_column([None] * len(results)) for name in reads}  # None if not played
+    columns: dict[str, list[object]] = {}
+    for name in reads:
+        columns[name] = [None] * len(results)  # None if not played
     for record in records:
         rows = rows_by_play.get(_play_key(record))
         if rows is None:
@@ -144,7 +153,7 @@ def with_columns(
             value = read(record)
             for row in rows:
                 columns[name][row] = value
-    return frame.extended(columns)
+    return frame.extended({name: as_column(values) for name, values in columns.items()})
 
 
 def _play_key(job: Job) -> tuple[object, ...]:

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
+from roboirg.analysis.results.frame import Frame, make_frame
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.records.packs import PACK_SUFFIX, opened_run
 from roboirg.records.record import Job, Record, Summary
@@ -80,6 +81,11 @@ class Source:
         if plan is None:
             return ()
         return tuple(self.wanted(plan.drawable_jobs(self.stored.newest)))
+
+    @cached_property
+    def frame(self) -> Frame:
+        """The results as a table, with a row for each planned job without one, too."""
+        return make_frame([(str(self.path), self.results)], self.planned)
 
     def records(self) -> Iterator[Record]:
         """Yield the whole records; those that were written again come twice."""
