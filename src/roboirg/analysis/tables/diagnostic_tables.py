@@ -114,8 +114,9 @@ _BREAKDOWN_NOTE = (
 _HEARD_NOTE = (
     "Cut: the policy's model reads fewer tokens than the prompt needs, so the end of the prompt, "
     "where the command stands, does not arrive; between two bounds if the tokenizer is not "
-    "known. Success in percent over all episodes with a verdict, and over those that were heard "
-    "whole. Of all tasks, shares and rates are means over the tasks that have such episodes. "
+    "known. Prompts: of all trials that were played, errors too. Heard: trials with a verdict "
+    "whose prompt was read whole. Success in percent over all trials with a verdict, and over "
+    "those heard. Of all tasks, shares and rates are means over the tasks that have such trials. "
     "Policies that declare no limit (prompt_tokens) are not in this table."
 )
 
@@ -382,7 +383,7 @@ def make_heard_table(data: RunData) -> Table:
         key="heard",
         title="Instructions that the policies' models read to the end",
         heads=OF_CELLS,
-        columns=named_columns("episodes", "cut, %", "success, all", "heard", "success, heard"),
+        columns=named_columns("prompts", "cut, %", "success, all", "heard", "success, heard"),
         rows=_rows(cells, data.frame),
         notes=(_HEARD_NOTE,),
     )
@@ -393,8 +394,8 @@ def _heard_cells(
 ) -> RowCells:
     """Return the cells of a row of the table of cut prompts.
 
-    They are the number of episodes, the share of cut prompts, success over all episodes, the number
-    of trials whose prompt was read whole (heard), and success over these.
+    They are the number of prompts, the share of cut ones, success over all trials, the number of
+    trials whose prompt was read whole (heard), and success over these.
 
     Args:
         counts_of_tasks: numbers of episodes and of cut prompts of each task.
