@@ -42,15 +42,6 @@ def test_scene_and_words_rule_out_the_seeds_that_were_passed_over(task):
     assert passed_over == shipped_splits()[task].passed_over
 
 
-def test_three_seeds_had_no_room_in_an_episode_of_video_place_order():
-    """The only episode of the shipped splits for which seeds were passed over."""
-    slot = EpisodeSlot("VideoPlaceOrder", "val", 34)
-
-    rejections = find_seed(slot, check_words).rejections
-
-    assert [rejection.reason for rejection in rejections] == ["no room"] * 3
-
-
 @pytest.mark.sim
 @pytest.mark.parametrize(
     ("slot", "passed_over"),
