@@ -5,36 +5,26 @@ Where things stand is compared with RoboMME in `test_sampler_distributions.py`, 
 """
 
 import functools
-import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from drawn_scenes import drawn_scenes
 
-from roboirg.core.conditions import Elapsed
-from roboirg.core.episode import DIFFICULTIES
+from roboirg.core.conditions import Elapsed, Fact
+from roboirg.core.episode import Goal, Primitive
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.footprints import Rectangle, Region, overlap
 from roboirg.tasks import bin_fill, stop_cube, swing_x_times
-from roboirg.tasks.shared.fixtures import (
-    draw_bin,
-    footprint,
-)
+from roboirg.tasks.shared.fixtures import draw_bin, footprint
 
 SEEDS = 150
 
 
 @functools.cache
 def scenes(task, difficulty):
+    """Return the scenes of the seeds 0 to 149, each with its goal; "hard" has all colors."""
     return list(drawn_scenes(task, difficulty, range(SEEDS)))
-
-
-def cubes_of_color(scene, color):
-    return [cube for cube in scene.of_kind("cube") if cube.color == color]
-
-
-each_difficulty = pytest.mark.parametrize("difficulty", DIFFICULTIES)
 
 
 def test_a_scene_without_room_for_the_bin_is_rejected():
@@ -48,7 +38,6 @@ def test_a_scene_without_room_for_the_bin_is_rejected():
 
 def test_bin_fill_keeps_the_bin_off_the_button(monkeypatch):
     """In the real regions the two hardly ever meet; here they would in every second draw."""
-    # In the real regions the two hardly ever meet; here they would in every second draw.
     monkeypatch.setattr(bin_fill, "BUTTON_REGION", Region(-0.15, 0.0, 0.0, 0.0))
     monkeypatch.setattr(bin_fill, "BIN_REGION", Region(-0.05, 0.0, 0.03, 0.03))
     for seed in range(50):
@@ -56,81 +45,100 @@ def test_bin_fill_keeps_the_bin_off_the_button(monkeypatch):
         assert not overlap(footprint(scene["bin"]), footprint(scene["button"]))
 
 
-def test_bin_fill_has_a_goal_for_each_choice_of_one_to_five_cubes():
-    scene, _ = scenes("BinFill", "hard")[0]
-    there = {c: len(cubes_of_color(scene, c)) for c in ("red", "blue", "green")}
+def bin_fill_scene(**numbers):
+    """Return a scene with so many cubes of each color, and no order of the colors."""
+    drawn, _ = scenes("BinFill", "hard")[0]
+    cube = drawn.of_kind("cube")[0]
+    objects = [drawn["button"], drawn["bin"]]
+    for color, number in numbers.items():
+        for index in range(number):
+            objects.append(replace(cube, name=f"{color}_{index}", color=color))
+    return replace(drawn, objects=tuple(objects), motions=(), color_order=())
 
-    possible = [
-        counts
-        for counts in itertools.product(*(range(number + 1) for number in there.values()))
-        if 1 <= sum(counts) <= 5
+
+def test_bin_fill_has_a_goal_for_each_choice_among_the_cubes_of_the_scene():
+    """Colors that are not wanted are left out of a goal."""
+    goals = bin_fill.goals(bin_fill_scene(red=2, blue=1))
+
+    assert [goal.amounts for goal in goals] == [
+        (("blue", 1),),
+        (("red", 1),),
+        (("red", 1), ("blue", 1)),
+        (("red", 2),),
+        (("red", 2), ("blue", 1)),
     ]
 
-    assert len(bin_fill.goals(scene)) == len(possible)
-    assert all(min(goal.numbers("counts")) >= 1 for goal in bin_fill.goals(scene))
+
+def test_bin_fill_wants_at_most_five_cubes():
+    goals = bin_fill.goals(bin_fill_scene(green=7))
+
+    assert [goal["counts"] for goal in goals] == [(1,), (2,), (3,), (4,), (5,)]
+
+
+TWO_RED_ONE_BLUE = Goal.of(colors=("red", "blue"), counts=(2, 1))
 
 
 def test_bin_fill_subgoals_number_the_cubes_of_each_color_separately():
-    """The order of the colors is that of the goal, unless the scene has an order of its own."""
-    scene, _ = scenes("BinFill", "hard")[0]
-    goal = next(g for g in bin_fill.goals(scene) if g.numbers("counts") == (2, 1))
-    first, second = goal.texts("colors")
-    scene = replace(scene, color_order=())  # the goal's
+    stages = bin_fill.stages(bin_fill_scene(red=2, blue=1), TWO_RED_ONE_BLUE)
 
-    assert [stage.subgoal for stage in bin_fill.stages(scene, goal)] == [
-        f"pick up the first {first} cube {{at}}",
+    assert [stage.subgoal for stage in stages] == [
+        "pick up the first red cube {at}",
         "put it into the bin {at}",
-        f"pick up the second {first} cube {{at}}",
+        "pick up the second red cube {at}",
         "put it into the bin {at}",
-        f"pick up the first {second} cube {{at}}",
+        "pick up the first blue cube {at}",
         "put it into the bin {at}",
         "press the button {at}",
     ]
 
-    # The scene's own order takes the second color first.
-    turned = bin_fill.stages(replace(scene, color_order=(second,)), goal)
-    assert [stage.subgoal for stage in turned[::2]] == [
-        f"pick up the first {second} cube {{at}}",
-        f"pick up the first {first} cube {{at}}",
-        f"pick up the second {first} cube {{at}}",
-        "press the button {at}",
+
+def test_bin_fill_picks_in_the_order_of_the_scene_if_it_has_one():
+    """The goal names red first."""
+    scene = replace(bin_fill_scene(red=2, blue=1), color_order=("blue",))
+
+    stages = bin_fill.stages(scene, TWO_RED_ONE_BLUE)
+
+    assert [stage.subgoal for stage in stages if "pick up" in stage.subgoal] == [
+        "pick up the first blue cube {at}",
+        "pick up the first red cube {at}",
+        "pick up the second red cube {at}",
     ]
 
 
 # SwingXtimes
 
 
-@each_difficulty
-def test_swing_stages_go_right_then_left_with_the_goals_cube(difficulty):
-    """A pick, both sides for each repetition, a put-down and a press: 2 × repeats + 3 stages."""
-    for scene, _ in scenes("SwingXtimes", difficulty)[:50]:
-        for goal in swing_x_times.TASK.goals(scene):
-            stages = swing_x_times.stages(scene, goal)
-            repeats = goal.number("repeats")
-            assert len(stages) == 2 * repeats + 3
-            assert {stage.primitive.subject for stage in stages[:-1]} == {
-                f"cube_{goal.text('color')}"
-            }
-            sides = [stage.primitive.place for stage in stages[1:-2]]
-            assert sides == ["target_right", "target_left"] * repeats
-            assert stages[-2].primitive.height == 0.07
-            kinds = [stages[n].primitive.kind for n in (0, -2, -1)]
-            assert kinds == ["pick_cube", "put_down", "press"]
+def test_swing_goes_over_the_right_and_the_left_target_once_per_repeat():
+    """The scene has a cube of each color; the cube is put down from 0.07 m."""
+    scene, _ = scenes("SwingXtimes", "hard")[0]
+
+    stages = swing_x_times.stages(scene, Goal.of(color="green", repeats=3))
+
+    assert [stage.primitive for stage in stages] == [
+        Primitive("pick_cube", "cube_green"),
+        Primitive("move_over", "cube_green", "target_right"),
+        Primitive("move_over", "cube_green", "target_left"),
+        Primitive("move_over", "cube_green", "target_right"),
+        Primitive("move_over", "cube_green", "target_left"),
+        Primitive("move_over", "cube_green", "target_right"),
+        Primitive("move_over", "cube_green", "target_left"),
+        Primitive("put_down", "cube_green", height=0.07),
+        Primitive("press", "button"),
+    ]
 
 
-def test_swing_subgoals_number_the_repetitions():
-    scene, _ = scenes("SwingXtimes", "easy")[0]
-    goal = swing_x_times.TASK.goals(scene)[1]
+def test_swing_subgoals_number_the_repeats():
+    scene, _ = scenes("SwingXtimes", "hard")[0]
 
-    color = goal.text("color")
+    stages = swing_x_times.stages(scene, Goal.of(color="red", repeats=2))
 
-    assert [stage.subgoal for stage in swing_x_times.stages(scene, goal)] == [
-        f"pick up the {color} cube {{at}}",
+    assert [stage.subgoal for stage in stages] == [
+        "pick up the red cube {at}",
         "move to the top of the right-side target {at} for the first time",
         "move to the top of the left-side target {at} for the first time",
         "move to the top of the right-side target {at} for the second time",
         "move to the top of the left-side target {at} for the second time",
-        f"put the {color} cube on the table",
+        "put the red cube on the table",
         "press the button {at}",
     ]
 
@@ -157,17 +165,37 @@ def test_stop_cube_waits_in_steps_of_100_until_30_steps_before_the_visit(interva
     assert stop_cube.checkpoints(interval, visit) == expected
 
 
-def test_stop_cube_stages_hover_wait_and_press():
-    """The hand goes over the button, waits until it is time, and presses."""
-    for scene, _ in scenes("StopCube", "easy")[:50]:
-        (run,) = scene.motions
-        for goal in stop_cube.goals(scene):
-            hover, *waits, press = stop_cube.stages(scene, goal)
-            times = stop_cube.checkpoints(run.interval, goal.number("visit"))
-            assert hover.primitive.kind == "hover"
-            assert [stage.expects for stage in waits] == [Elapsed(least=time) for time in times]
-            assert [stage.primitive.steps for stage in waits] == list(times)
-            assert press.primitive.kind == "press_below"
-            assert press.points_at == "target"
-            middle = run.interval * (goal.number("visit") - 0.5)
-            assert times[-1] == middle - 30
+def stages_of_the_third_visit():
+    """Return the stages for passes of 120 steps: the visit takes steps 240 to 360."""
+    scene, _ = scenes("StopCube", "easy")[0]
+    (shuttle,) = scene.motions
+    scene = replace(scene, motions=(shuttle._replace(interval=120),))
+    return stop_cube.stages(scene, Goal.of(visit=3))
+
+
+def test_stop_cube_hovers_waits_and_presses_in_the_middle_of_the_visit():
+    stages = stages_of_the_third_visit()
+
+    assert [stage.primitive for stage in stages] == [
+        Primitive("hover", "button"),
+        Primitive("hold_until", "robot", steps=100),
+        Primitive("hold_until", "robot", steps=200),
+        Primitive("hold_until", "robot", steps=270),
+        Primitive("press_below", "button", steps=300),
+    ]
+
+
+def test_stop_cube_stages_end_over_the_button_then_by_time_then_with_the_cube_on_the_target():
+    stages = stages_of_the_third_visit()
+
+    assert [stage.expects for stage in stages] == [
+        Fact("hovering", "robot", "button"),
+        Elapsed(least=100),
+        Elapsed(least=200),
+        Elapsed(least=270),
+        Fact("stopped", "shuttle", "target"),
+    ]
+
+
+def test_stop_cube_points_at_the_target_when_it_is_time_to_press():
+    assert stages_of_the_third_visit()[-1].points_at == "target"

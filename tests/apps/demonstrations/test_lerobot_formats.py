@@ -116,20 +116,31 @@ def test_every_frame_has_the_words_of_its_episode(export, version):
     assert read_json(root / "meta/info.json")["total_tasks"] == len(texts)
 
 
-def test_version_3_has_rewards_and_subgoals(export):
+def test_version_3_has_pose_actions_and_subgoals(export):
+    """Of a task without a video."""
+    _, frames = next(episodes_of(export()))
+
+    episode = get_episode("PickXtimes", "train", 0)
+    recorded = synthetic.arrays_of(episode, synthetic.STEPS + 1, 0, has_depth=False)
+    for time, frame in enumerate(frames):
+        assert frame["pose_action"] == pytest.approx(recorded["pose_actions"][time + 1])
+        assert frame["subgoal"] == recorded["subgoals"][time + 1]
+        assert not frame["is_video_demo"]
+
+
+@pytest.mark.parametrize("column", ["next.done", "next.success", "next.reward"])
+def test_version_3_rewards_the_last_of_seven_steps(column, export):
+    _, frames = next(episodes_of(export()))
+
+    assert [frame[column] for frame in frames] == [0, 0, 0, 0, 0, 0, 1]
+
+
+def test_version_3_names_all_columns_and_all_episodes(export):
+    """All eight episodes are for training."""
     root = export()
 
-    _, frames = next(episodes_of(root))
-    episode = get_episode("PickXtimes", "train", 0)
-    expected = synthetic.arrays_of(episode, synthetic.STEPS + 1, 0, has_depth=False)
-    for time, frame in enumerate(frames):
-        is_last = time == synthetic.STEPS - 1
-        assert frame["pose_action"] == pytest.approx(expected["pose_actions"][time + 1])
-        assert frame["subgoal"] == expected["subgoals"][time + 1]
-        assert frame["next.done"] == frame["next.success"] == is_last
-        assert frame["next.reward"] == float(is_last)
-        assert not frame["is_video_demo"]
     info = read_json(root / "meta/info.json")
+    _, frames = next(episodes_of(root))
     assert info["splits"] == {"train": "0:8"}
     assert set(info["features"]) == set(frames[0])
     assert None not in [feature["names"] for feature in info["features"].values()]
@@ -213,39 +224,72 @@ def test_the_video_comes_before_the_policy_and_is_marked(export):
             assert np.array_equal(video[time], synthetic.picture("wrist", episode.seed, time))
 
 
-def test_version_2_1_has_a_file_per_episode_and_describes_its_columns(export):
+def test_version_2_1_has_a_file_and_statistics_for_each_episode_and_no_videos(export):
+    """Two tasks and two settings of two episodes that succeed."""
     root = export(format="lerobot-v2.1")
-    info = read_json(root / "meta/info.json")
+
+    assert len(list((root / "data").rglob("*.parquet"))) == 8
     assert len(read_lines(root / "meta/episodes_stats.jsonl")) == 8
+    info = read_json(root / "meta/info.json")
     assert (info["total_videos"], info["total_chunks"]) == (0, 1)
 
-    paths = list((root / "data").rglob("*.parquet"))
-    assert len(paths) == 8
 
-    # LeRobot reads this version without saying what the columns are.
-    described = json.loads(parquet.read_schema(paths[0]).metadata[b"huggingface"])
+def test_version_2_1_describes_its_columns_in_each_file(export):
+    """LeRobot reads this version without saying what the columns are."""
+    root = export(format="lerobot-v2.1")
+
+    path = next((root / "data").rglob("*.parquet"))
+    described = json.loads(parquet.read_schema(path).metadata[b"huggingface"])
     types = described["info"]["features"]
     assert types["image"] == {"_type": "Image"}
-
     value = {"dtype": "float32", "_type": "Value"}
     assert types["actions"] == {"feature": value, "length": 8, "_type": "Sequence"}
 
-    modality = read_json(root / "meta/modality.json")
+
+def test_version_2_1_says_where_the_gripper_is_in_the_state(export):
+    """After the seven joints."""
+    modality = read_json(export(format="lerobot-v2.1") / "meta/modality.json")
+
     assert modality["state"]["gripper"] == {"start": 7, "end": 8, "original_key": "state"}
 
 
+READ_BACK = {
+    ("PickXtimes", 0): 0,
+    ("PickXtimes", 2): 0,
+    ("VideoUnmask", 0): 4,
+    ("VideoUnmask", 2): 4,
+}
+"""Task and number of the episodes that succeed, and the rows of their video."""
+
+
+@pytest.mark.parametrize("version", COLUMNS)
+def test_each_trajectory_is_read_back_once(export, version):
+    """Also where two settings give it different words."""
+    found = read_dataset(export(format=version, video=True))
+
+    assert [(trajectory.task, trajectory.index) for trajectory in found] == list(READ_BACK)
+
+
 @pytest.mark.parametrize("version", [*COLUMNS, "robomme-hdf5"])
-def test_actions_are_read_back_once_per_trajectory(export, version):
+def test_actions_and_states_are_read_back_without_the_video(export, version):
+    """The first row after the video is the state at reset; its action was not taken."""
     root = export(format=version, video=True)
-    lengths = {"PickXtimes": 0, "VideoUnmask": 4}
-    played = [get_episode(task, "train", index) for task in lengths for index in (0, 2)]
-    for episode, found in zip(played, read_dataset(root), strict=True):
-        video = lengths[episode.task]
+
+    for found, (task, index) in zip(read_dataset(root), READ_BACK, strict=True):
+        episode = get_episode(task, "train", index)
+        video = READ_BACK[task, index]
         rows = video + 1 + synthetic.STEPS
-        expected = synthetic.arrays_of(episode, rows, video, has_depth=False)
-        assert (found.task, found.seed) == (episode.task, episode.seed)
-        assert np.array_equal(found.actions, expected["actions"][video + 1 :])
-        assert np.array_equal(found.states[:, :7], expected["joint_positions"][video + 1 :])
-        if version != "robomme-hdf5":  # which has no last state and no number of the episode
-            assert found.index == episode.index
-            assert np.array_equal(found.final_state[7:], expected["gripper"][-1])
+        recorded = synthetic.arrays_of(episode, rows, video, has_depth=False)
+        assert (found.task, found.seed) == (task, episode.seed)
+        assert np.array_equal(found.actions, recorded["actions"][video + 1 :])
+        assert np.array_equal(found.states[:, :7], recorded["joint_positions"][video + 1 :])
+
+
+@pytest.mark.parametrize("version", COLUMNS)
+def test_the_last_state_is_read_back_with_the_gripper(export, version):
+    """RoboMME's format has no last state."""
+    found = next(iter(read_dataset(export(format=version))))
+
+    episode = get_episode("PickXtimes", "train", 0)
+    recorded = synthetic.arrays_of(episode, 1 + synthetic.STEPS, 0, has_depth=False)
+    assert np.array_equal(found.final_state[7:], recorded["gripper"][-1])

@@ -73,8 +73,8 @@ def _sleep(self):
 
 
 def _failing(name, **fields):
+    """Define a class of this module, so that a plan can name it."""
     globals()[name] = type(name, (Failing,), {**fields, "__module__": __name__})
-    return name
 
 
 BAD_ANSWERS = {
@@ -85,15 +85,13 @@ BAD_ANSWERS = {
     "Beyond": np.full(8, 1e9),
     "Half": np.vstack([np.zeros((4, 8)), np.full((1, 8), np.inf)]),  # four good rows
 }
-IN_PROCESS = ["Posing", _failing("Exits", fail=_exit)]
-for _when, _at in (("init", 1), ("reset", 1), ("act", 1), ("act", 2), ("hear", 1), ("usage", 1),
-                   ("close", 1)):  # fmt: skip
-    IN_PROCESS.append(_failing(f"Raises_{_when}_{_at}", when=_when, at=_at))
+_failing("Exits", fail=_exit)
+for _when in ("init", "reset", "act", "hear", "usage", "close"):
+    _failing(f"Raises_{_when}_1", when=_when)
+_failing("Raises_act_2", at=2)
 for _name, _answer in BAD_ANSWERS.items():
     for _at in (1, 2):
-        answer = lambda self, answer=_answer: answer  # noqa: E731
-        IN_PROCESS.append(_failing(f"{_name}_{_at}", fail=answer, at=_at))
-HOSTED = [
-    _failing(f"{fail.__name__.strip('_').title()}_{when}", fail=fail, when=when)
-    for fail in (_die, _kill, _sleep) for when in ("reset", "act")
-]  # fmt: skip
+        _failing(f"{_name}_{_at}", fail=lambda self, answer=_answer: answer, at=_at)
+for _name, _end in {"Die": _die, "Kill": _kill, "Sleep": _sleep}.items():
+    for _when in ("reset", "act"):
+        _failing(f"{_name}_{_when}", fail=_end, when=_when)

@@ -1,8 +1,6 @@
 """Honest runs of policies that fail, at once or later, hold."""
 
-import failing_policies
 import pytest
-from failing_policies import HOSTED, IN_PROCESS
 
 from roboirg.apps.leaderboard.run_verification import verify_run
 from roboirg.records.store import read_records
@@ -12,36 +10,81 @@ from roboirg.runs.run.runner import episode_runner, run_plan
 
 pytestmark = pytest.mark.sim
 
+# Classes of failing_policies: what they do, when, and at which call.
+RAISING = ("Posing", "Exits", "Raises_init_1", "Raises_reset_1", "Raises_act_1", "Raises_act_2")
+GIVING_NO_ACTIONS = ("Nan_1", "Nan_2", "Narrow_1", "Narrow_2", "Text_1", "Text_2", "Empty_1",
+                     "Empty_2", "Half_1", "Half_2")  # fmt: skip
+PLAYING_TO_THE_END = ("Raises_hear_1", "Raises_usage_1", "Raises_close_1", "Beyond_1", "Beyond_2")
+"""In an episode without a second utterance; targets beyond the joints' limits are clipped."""
+ENDING_THEIR_PROCESS = ("Die_reset", "Kill_reset", "Sleep_reset", "Die_act", "Kill_act",
+                        "Sleep_act")  # fmt: skip
+
 
 def play(folder, names, executor, **options):
-    specs = [f"failing_policies:{name}" for name in names]
-    chosen = {"tasks": "StopCube", "settings": "contextual", "delivery": "turns", "max_steps": 6,
-              "episodes": "1", "tries": 1}  # fmt: skip
-    # Not opened: some fail when they are made.
-    plan = Plan.model_validate({"policies": specs, **chosen, **options})
+    """Play six steps of an episode by each policy."""
+    plan = Plan.model_validate(
+        {
+            "policies": [f"failing_policies:{name}" for name in names],
+            "tasks": "StopCube",
+            "settings": "contextual",
+            "delivery": "turns",
+            "max_steps": 6,
+            "episodes": "1",
+            "tries": 1,
+            **options,
+        }
+    )
+    # Some policies fail when they are made, so `make_plan` would refuse them.
     run_plan(plan, folder, episode_runner(plan, folder), executor)
 
 
-def test_runs_of_policies_that_fail_in_this_process_hold(tmp_path):
-    assert failing_policies.Failing
+@pytest.fixture(scope="module")
+def in_process(tmp_path_factory):
+    """Return the folder of a run of the policies that leave this process alive."""
+    folder = tmp_path_factory.mktemp("in_process")
+    names = RAISING + GIVING_NO_ACTIONS + PLAYING_TO_THE_END
+    play(folder, names, InProcess(), policy_process="shared")
+    return folder
 
-    play(tmp_path, IN_PROCESS, InProcess(), policy_process="shared")
-    records = {record.policy.partition(":")[2]: record for record in read_records(tmp_path)}
-    assert len(records) == len(IN_PROCESS) >= 20
-    assert {record.outcome for record in records.values()} == {"error", "failure"}
-    assert records["Raises_act_1"].action_log is not None
-    assert (records["Posing"].outcome, records["Posing"].steps) == ("error", 2)
 
-    found = verify_run(tmp_path, workers=1)
+def records_of(folder):
+    """Return the records by the name of the policy's class."""
+    return {record.policy.partition(":")[2]: record for record in read_records(folder)}
+
+
+def test_the_record_has_the_kind_of_error_that_ended_the_episode(in_process):
+    errors = {name: record.error for name, record in records_of(in_process).items()}
+
+    assert errors == {
+        **dict.fromkeys(RAISING, "policy"),
+        **dict.fromkeys(GIVING_NO_ACTIONS, "invalid_action"),
+        **dict.fromkeys(PLAYING_TO_THE_END, None),
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "steps"), [("Raises_act_1", 0), ("Raises_act_2", 1), ("Posing", 2)]
+)
+def test_the_actions_before_an_error_are_kept(name, steps, in_process):
+    """Posing raises in its third call."""
+    record = records_of(in_process)[name]
+
+    assert record.steps == steps
+    assert record.action_log is not None
+
+
+def test_a_run_of_policies_that_fail_in_this_process_holds(in_process):
+    found = verify_run(in_process, workers=1)
+
     assert found.holds, found
-    assert found.errors == sum(record.outcome == "error" for record in records.values())
+    assert found.errors == 6 + 10  # raising, and giving no actions
 
 
 @pytest.mark.slow
-def test_runs_of_policies_whose_process_ends_hold(tmp_path):
-    play(tmp_path, HOSTED, LocalProcesses(1), policy_timeout_s=30.0)
+def test_a_run_of_policies_whose_process_ends_holds(tmp_path):
+    play(tmp_path, ENDING_THEIR_PROCESS, LocalProcesses(1), policy_timeout_s=30.0)
+
     records = read_records(tmp_path)
     assert {record.error for record in records} == {"policy", "infrastructure", "timeout"}
-
     found = verify_run(tmp_path)
     assert found.holds, found

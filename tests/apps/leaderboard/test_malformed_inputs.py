@@ -6,7 +6,6 @@ actions is in test_verification.py.
 
 import hashlib
 import io
-import itertools
 import json
 import os
 import re
@@ -76,6 +75,11 @@ def fit(message):
     return message
 
 
+def cases(arguments, by_name):
+    """Run a test for each entry of a table, under its name."""
+    return pytest.mark.parametrize(arguments, by_name.values(), ids=by_name)
+
+
 def line_of(run):
     return json.loads((run / RECORDS_FILE).read_text().splitlines()[0])
 
@@ -136,82 +140,89 @@ def planned(**changes):
     return change
 
 
-REFUSED_RECORDS = {
-    "step limit of 10**30": (
-        record(environment={"max_steps": 10**30}),
-        r"\$\.environment\.max_steps",
-    ),
-    "seed of 10**40": (record(seed=10**40), r"\$\.seed"),
-    "step 10**25": (record(steps=10**25), r"\$\.steps"),
-    "a million stages": (option(stages=[1] * 1_000_000), "length <= 100"),
-    "cause of 5 MB": (record(outcome="failure", cause="x" * 5_000_000), r"\$\.cause"),
-    "version in bidi marks": (record(language_version="\u202e0.0.2"), "control characters"),
-    "policy with a line end": (record(policy="random\n"), "control characters"),
-    "policy that is a formula": (record(policy="=cmd|' /C calc'!A0"), "none of = [+] - @"),
-    "task that is a formula": (record(task="@SUM(1)"), "none of = [+] - @"),
-    "setting that is a formula": (option(setting="+1+1"), "none of = [+] - @"),
-    "video with a line end": (record(video="videos/a.mp4\n"), "path below"),
-    "video outside": (record(video="videos/../../secret.mp4"), "path below"),
-    "line of 65 MiB": (
-        lambda run: os.truncate(run / RECORDS_FILE, 65 << 20),
-        "line 3 has more than",
-    ),
-    "pipe": (replaced(RECORDS_FILE, os.mkfifo), "not a regular file"),
-    "circle of links": (replaced(RECORDS_FILE, link(RECORDS_FILE)), "symbolic links"),
-}
-
-
-REFUSED_COURSES = {
-    "event at step 10**25": (
-        record(events=[{"step": 10**25, "kind": "home", "subject": "robot"}]),
-        r"\$\.events\[0\]\.step",
-    ),
-    "field of a mention that no version has": (
-        record(mentions=[{"luck": 1}]),
-        "unknown field `luck`",
-    ),
-    "field that no version has": (record(mentions=[], luck=1), "unknown field `luck`"),
-}
-"""What packs hold unread."""
-
-
-@pytest.mark.parametrize(
-    ("name", "reader"),
-    [
-        *itertools.product(REFUSED_RECORDS, (read_records, pack)),
-        *itertools.product(REFUSED_COURSES, (read_records, merge)),
-    ],
+@pytest.mark.parametrize("reader", [read_records, pack])
+@cases(
+    ("change", "complaint"),
+    {
+        "step limit of 10**30": (
+            record(environment={"max_steps": 10**30}),
+            r"\$\.environment\.max_steps",
+        ),
+        "seed of 10**40": (record(seed=10**40), r"\$\.seed"),
+        "step 10**25": (record(steps=10**25), r"\$\.steps"),
+        "a million stages": (option(stages=[1] * 1_000_000), "length <= 100"),
+        "cause of 5 MB": (record(outcome="failure", cause="x" * 5_000_000), r"\$\.cause"),
+        "version in bidi marks": (record(language_version="\u202e0.0.2"), "control characters"),
+        "policy with a line end": (record(policy="random\n"), "control characters"),
+        "policy that is a formula": (record(policy="=cmd|' /C calc'!A0"), "none of = [+] - @"),
+        "task that is a formula": (record(task="@SUM(1)"), "none of = [+] - @"),
+        "setting that is a formula": (option(setting="+1+1"), "none of = [+] - @"),
+        "video with a line end": (record(video="videos/a.mp4\n"), "path below"),
+        "video outside": (record(video="videos/../../secret.mp4"), "path below"),
+        "line of 65 MiB": (
+            lambda run: os.truncate(run / RECORDS_FILE, 65 << 20),
+            "line 3 has more than",
+        ),
+        "pipe": (replaced(RECORDS_FILE, os.mkfifo), "not a regular file"),
+        "circle of links": (replaced(RECORDS_FILE, link(RECORDS_FILE)), "symbolic links"),
+    },
 )
-def test_records_that_are_none_are_refused_by_the_name_of_their_file(name, reader, run):
-    change, says = {**REFUSED_RECORDS, **REFUSED_COURSES}[name]
+def test_records_that_are_none_are_refused_by_the_name_of_their_file(
+    change, complaint, reader, run
+):
     change(run)
 
     message = refusal(reader, run)
 
-    assert re.search(says, message)
+    assert re.search(complaint, message)
     assert RECORDS_FILE in message
 
 
-DAMAGED_LINES = {
-    "bytes that are no UTF-8": raw(b'"policy":"random"', b'"policy":"\xff"'),
-    "lone surrogate": raw(b'"policy":"random"', b'"policy":"\\udfff"'),
-    "deep nesting": raw(b'"policy_metadata":{', b'"policy_metadata":{"a":' + b"[" * 200_000),
-}
+@pytest.mark.parametrize("reader", [read_records, merge])
+@cases(
+    ("change", "complaint"),
+    {
+        "event at step 10**25": (
+            record(events=[{"step": 10**25, "kind": "home", "subject": "robot"}]),
+            r"\$\.events\[0\]\.step",
+        ),
+        "field of a mention that no version has": (
+            record(mentions=[{"luck": 1}]),
+            "unknown field `luck`",
+        ),
+        "field that no version has": (record(mentions=[], luck=1), "unknown field `luck`"),
+    },
+)
+def test_fields_that_packs_hold_unread_are_refused_by_who_reads_them(
+    change, complaint, reader, run
+):
+    change(run)
+
+    message = refusal(reader, run)
+
+    assert re.search(complaint, message)
+    assert RECORDS_FILE in message
 
 
 @pytest.mark.parametrize("reader", [pack, verify])
-@pytest.mark.parametrize("name", DAMAGED_LINES)
-def test_a_damaged_run_is_merged_with_a_warning_but_neither_packed_nor_verified(
-    name, reader, run, caplog
-):
-    DAMAGED_LINES[name](run)
+@cases(
+    "damage",
+    {
+        "bytes that are no UTF-8": raw(b'"policy":"random"', b'"policy":"\xff"'),
+        "lone surrogate": raw(b'"policy":"random"', b'"policy":"\\udfff"'),
+        "deep nesting": raw(b'"policy_metadata":{', b'"policy_metadata":{"a":' + b"[" * 200_000),
+    },
+)
+def test_a_damaged_run_is_refused_until_it_is_merged(damage, reader, run, caplog):
+    """Merging warns of the line, and leaves it out."""
+    damage(run)
     assert "has 1 damaged line, the first is line 1" in refusal(reader, run)
 
     merged = merge(run)
+
     (warning,) = caplog.messages
     assert f"{run / RECORDS_FILE} has 1 damaged line, the first is line 1" in warning
     assert len(read_records(merged)) == 1
-
     reader(merged)
 
 
@@ -283,43 +294,38 @@ def test_hidden_files_and_pipes_are_not_packed(run):
     assert names == {path.name for path in (run / "logs").iterdir()} - {".DS_Store", "pipe.txt"}
 
 
-UNREAD_PLANS = {
-    "1,200,000 jobs": planned(policy_seeds=list(range(12_000)), episodes=list(range(50))),
-    "no seeds": planned(policy_seeds=[]),
-    "policy that controls the terminal": planned(policies=["\x1b[31m"]),
-    "task that controls the terminal": planned(tasks=["\u202eksat"]),
-    "split of half a character": planned(split="\ud800"),
-    "deep nesting": replaced(PLAN_FILE, lambda path: path.write_text("[" * 200_000)),
-    "pipe": replaced(PLAN_FILE, os.mkfifo),
-    "3 GB": replaced(PLAN_FILE, sparse(3 << 30)),
-}
-
-
 def test_a_plan_of_many_jobs_is_read(run):
     planned(policy_seeds=list(range(9_000)), episodes=list(range(50)))(run)
     assert len(read_plans(run)) == 1
 
 
-@pytest.mark.parametrize("name", UNREAD_PLANS)
-def test_plans_that_cannot_be_are_missing(name, run):
-    UNREAD_PLANS[name](run)
+@cases(
+    "change",
+    {
+        "1,200,000 jobs": planned(policy_seeds=list(range(12_000)), episodes=list(range(50))),
+        "no seeds": planned(policy_seeds=[]),
+        "policy that controls the terminal": planned(policies=["\x1b[31m"]),
+        "task that controls the terminal": planned(tasks=["\u202eksat"]),
+        "split of half a character": planned(split="\ud800"),
+        "deep nesting": replaced(PLAN_FILE, lambda path: path.write_text("[" * 200_000)),
+        "pipe": replaced(PLAN_FILE, os.mkfifo),
+        "3 GB": replaced(PLAN_FILE, sparse(3 << 30)),
+    },
+)
+def test_plans_that_cannot_be_are_missing(change, run):
+    change(run)
+
     assert read_plans(run) == ()
     assert verify_run(run, sample=0).faults == ("2 records from no plan that is kept.",)
 
 
-def test_a_plan_of_3_gb_is_neither_merged_nor_played(run):
+@pytest.mark.parametrize(
+    "reader", [merge, lambda run: read_plan_file(str(run / PLAN_FILE))], ids=["merged", "played"]
+)
+def test_a_plan_of_3_gb_is_neither_merged_nor_played(reader, run):
     replaced(PLAN_FILE, sparse(3 << 30))(run)
-    for reader in (merge, lambda run: read_plan_file(str(run / PLAN_FILE))):
-        assert re.search(r"plan\.json has more than", refusal(reader, run))
 
-
-PLAN_FILES = {
-    "Python object": ("tasks: !!python/object/apply:os.abort []\n", "not valid YAML"),
-    "deep nesting": ("tasks: " + "[" * 20_000, "nested too deeply"),
-    "number of 10,000 digits": ("max_steps: " + "9" * 10_000, "not valid YAML"),
-    "date that cannot be": ("split: 2020-99-99", "line 1 has 2020-99-99"),
-    "list as key": ("? [tasks]\n: all\n", "not valid YAML"),
-}
+    assert "plan.json has more than" in refusal(reader, run)
 
 
 @pytest.mark.parametrize("make", [os.mkfifo, link("/dev/zero")], ids=["pipe", "device"])
@@ -329,15 +335,23 @@ def test_plan_files_are_regular_files(make, tmp_path):
     assert message.endswith("is not a regular file.")
 
 
-@pytest.mark.parametrize("name", PLAN_FILES)
-def test_plan_files_are_refused(name, tmp_path):
-    content, says = PLAN_FILES[name]
+@cases(
+    ("content", "complaint"),
+    {
+        "Python object": ("tasks: !!python/object/apply:os.abort []\n", "not valid YAML"),
+        "deep nesting": ("tasks: " + "[" * 20_000, "nested too deeply"),
+        "number of 10,000 digits": ("max_steps: " + "9" * 10_000, "not valid YAML"),
+        "date that cannot be": ("split: 2020-99-99", "line 1 has 2020-99-99"),
+        "list as key": ("? [tasks]\n: all\n", "not valid YAML"),
+    },
+)
+def test_plan_files_with_other_content_are_refused_by_name(content, complaint, tmp_path):
     path = tmp_path / "plan.yaml"
     path.write_text(content)
 
     message = refusal(lambda path: read_plan_file(str(path)), path)
 
-    assert says in message
+    assert complaint in message
     assert "plan.yaml" in message
 
 
@@ -378,23 +392,24 @@ def _headers_with(offset, value):
 ENCRYPTED = _headers_with(6, 1)
 UNKNOWN_METHOD = _headers_with(8, 99)
 
-ACTION_FILES = {
-    "10**12 rows": _rows("(1000000000000, 8)"),
-    "shape of truth values": _rows("(True, 8)", bytes(64)),
-    "complex rows": _rows("(3, 8)", bytes(384), "<c16"),
-    "code in a header": _rows("__import__('os').abort()"),
-    "encrypted": ENCRYPTED,
-    "unknown compression": UNKNOWN_METHOD,
-    "bomb": _rows("(3, 8)", bytes(20_000_000)),
-}
-
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("name", ACTION_FILES)
-def test_action_files_are_refused(name, run):
+@cases(
+    "damaged",
+    {
+        "10**12 rows": _rows("(1000000000000, 8)"),
+        "shape of truth values": _rows("(True, 8)", bytes(64)),
+        "complex rows": _rows("(3, 8)", bytes(384), "<c16"),
+        "code in a header": _rows("__import__('os').abort()"),
+        "encrypted": ENCRYPTED,
+        "unknown compression": UNKNOWN_METHOD,
+        "bomb": _rows("(3, 8)", bytes(20_000_000)),
+    },
+)
+def test_action_files_that_are_none_are_refused_and_named_by_verify(damaged, run):
     digest = line_of(run)["action_log"]
     path = action_path(run, digest)
-    path.write_bytes(ACTION_FILES[name](path.read_bytes()))
+    path.write_bytes(damaged(path.read_bytes()))
 
     assert "is not an action log" in refusal(lambda folder: read_actions(folder, digest), run)
     assert fit(verify(run)).count("is not an action log") == 2  # both records name it
@@ -445,41 +460,42 @@ def _swollen(good, only=b""):
     return bytes(content)
 
 
-PACKS = {
-    "absolute path": (_with({"/var/evil": b""}), "not belong to a run"),
-    "path that leaves": (_with({"actions/../../evil": b""}), "not belong to a run"),
-    "Windows path": (_with({"actions\\..\\..\\evil": b""}), "not belong to a run"),
-    "file of another kind": (_with({"x": b""}), "not belong to a run"),
-    "name of 60,000 letters": (_with({"logs/" + "a" * 60_000: b""}), "not belong to a run"),
-    "name with a line end": (_with({"logs/a.txt\n": b""}), "not belong to a run"),
-    "other records": (
-        _with({RECORDS_FILE: b"{}\n"}, manifest_fits=False),
-        "is not the file that its manifest names",
-    ),
-    "file more": (_with({"more.txt": b"x"}, manifest_fits=False), "exactly the files"),
-    "no records": (_without(RECORDS_FILE), "exactly the files"),
-    "no manifest": (_without(MANIFEST), "cannot be read"),
-    "empty manifest": (_with({MANIFEST: b"{}"}, manifest_fits=False), "cannot be read"),
-    "manifest that is no JSON": (_with({MANIFEST: b"no"}, manifest_fits=False), "cannot be read"),
-    "other format": (_manifest_with(format=2), "of format 2; this roboirg reads format 1"),
-    "negative number of records": (_manifest_with(records=-1), "cannot be read"),
-    "encrypted": (ENCRYPTED, "not a packed run"),
-    "unknown compression": (UNKNOWN_METHOD, "not a packed run"),
-    "cut short": (lambda good: good[:-100], "not a packed run"),
-    "says it is huge": (_swollen, "unpacks to more than 20 GiB"),
-    "records of 70 MB of blanks": (_with({RECORDS_FILE: b" " * 70_000_000}), "more than"),
-}
-
-
-@pytest.mark.parametrize("name", PACKS)
-def test_a_pack_that_is_none_is_refused_and_leaves_nothing_behind(name, run):
-    build, says = PACKS[name]
+@cases(
+    ("build", "complaint"),
+    {
+        "absolute path": (_with({"/var/evil": b""}), "not belong to a run"),
+        "path that leaves": (_with({"actions/../../evil": b""}), "not belong to a run"),
+        "Windows path": (_with({"actions\\..\\..\\evil": b""}), "not belong to a run"),
+        "file of another kind": (_with({"x": b""}), "not belong to a run"),
+        "name of 60,000 letters": (_with({"logs/" + "a" * 60_000: b""}), "not belong to a run"),
+        "name with a line end": (_with({"logs/a.txt\n": b""}), "not belong to a run"),
+        "other records": (
+            _with({RECORDS_FILE: b"{}\n"}, manifest_fits=False),
+            "is not the file that its manifest names",
+        ),
+        "file more": (_with({"more.txt": b"x"}, manifest_fits=False), "exactly the files"),
+        "no records": (_without(RECORDS_FILE), "exactly the files"),
+        "no manifest": (_without(MANIFEST), "cannot be read"),
+        "empty manifest": (_with({MANIFEST: b"{}"}, manifest_fits=False), "cannot be read"),
+        "manifest that is no JSON": (
+            _with({MANIFEST: b"no"}, manifest_fits=False),
+            "cannot be read",
+        ),
+        "other format": (_manifest_with(format=2), "of format 2; this roboirg reads format 1"),
+        "negative number of records": (_manifest_with(records=-1), "cannot be read"),
+        "encrypted": (ENCRYPTED, "not a packed run"),
+        "unknown compression": (UNKNOWN_METHOD, "not a packed run"),
+        "cut short": (lambda good: good[:-100], "not a packed run"),
+        "says it is huge": (_swollen, "unpacks to more than 20 GiB"),
+        "records of 70 MB of blanks": (_with({RECORDS_FILE: b" " * 70_000_000}), "more than"),
+    },
+)
+def test_a_pack_that_is_none_is_refused_and_leaves_nothing_behind(build, complaint, run):
     path = pack(run)
     path.write_bytes(build(path.read_bytes()))
-
     before = sorted(run.parent.rglob("*"))
 
-    assert says in refusal(read_pack, path)
+    assert complaint in refusal(read_pack, path)
     assert sorted(run.parent.rglob("*")) == before
 
 
@@ -511,26 +527,29 @@ commands.all = ["pick up {color} {repeats}"]
 stated.all = { color = "the {color} cube" }
 """
 
-WORDING_FILES = {
-    "deep list": ("a=" + "[" * 50_000, "not valid TOML"),
-    "deep tables": ("a=" + "{a=" * 3_000 + "1" + "}" * 3_000, "not valid TOML"),
-    "key of 20,000 parts": (".".join("a" * 20_000) + "=1", "more than 20 parts"),
-    "number of 10,000 digits": ("name=" + "9" * 10_000, "not valid TOML"),
-    "command of 1 MB": (WORDINGS.replace("pick up", "pick up " + "very " * 200_000), "characters"),
-    "file of 4 MB": (WORDINGS + "#" * 4_000_000, "has more than 4,000,000 bytes"),
-    "field of an attribute": (WORDINGS.replace("{color}", "{0.__class__}"), "bracket"),
-}
 
-
-@pytest.mark.parametrize("name", WORDING_FILES)
-def test_wording_files_are_refused(name, tmp_path):
-    content, says = WORDING_FILES[name]
+@cases(
+    ("content", "complaint"),
+    {
+        "deep list": ("a=" + "[" * 50_000, "not valid TOML"),
+        "deep tables": ("a=" + "{a=" * 3_000 + "1" + "}" * 3_000, "not valid TOML"),
+        "key of 20,000 parts": (".".join("a" * 20_000) + "=1", "more than 20 parts"),
+        "number of 10,000 digits": ("name=" + "9" * 10_000, "not valid TOML"),
+        "command of 1 MB": (
+            WORDINGS.replace("pick up", "pick up " + "very " * 200_000),
+            "characters",
+        ),
+        "file of 4 MB": (WORDINGS + "#" * 4_000_000, "has more than 4,000,000 bytes"),
+        "field of an attribute": (WORDINGS.replace("{color}", "{0.__class__}"), "bracket"),
+    },
+)
+def test_wording_files_that_are_malformed_or_huge_are_refused_by_name(content, complaint, tmp_path):
     path = tmp_path / "words.toml"
     path.write_text(content)
 
     message = refusal(read_wordings, path)
 
-    assert says in message
+    assert complaint in message
     assert "words.toml" in message
 
 
