@@ -20,7 +20,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.policy_ref import BEHIND, RESOLVE
 from roboirg.core.versions import POLICY, makeup_text
 from roboirg.stats.cells import ByTask, Cell, Key, gather
-from roboirg.stats.intervals import TaskRates, share_interval
+from roboirg.stats.intervals import Rows, TaskRates, share_interval
 from roboirg.stats.rates import NOT_APPLICABLE, whole_percent
 
 NO_SHARE = "no clear gap"
@@ -100,41 +100,56 @@ def _shared_options(
 
 def _words(rewritten: ByTask, said: ByTask, explicit: ByTask) -> list[str]:
     """Return the cells of a row: episodes, the three rates, the share and its interval."""
-    tasks: list[TaskRates] = []
-    episodes = 0
-    rates = []
+    tasks: list[Rows] = []
     for task in rewritten:
-        if task not in said or task not in explicit:
-            continue
-        rows = _joint_rows([rewritten[task], said[task], explicit[task]])
-        if rows:
-            counts = np.array(rows, dtype=np.int64)
-            totals = counts.sum(axis=0)
-            rates.append(totals[0::2] / totals[1::2])
-            tasks.append(TaskRates.of(counts))
-            episodes += len(rows)
+        if task in said and task in explicit:
+            rows = _joint_rows([rewritten[task], said[task], explicit[task]])
+            if len(rows):
+                tasks.append(rows)
     if not tasks:
         return ["0", *[NOT_APPLICABLE] * 5]
 
-    after, before, best = np.mean(rates, axis=0).tolist()
-    interval = share_interval(tasks)
-    share = NO_SHARE
-    ends = NOT_APPLICABLE
-    if interval is not None:
-        share = whole_percent((after - before) / (best - before))
-        ends = f"{whole_percent(interval.low)} to {whole_percent(interval.high)}"
-    shown_rates = [whole_percent(rate) for rate in (before, after, best)]
-    return [str(episodes), *shown_rates, share, ends]
+    episodes = str(sum(map(len, tasks)))
+    rates = _mean_rates(tasks)
+    shown_rates = [whole_percent(rates.said), whole_percent(rates.rewritten)]
+    shown_rates.append(whole_percent(rates.explicit))
+    interval = share_interval([TaskRates.of(rows) for rows in tasks])
+    if interval is None:
+        return [episodes, *shown_rates, NO_SHARE, NOT_APPLICABLE]
+    share = (rates.rewritten - rates.said) / (rates.explicit - rates.said)
+    ends = f"{whole_percent(interval.low)} to {whole_percent(interval.high)}"
+    return [episodes, *shown_rates, whole_percent(share), ends]
 
 
-def _joint_rows(cells: Sequence[Cell]) -> list[list[int]]:
-    """Return successes and trials in each cell, side by side, of the episodes that all have.
+class _Rates(NamedTuple):
+    """Success rates, 0 to 1, as means over tasks."""
 
-    With one seed, an episode that only the second of three cells solved has the row
-    ``[0, 1, 1, 1, 0, 1]``.
+    rewritten: float
+    said: float
+    explicit: float
+
+
+def _mean_rates(tasks: Sequence[Rows]) -> _Rates:
+    """Return the mean rates of some tasks, given the rows of `_joint_rows` of each."""
+    rates = []
+    for rows in tasks:
+        totals = rows.sum(axis=0)
+        rates.append(totals[0::2] / totals[1::2])
+    return _Rates._make(np.mean(rates, axis=0).tolist())
+
+
+def _joint_rows(cells: Sequence[Cell]) -> Rows:
+    """Return successes and trials in each of three cells, side by side, of the shared episodes.
+
+    With one seed, an episode that only the second cell solved has the row ``(0, 1, 1, 1, 0, 1)``.
+
+    Returns:
+        Shape (episodes, 6).
     """
     by_episode = [cell.by_episode() for cell in cells]
-    shared = set.intersection(*(set(episodes) for episodes in by_episode))
+    shared = set(by_episode[0])
+    for episodes in by_episode:
+        shared &= set(episodes)
     rows = []
     for episode in sorted(shared):
         row: list[int] = []
@@ -142,4 +157,4 @@ def _joint_rows(cells: Sequence[Cell]) -> list[list[int]]:
             verdicts = episodes[episode]
             row += [sum(verdicts.values()), len(verdicts)]
         rows.append(row)
-    return rows
+    return np.array(rows, dtype=np.int64).reshape(-1, 6)
