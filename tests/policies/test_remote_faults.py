@@ -274,15 +274,13 @@ def test_a_second_reply_to_one_request_is_an_error():
             policy.act(moment(0, history=()))
 
 
-def free_port():
-    """A port below those that the kernel gives away."""
-    return 20_000 + os.getpid() % 10_000
+PORT = 20_000 + os.getpid() % 10_000
+"""Below those that the kernel gives away."""
 
 
 def test_a_client_waits_for_a_server_that_starts_late():
     """It starts half a second after the client was made."""
-    port = free_port()
-    server = MmeVlaServer(port=port)
+    server = MmeVlaServer(port=PORT)
     timer = threading.Timer(0.5, server.__enter__)
     timer.start()
     with client_of(server, "mme-vla", "?connect=300") as policy:
@@ -293,14 +291,13 @@ def test_a_client_waits_for_a_server_that_starts_late():
 
 
 def test_a_client_finds_a_server_again_that_was_restarted_at_its_port():
-    port = free_port()
-    with MmeVlaServer(port=port) as server:
+    with MmeVlaServer(port=PORT) as server:
         policy = make_policy(f"mme-vla://{server.place}?connect=300", 0)
         play_episode(policy)
     with pytest.raises(PolicyConnectionError):
         policy.act(moment(3, history=(moment(3),)))
 
-    with MmeVlaServer(port=port):
+    with MmeVlaServer(port=PORT):
         (actions,) = play_episode(policy)
         policy.close()
 
