@@ -144,11 +144,14 @@ def clip(body):
     return decoded(base64.b64decode(part["inlineData"]["data"].replace("-", "+").replace("_", "/")))
 
 
-@pytest.mark.parametrize("kind", ["qwen", "memer"])
-def test_the_qwen_and_memer_planners_ask_before_each_chunk_of_actions(kind):
-    asked = steps_asked(kind, REPLY_OF[kind], chunk=80)
+@pytest.mark.parametrize(
+    ("kind", "asked"),
+    [("qwen", "each-chunk"), ("memer", "each-chunk"), ("qwen", "every 7 steps")],
+)
+def test_a_planner_asks_once_a_chunk_also_if_its_period_is_shorter(kind, asked):
+    steps = steps_asked(kind, REPLY_OF[kind], chunk=80, asked=asked)
 
-    assert asked == [0, 80, 160, 240, 320]
+    assert steps == [0, 80, 160, 240, 320]
 
 
 def test_a_planner_asks_at_the_first_chunk_of_each_period():
@@ -156,12 +159,6 @@ def test_a_planner_asks_at_the_first_chunk_of_each_period():
     asked = steps_asked("qwen", REPLY, chunk=16, asked="every 40 steps")
 
     assert asked == [0, 48, 80, 128, 160, 208, 240, 288, 320]
-
-
-def test_a_planner_asks_once_a_chunk_if_its_period_is_shorter():
-    asked = steps_asked("qwen", REPLY, chunk=80, asked="every 7 steps")
-
-    assert asked == [0, 80, 160, 240, 320]
 
 
 @pytest.mark.parametrize(
