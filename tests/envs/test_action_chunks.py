@@ -43,7 +43,7 @@ def assert_same(ours, theirs):
 
 
 def assert_second(batch, infos, observation, info):
-    """Assert that what the second of two environments gave is equal bit for bit."""
+    """Assert that the second of two environments gave the same, bit for bit, as a single one."""
     assert_same({key: value[1] for key, value in batch.items()}, observation)
     for key in info.keys() - {"demonstration"}:
         assert np.all(infos[key][1] == info[key]), key
@@ -52,6 +52,10 @@ def assert_second(batch, infos, observation, info):
 
 
 def test_sub_environments_that_take_chunks_equal_single_ones():
+    """The second one has episode 1, then 2, as a single environment has here, with the same chunks.
+
+    An episode ends after ten steps: in the middle of the third chunk of four.
+    """
     vector = gymnasium.make_vec(
         f"roboirg.envs.registration:{environment_id('VideoUnmaskSwap')}",
         2,
@@ -82,9 +86,11 @@ def test_sub_environments_that_take_chunks_equal_single_ones():
 
 
 @pytest.mark.parametrize(
-    "wrong", [np.zeros((2, 7)), np.zeros(7), np.full((3, 7), np.nan), "up"], ids=str
+    "wrong",
+    [np.zeros((2, 7)), np.zeros(7), np.full((3, 7), np.nan), "up"],
+    ids=["two poses", "one pose", "not finite", "a text"],
 )
-def test_a_chunk_of_another_shape_is_refused_before_anything_moves(wrong):
+def test_what_is_not_a_chunk_of_finite_numbers_is_refused_before_anything_moves(wrong):
     """Here three poses of seven numbers are a chunk."""
     env = ActionChunks(roboirg.make("PickXtimes", cameras=(), actions="ee_pose"), 3)
     env.reset()
@@ -92,8 +98,13 @@ def test_a_chunk_of_another_shape_is_refused_before_anything_moves(wrong):
     with pytest.raises(InvalidActionError):
         env.step(wrong)
 
-    assert env.action_space.shape == (3, 7)
     assert env.unwrapped.executed_actions == 0
+
+
+def test_the_action_space_has_the_shape_of_a_chunk():
+    env = ActionChunks(roboirg.make("PickXtimes", cameras=(), actions="ee_pose"), 3)
+
+    assert env.action_space.shape == (3, 7)
 
 
 def test_a_chunk_has_at_least_one_action():
@@ -101,16 +112,13 @@ def test_a_chunk_has_at_least_one_action():
         ActionChunks(roboirg.make("PickXtimes", cameras=()), 0)
 
 
-def test_the_example_in_the_documents_runs(tmp_path):
+def test_the_documents_example_plays_a_chunk_of_16_actions_in_each_environment(tmp_path):
+    """It prints for each its success and its steps; here in two environments, not in 4."""
     page = (Path(__file__).parents[2] / "docs" / "environment.md").read_text()
-    (example,) = [
-        block
-        for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-        if "make_vec" in block
-    ]
+    (example,) = re.findall(r"```python\n([^`]*make_vec[^`]*)```", page)
     script = tmp_path / "example.py"
-    script.write_text(example.replace("4", "2"))  # environments
+    script.write_text(example.replace("4", "2"))
 
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
 
-    assert done.stdout.strip() == "[False False] [16 16]", done.stderr
+    assert done.stdout == "[False False] [16 16]\n", done.stderr

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from planning_fakes import (
     CAPTURES,
-    TOKENS,
     check_capture,
     check_sample,
     decoded,
@@ -27,9 +26,9 @@ from roboirg.policies.contract.base import SubgoalEnd
 from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.planners import make_planner as make_by_kind
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
+from roboirg.policies.planners.model_planners import GeminiOptions
 from roboirg.policies.planners.oracle_planner import OraclePlanner
 from roboirg.policies.planners.points import to_pixel
-from roboirg.policies.planners.query_schedule import MOST_USELESS
 from roboirg.policies.vlm.models import ModelOptions
 
 CHUNK = 16
@@ -113,19 +112,18 @@ def play_in_chunks(
     return policy
 
 
-def asked_at(server, kind, answer, steps, chunk=CHUNK, **options):
-    """The steps at which a planner asks."""
-    planner = make_planner(kind, server, **options)
-    at = []
-    plan = planner.plan
-
-    def watched(observation, step):
-        server.answer = lambda body: at.append(step) or answer
-        return plan(observation, step)
-
-    planner.plan = watched
-    play_in_chunks(planner, steps, chunk)
-    return at
+def steps_asked(kind, reply, chunk=CHUNK, **options):
+    """The steps, of 0 to 320, at which a planner asks; the policy plays `chunk` steps at a time."""
+    asked = []
+    with fake_vlm([reply]) as server:
+        planner = make_planner(kind, server, **options)
+        policy = HierarchicalPolicy(planner, PolicyThatStandsStill(chunk))
+        policy.reset("Do it.", NO_VIDEO)
+        for step in range(0, 321, chunk):
+            before = len(server.requests)
+            policy.act({**observation_at(step), "history": ()})
+            asked += [step] * (len(server.requests) - before)
+    return asked
 
 
 def pictures(body):
@@ -147,44 +145,70 @@ def clip(body):
 
 
 @pytest.mark.parametrize(
-    ("kind", "answer", "options", "steps"),
+    ("kind", "asked"),
+    [("qwen", "each-chunk"), ("memer", "each-chunk"), ("qwen", "every 7 steps")],
+)
+def test_a_planner_asks_once_a_chunk_also_if_its_period_is_shorter(kind, asked):
+    steps = steps_asked(kind, REPLY_OF[kind], chunk=80, asked=asked)
+
+    assert steps == [0, 80, 160, 240, 320]
+
+
+def test_a_planner_asks_at_the_first_chunk_of_each_period():
+    """Chunks begin at 0, 16, 32, 48, …: the first one of the period from 40 on begins at 48."""
+    asked = steps_asked("qwen", REPLY, chunk=16, asked="every 40 steps")
+
+    assert asked == [0, 48, 80, 128, 160, 208, 240, 288, 320]
+
+
+@pytest.mark.parametrize(
+    ("subgoal", "asked_again"),
     [
-        ("qwen", REPLY, {}, range(0, 321, 16)),
-        ("qwen", REPLY, {"asked": "every 40 steps"}, [0, 48, 80, 128, 160, 208, 240, 288, 320]),
-        ("qwen", REPLY, {"asked": "every 7 steps"}, range(0, 321, 16)),  # two periods in a chunk
-        ("qwen", "press the button at (3,4) to stop", {}, range(0, 321, 16)),
-        # The last step of a hold belongs to it.
-        ("qwen", "press the button at (3,4)", {"chunk": 10}, [0, *range(100, 321, 10)]),
-        ("qwen", "press the first button", {"chunk": 10}, [0, *range(110, 321, 10)]),
-        ("qwen", "press the second button", {"chunk": 10}, [0, *range(260, 321, 10)]),
-        ("memer", REPLY_OF["memer"], {}, range(0, 321, 16)),
-        ("gemini", REPLY_OF["gemini"], {}, [0, 96, 144, 192, 240, 288]),
-        ("gemini", REPLY_OF["gemini"], {"first_pause": 0}, range(0, 321, 48)),
-        ("gemini", REPLY_OF["gemini"], {"first_pause": 144}, [0, 144, 192, 240, 288]),
+        ("press the button at (3,4)", 100),  # held until step 90, which belongs to the hold
+        ("press the first button", 110),  # until step 100
+        ("press the second button", 260),  # until step 250
+        ("press the button at (3,4) to stop", 10),  # another subgoal: not held
     ],
 )
-def test_each_planner_asks_its_model_at_the_steps_that_its_options_set(
-    kind, answer, options, steps
-):
-    """`steps` are those at which it asks in 320 steps, which the policy plays in chunks of 16."""
-    with fake_vlm(["x"]) as server:
-        assert asked_at(server, kind, answer, 320, **options) == list(steps)
+def test_the_qwen_planner_does_not_ask_while_it_holds_a_button_s_subgoal(subgoal, asked_again):
+    """Its model names the same subgoal each time; chunks have ten steps."""
+    asked = steps_asked("qwen", subgoal, chunk=10)
+
+    assert asked == [0, *range(asked_again, 321, 10)]
+
+
+@pytest.mark.parametrize(
+    ("first_pause", "steps"),
+    [
+        (0, [0, 48, 96, 144, 192, 240, 288]),
+        (75, [0, 96, 144, 192, 240, 288]),
+        (144, [0, 144, 192, 240, 288]),
+    ],
+)
+def test_the_gemini_planner_asks_every_48_steps_after_its_first_pause(first_pause, steps):
+    asked = steps_asked("gemini", REPLY_OF["gemini"], first_pause=first_pause)
+
+    assert asked == steps
+
+
+def test_the_first_pause_of_the_gemini_planner_is_75_steps():
+    assert GeminiOptions.model_fields["first_pause"].default == 75
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_after_an_unreadable_reply_the_last_subgoal_stays(kind):
-    """A reply is unreadable after a second try; replies are {}, {}, a good one, then {} only."""
-    with fake_vlm(["{}", "{}", REPLY_OF[kind], "{}"]) as server:
-        planner = make_planner(kind, server, **({"first_pause": 0} if kind == "gemini" else {}))
-        policy = play_in_chunks(planner, 64)  # five chunks of 16, from step 0
-        assert policy.policy.told == [SUBGOAL] * 4  # none at first
+def test_after_an_unreadable_reply_the_last_subgoal_stays_and_the_question_is_counted(kind):
+    """Questions come at steps 0, 96 and 192; {} is unreadable, and each question has two tries."""
+    with fake_vlm(["{}", "{}", REPLY_OF[kind], "{}", "{}"]) as server:
+        planner = make_planner(kind, server)
+        policy = play_in_chunks(planner, 192, chunk=96)
 
-        usage = planner.usage()
-        assert (usage["unparsed"], usage["unreadable"]) == (2 if kind == "gemini" else 4, 1)
-        assert usage["calls"] == len(server.requests) == 1 + 2 * usage["unparsed"]
+    assert policy.policy.told == [SUBGOAL, SUBGOAL]  # none at step 0
+    usage = planner.usage()
+    assert (usage["calls"], usage["unparsed"], usage["unreadable"]) == (5, 2, 1)
 
 
-def test_a_planner_that_waits_for_a_subgoal_s_end_repeats_an_unreadable_question():
+def test_a_planner_that_waits_for_a_subgoal_s_end_repeats_an_unreadable_question_five_times():
+    """One readable question, then five unreadable ones of two tries each: 11 requests."""
     with fake_vlm([REPLY, "{}"]) as server:
         planner = make_planner("qwen", server, asked="when-done")
         planner.reset("Do it.", NO_VIDEO)
@@ -193,41 +217,78 @@ def test_a_planner_that_waits_for_a_subgoal_s_end_repeats_an_unreadable_question
         planner.hear("Now.", 1)
         for step in range(CHUNK, 20 * CHUNK, CHUNK):
             planner.plan(observation_at(step), step)
-        assert len(server.requests) == 1 + 2 * MOST_USELESS
+        assert len(server.requests) == 11
 
 
-def test_the_qwen_planner_sends_the_subgoals_so_far_and_the_current_picture():
-    """Pictures have their step as their shade of grey."""
-    answers = [REPLY, REPLY.replace("500", "700"), "put it down", REPLY]
-    with fake_vlm(answers) as server:
+def test_the_qwen_planner_sends_the_current_picture_alone_besides_the_video():
+    """Pictures have their step as their shade of grey; the video of 60 frames is a clip."""
+    with fake_vlm([REPLY]) as server:
         play_in_chunks(make_planner("qwen", server, video="mp4"), 48, demonstration=video(60))
-        assert [pictures(body) for body in server.requests] == [[0], [16], [32], [48]]
 
+    assert [pictures(body) for body in server.requests] == [[0], [16], [32], [48]]
+
+
+def test_the_qwen_planner_sends_the_subgoals_so_far():
+    """The same words at another place are not another subgoal."""
+    here = "pick up the cube at <|box_start|>(500,250)<|box_end|>"
+    there = "pick up the cube at <|box_start|>(700,250)<|box_end|>"
+    with fake_vlm([here, there, "put it down", here]) as server:
+        play_in_chunks(make_planner("qwen", server, video="mp4"), 48, demonstration=video(60))
+
+    # A message has the video's words, the video, the instruction, then the subgoals.
     told = [body["messages"][1]["content"][3]["text"] for body in server.requests]
-
     assert "nothing has been done" in told[0]
-    # The same words at another place are not another subgoal.
-    assert told[1] == told[2] == f"Subgoals so far, in order: 1. {REPLY}"
-    assert told[3] == f"Subgoals so far, in order: 1. {REPLY}; 2. put it down"
+    assert told[1:] == [
+        f"Subgoals so far, in order: 1. {here}",
+        f"Subgoals so far, in order: 1. {here}",
+        f"Subgoals so far, in order: 1. {here}; 2. put it down",
+    ]
 
 
-def test_the_gemini_planner_sends_a_video_clip_in_each_turn_of_a_conversation():
+@pytest.fixture(scope="module")
+def three_turns():
+    """Google's requests at steps 0, 96 and 144; every second frame is kept."""
     with fake_vlm([REPLY_OF["gemini"]]) as server:
-        options = {"sampling_fps": 5, "observe_every": 2}
-        policy = play_in_chunks(make_planner("gemini", server, "google", **options), 144,
-                       demonstration=video(20))  # fmt: skip
-        first, second, third = server.requests
-    assert server.paths[0].endswith("models/fake:generateContent")
+        planner = make_planner("gemini", server, "google", sampling_fps=5, observe_every=2)
+        play_in_chunks(planner, 144, demonstration=video(20))
+    return server.requests
+
+
+def test_the_gemini_planner_continues_one_conversation(three_turns):
+    _, second, third = three_turns
+
     assert third["contents"][:3] == second["contents"]
 
-    frames, rate = clip(first)
-    assert (len(frames), rate) == (21, 15)  # the demonstration and the first frame
-    assert policy.demonstration_frames == 2
-    assert [part.get("videoMetadata") for part in first["contents"][0]["parts"]].count({"fps": 5})
 
+def test_the_first_clip_of_the_gemini_planner_is_the_demonstration_and_the_first_frame(three_turns):
+    """The demonstration has 20 frames, of a video at 15 a second."""
+    frames, rate = clip(three_turns[0])
+
+    assert (len(frames), rate) == (21, 15)
+
+
+def test_the_gemini_planner_asks_google_to_sample_its_clip_at_the_given_rate(three_turns):
+    parts = three_turns[0]["contents"][0]["parts"]
+
+    assert {"fps": 5} in [part.get("videoMetadata") for part in parts]
+
+
+def test_later_clips_of_the_gemini_planner_have_every_second_frame_since_the_turn_before(
+    three_turns,
+):
+    """Pictures have their step as their shade of grey, which a video keeps to within 4."""
+    _, second, third = three_turns
     shades = clip(second)[0][:, 0, 0, 0].astype(int)
-    assert np.abs(shades - np.arange(2, 97, 2)).max() < 4
-    assert len(clip(third)[0]) == 24
+
+    assert shades == pytest.approx(np.arange(2, 97, 2), abs=3)
+    assert len(clip(third)[0]) == 24  # steps 98, 100, … 144
+
+
+def test_the_gemini_planner_asks_for_the_demonstration_at_its_own_period():
+    with fake_vlm([]) as server:
+        planner = make_planner("gemini", server, observe_every=2)
+
+    assert HierarchicalPolicy(planner, PolicyThatStandsStill()).demonstration_frames == 2
 
 
 def test_the_gemini_planner_sends_pictures_to_a_service_that_takes_no_clips():
@@ -292,36 +353,54 @@ def test_a_planner_whose_subgoals_are_refused_asks_five_times_in_an_episode(when
             assert planner.ends == [SubgoalEnd(SUBGOAL, "refused", "no")]
 
 
-@pytest.mark.parametrize(
-    ("ends", "stages"),
-    [
-        ("done missed done blocked done time-out done missed", [1, 1, 2, 1, 2, 1, 2, 3]),
-        ("refused", [3]),
-    ],
-)
-def test_a_failed_stage_is_repeated_from_its_pick_and_at_most_three_times(ends, stages):
-    """Stages are 0 hover, 1 pick and 2 drop; `stages` are those due after each end."""
+@pytest.fixture
+def listener():
+    """A planner that is about to name the first of three stages: 0 hover, 1 pick, 2 drop."""
     planner = make_policy("planner:listener", 3).planner
-    assert planner._decider.seed == 3  # by which it guesses
-
-    planner._index = planner._retries = 0
+    planner._index = 0
+    planner._retries = 0
     planner._decider.stages = [
         SimpleNamespace(primitive=Primitive(kind, "cube"))
         for kind in ("hover", "pick_cube", "drop_into")
     ]
-    found = []
-    for how in ends.split():
-        planner.learn(SubgoalEnd("", how))
-        found.append(planner._index)
+    return planner
 
-    assert found == stages
+
+def test_a_failed_stage_is_repeated_from_its_pick_and_at_most_three_times(listener):
+    """Stage 3 is past the last one: the fourth failure ends the planning."""
+    ends = [
+        ("done", 1),
+        ("missed", 1),
+        ("done", 2),
+        ("blocked", 1),  # a cube that was lost is picked up again
+        ("done", 2),
+        ("time-out", 1),
+        ("done", 2),
+        ("missed", 3),
+    ]
+    for how, next_stage in ends:
+        listener.learn(SubgoalEnd("", how))
+        assert listener._index == next_stage
+
+
+def test_a_refused_stage_ends_the_planning(listener):
+    listener.learn(SubgoalEnd("", "refused"))
+
+    assert listener._index == 3
+
+
+def test_a_planner_that_listens_guesses_by_the_seed_of_the_policy(listener):
+    assert listener._decider.seed == 3
 
 
 @pytest.mark.parametrize("last", ["all tasks completed", "the task is complete", "it is done"])
 def test_all_is_done_from_the_gemini_model_leaves_the_last_subgoal(last):
+    """The model says so at step 96, after a subgoal at step 0."""
     done = json.dumps({"description": "x", "subgoal": last})
     with fake_vlm([REPLY_OF["gemini"], done]) as server:
-        assert set(play_in_chunks(make_planner("gemini", server), 144).policy.told) == {SUBGOAL}
+        policy = play_in_chunks(make_planner("gemini", server), 96, chunk=96)
+
+    assert policy.policy.told == [SUBGOAL, SUBGOAL]
 
 
 def test_the_memer_planner_sends_recent_frames_and_the_key_frames_it_chose():
@@ -368,7 +447,11 @@ def test_key_frame_positions_that_do_not_exist_make_a_memer_reply_unreadable(pos
 
 @pytest.mark.parametrize(("option", "kept"), [({"most": 2}, [66, 82]), ({"near": 16}, [82])])
 def test_options_of_the_memer_planner_limit_the_key_frames_it_keeps(option, kept):
-    """In each reply the model chooses the first of the frames that it sees."""
+    """The newest of at most `most`; those within `near` steps are one.
+
+    In each reply the model chooses the first of the frames that it sees, so 66 at step 80 and 82
+    at step 96.
+    """
     choose = json.dumps({"current_subtask": REPLY, "keyframe_positions": [1]})
     with fake_vlm([choose]) as server:
         planner = make_planner("memer", server, **option)
@@ -397,17 +480,20 @@ def test_the_page_of_planners_shows_a_stored_request_and_a_reply():
 
 
 def test_planner_and_policy_form_a_policy_whose_costs_are_summed():
-    """Three questions to the planner's model, and one call at 0.5 US dollars by the policy."""
+    """Three questions to the planner's model and one call of the policy, at 0.5 US dollars.
+
+    A question takes 100 tokens, at a dollar per million, and its reply 7.
+    """
     with fake_vlm([REPLY]) as server:
         policy = play_in_chunks(make_planner("qwen", server, input_price=1.0), 32)
         assert isinstance(policy, Policy)
         assert not isinstance(policy, PrivilegedPolicy)
         assert spent(policy) == {
             "calls": 4,
-            "input_tokens": 3 * TOKENS[0],
-            "output_tokens": 3 * TOKENS[1],
+            "input_tokens": 300,
+            "output_tokens": 21,
             "unparsed": 0,
-            "cost_usd": pytest.approx(0.5 + 3 * TOKENS[0] / 1e6),
+            "cost_usd": pytest.approx(0.5003),
         }
         assert policy.metadata["policy"] == {"checkpoint": "seven"}
         assert policy.metadata["planner"]["model"]["model"] == "fake"

@@ -14,8 +14,18 @@ from roboirg.policies.resolving.goal_namers import MeaningNamer, RuleNamer
 from roboirg.policies.resolving.resolving_policy import ResolvingPolicy
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMNamer
-from roboirg.tasks import all_tasks, goals_of
+from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode, split_episodes
+
+# The instruction of episode 0 of the test split of PickXtimes, whose goal is {green, 3}.
+INTRODUCTION = "I want to see how you handle the green cube."
+COMMAND = "Grab it and place it on the target three times, then press the button."
+DIRECT = f"{INTRODUCTION} {COMMAND}"
+EXPLICIT = "Grab the green cube and place it on the target three times, then press the button."
+SPATIAL = (
+    "Let's start with the cube on the left. "
+    "Please grab it and place it on the target three times, then press the button."
+)
 
 
 class Hearer:
@@ -50,109 +60,114 @@ class Names:
         return self.goal
 
 
-def words_heard(namer, episode, setting):
-    """What the policy behind a rewriter hears of an episode in a setting, in one prompt."""
-    policy = ResolvingPolicy(namer, Hearer())
-    policy.attach(stand_in(episode, setting))
-    policy.reset(instruct(episode, setting).text, {})
-    return policy.policy.heard
+def resolving(namer, setting="direct", wordings=None, **more):
+    """A policy that hears what a namer makes of the instruction, in episode 0 of PickXtimes."""
+    policy = ResolvingPolicy(namer, Hearer(), wordings)
+    policy.attach(stand_in(get_episode("PickXtimes", "test", 0), setting, **more))
+    return policy
 
 
 @pytest.mark.parametrize("task", all_tasks())
 def test_a_namer_that_is_always_right_turns_every_setting_into_the_explicit_one(task):
+    """Of five episodes of each task, whatever setting can express their goal."""
     for episode in itertools.islice(split_episodes([task], ["val"]), 5):
-        explicit = instruct(episode).text
         for setting in expressible(episode):
-            assert words_heard(MeaningNamer(), episode, setting) == [explicit], (episode, setting)
+            policy = ResolvingPolicy(MeaningNamer(), Hearer())
+            policy.attach(stand_in(episode, setting))
+            policy.reset(instruct(episode, setting).text, {})
+
+            assert policy.policy.heard == [instruct(episode).text], (episode, setting)
 
 
 def test_the_command_is_said_in_the_words_that_the_policy_knows():
-    episode = get_episode("PickXtimes", "test", 0)
-    policy = ResolvingPolicy(MeaningNamer(), Hearer(), "train")
-    policy.attach(stand_in(episode, "direct"))
+    policy = resolving(MeaningNamer(), wordings="train")
 
-    policy.reset(instruct(episode, "direct").text, {})
+    policy.reset(DIRECT, {})
 
-    assert policy.policy.heard == [instruct(episode, wordings="train").text]
-    assert policy.policy.heard != [instruct(episode).text]
+    assert policy.policy.heard == [
+        "Move the green cube onto the target three times, then press the button."
+    ]
 
 
 def test_of_an_instruction_in_turns_only_the_last_utterance_is_replaced():
-    episode = get_episode("PickXtimes", "test", 0)
-    introduction, command = instruct(episode, "direct").turns
-    policy = ResolvingPolicy(MeaningNamer(), Hearer())
-    policy.attach(stand_in(episode, "direct", unheard=1))
+    policy = resolving(MeaningNamer(), unheard=1)
 
-    policy.reset(introduction, {})
-    assert policy.act({"instruction": introduction}) == introduction
+    policy.reset(INTRODUCTION, {})
+    policy.hear(COMMAND, 20)
+
+    assert policy.policy.heard == [INTRODUCTION, EXPLICIT]
+
+
+def test_observations_show_the_instruction_as_the_policy_has_heard_it():
+    policy = resolving(MeaningNamer(), unheard=1)
+
+    policy.reset(INTRODUCTION, {})
+    assert policy.act({"instruction": INTRODUCTION}) == INTRODUCTION
+
+    policy.hear(COMMAND, 20)
+    assert policy.act({"instruction": COMMAND}) == EXPLICIT
+
+
+def test_before_the_last_utterance_nothing_is_understood():
+    policy = resolving(MeaningNamer(), unheard=1)
+
+    policy.reset(INTRODUCTION, {})
+
     assert "understood" not in policy.metadata
-    policy.hear(command, 20)
-
-    explicit = instruct(episode).text
-    assert policy.policy.heard == [introduction, explicit]
-    assert policy.act({"instruction": command}) == explicit
 
 
 def test_a_goal_that_the_scene_does_not_have_is_said_as_well():
-    """To pass such a text on, the rewriter would have to know what the scene has."""
-    episode = get_episode("PickXtimes", "test", 0)
-    in_scene = goals_of(episode)
-    impossible = next(
-        goal for goal in goal_schema("PickXtimes").goals.values() if goal not in in_scene
-    )
+    """To pass such a text on, the rewriter would have to know that the scene has no red cube."""
+    red_once = goal_schema("PickXtimes").goals['{"color": "red", "repeats": 1}']
+    policy = resolving(Names(red_once))
 
-    (heard,) = words_heard(Names(impossible), episode, "direct")
+    policy.reset(DIRECT, {})
 
-    assert str(impossible["color"]) in heard
+    (heard,) = policy.policy.heard
+    assert "red cube" in heard
 
 
 def test_without_a_goal_the_policy_hears_what_was_said_and_that_is_counted():
-    episode = get_episode("PickXtimes", "test", 0)
-    policy = ResolvingPolicy(NamesNothing(), Hearer())
-    policy.attach(stand_in(episode, "direct"))
-    said = instruct(episode, "direct").text
+    policy = resolving(NamesNothing())
 
-    policy.reset(said, {})
+    policy.reset(DIRECT, {})
 
-    assert policy.policy.heard == [said]
+    assert policy.policy.heard == [DIRECT]
     assert policy.usage() == {"passed_on": 1.0}
     assert "understood" not in policy.metadata
 
 
 def test_a_rewritten_command_is_counted_and_kept_with_the_goal():
-    episode = get_episode("PickXtimes", "test", 0)
-    policy = ResolvingPolicy(Names(episode.goal), Hearer())
-    policy.attach(stand_in(episode, "direct"))
+    """The namer names the goal of the episode: the green cube, three times."""
+    policy = resolving(Names(get_episode("PickXtimes", "test", 0).goal))
 
-    policy.reset(instruct(episode, "direct").text, {})
+    policy.reset(DIRECT, {})
 
     assert policy.usage() == {"resolved": 1.0}
-    assert policy.metadata["heard"] == instruct(episode).text
-    assert policy.metadata["understood"] == episode.goal.as_mapping()
+    assert policy.metadata["heard"] == EXPLICIT
+    assert policy.metadata["understood"] == {"color": "green", "repeats": 3}
 
 
-def test_a_rule_without_eyes_passes_on_a_text_that_names_a_thing_by_its_place():
-    episode = get_episode("PickXtimes", "test", 0)
+@pytest.mark.parametrize("text", [SPATIAL, EXPLICIT], ids=["by its place", "by its color"])
+def test_a_rule_without_eyes_says_no_more_of_a_thing_than_the_text(text):
+    """It passes on a text that names a thing by its place, and repeats an explicit one."""
+    policy = resolving(RuleNamer("surface"))
 
-    assert words_heard(RuleNamer("surface"), episode, "spatial") == [
-        instruct(episode, "spatial").text
-    ]
-    assert words_heard(RuleNamer("surface"), episode, "explicit") == [instruct(episode).text]
+    policy.reset(text, {})
+
+    assert policy.policy.heard == [text]
 
 
-def test_a_model_behind_http_names_the_goal_from_words_and_pictures():
-    episode = get_episode("PickXtimes", "test", 0)
-    with fake_vlm([goal_schema("PickXtimes").answers[episode.goal]]) as server:
-        namer = VLMNamer(ListenerOptions(model=model_options(server)))
-        policy = ResolvingPolicy(namer, Hearer())
-        policy.attach(stand_in(episode, "direct"))
+def test_a_model_behind_http_names_the_goal_from_what_was_said():
+    """It is asked once."""
+    with fake_vlm(['{"color": "green", "repeats": 3}']) as server:
+        policy = resolving(VLMNamer(ListenerOptions(model=model_options(server))))
 
-        policy.reset(instruct(episode, "direct").text, {})
+        policy.reset(DIRECT, {})
 
-        assert policy.policy.heard == [instruct(episode).text]
-        usage = policy.usage()
-        assert (usage["calls"], usage["resolved"]) == (1, 1)
-        assert instruct(episode, "direct").text in str(server.requests[0])
+    assert policy.policy.heard == [EXPLICIT]
+    assert policy.usage()["calls"] == 1
+    assert DIRECT in str(server.requests[0])
 
 
 def test_needs_of_namer_and_policy_are_merged():
@@ -178,23 +193,33 @@ def test_the_whole_is_privileged_if_the_namer_or_the_policy_is(spec, is_privileg
     assert read_policy(spec).is_privileged == is_privileged
 
 
-def test_another_namer_or_policy_is_another_makeup():
-    specs = (
-        "resolve:surface?policy=openpi://localhost:8000",
-        "resolve:surface?policy=openpi://localhost:8000&wordings=train",
-        "resolve:first-mention?policy=openpi://localhost:8000",
-        "resolve:surface?policy=mme-vla://localhost:8000",
-        "resolve:vlm-listener:openai?model=a&policy=openpi://localhost:8000",
-        "resolve:vlm-listener:openai?model=b&policy=openpi://localhost:8000",
-    )
+@pytest.mark.parametrize(
+    ("spec", "other"),
+    [
+        (
+            "surface?policy=openpi://localhost:1",
+            "surface?policy=openpi://localhost:1&wordings=train",
+        ),
+        ("surface?policy=openpi://localhost:1", "first-mention?policy=openpi://localhost:1"),
+        ("surface?policy=openpi://localhost:1", "surface?policy=mme-vla://localhost:1"),
+        (
+            "vlm-listener:openai?model=a&policy=openpi://localhost:1",
+            "vlm-listener:openai?model=b&policy=openpi://localhost:1",
+        ),
+    ],
+    ids=["wordings", "namer", "policy", "model of the namer"],
+)
+def test_another_part_makes_another_policy(spec, other):
+    assert read_policy(f"resolve:{spec}").makeup != read_policy(f"resolve:{other}").makeup
 
-    assert len({read_policy(spec).makeup for spec in specs}) == len(specs)
 
-
-def test_its_version_names_both_and_is_not_that_of_a_planner():
+def test_the_version_names_that_of_the_namer_and_of_the_policy():
     policy = ResolvingPolicy(RuleNamer("surface"), Hearer())
 
     assert policy.version == "built-in → v7"
+
+
+def test_a_rewriter_is_no_planner():
     assert not isinstance(make_policy("resolve:surface?policy=surface", 0), HierarchicalPolicy)
 
 
