@@ -210,18 +210,12 @@ def ratio_interval(tasks: Sequence[TaskRates]) -> Interval | None:
         tasks: for each task the two rates.
     """
     part = 1 / len(tasks)
-    critical = critical_value()
 
     # Ratios from 0 to infinity are searched as r / (1 + r), from 0 to 1, which is called balance.
     def difference(balance: float) -> list[Stratum]:
         return [task.combined(part * (1 - balance), -part * balance) for task in tasks]
 
-    def above(balance: float) -> float:
-        return -_upper_end(difference(balance), critical)
-
-    def below(balance: float) -> float:
-        return -_upper_end([stratum.mirrored() for stratum in difference(balance)], critical)
-
+    above, below = _excesses(difference)
     first = sum(stratum.mean for stratum in difference(0))
     second = -sum(stratum.mean for stratum in difference(1))
     if second <= _ROUNDING or _has_too_few(difference(0)):
@@ -251,7 +245,6 @@ def share_interval(tasks: Sequence[TaskRates]) -> Interval | None:
         above 0: then any share would do.
     """
     part = 1 / len(tasks)
-    critical = critical_value()
     gap = mean_interval([task.combined(0, -part, part) for task in tasks])
     if gap is None or gap.low <= 0:
         return None
@@ -259,16 +252,40 @@ def share_interval(tasks: Sequence[TaskRates]) -> Interval | None:
     def difference(share: float) -> list[Stratum]:
         return [task.combined(part, part * (share - 1), -part * share) for task in tasks]
 
-    def above(share: float) -> float:
-        return -_upper_end(difference(share), critical)
-
-    def below(share: float) -> float:
-        return -_upper_end([stratum.mirrored() for stratum in difference(share)], critical)
-
+    above, below = _excesses(difference)
     of_none = sum(stratum.mean for stratum in difference(0))
     of_all = sum(stratum.mean for stratum in difference(1))
     estimate = of_none / (of_none - of_all)
     return Interval(_end(below, estimate, -1.0), _end(above, estimate, 1.0))
+
+
+class _Excesses(NamedTuple):
+    """Functions of a number, negative where the interval of a difference has 0.
+
+    Attributes:
+        above: positive where the interval ends below 0, so where the number is too large.
+        below: positive where it begins above 0, so where the number is too small.
+    """
+
+    above: Callable[[float], float]
+    below: Callable[[float], float]
+
+
+def _excesses(difference: Callable[[float], list[Stratum]]) -> _Excesses:
+    """Return how far 0 is outside of the 95 % interval of a difference, by a number in it.
+
+    Args:
+        difference: returns the strata of the difference; its mean falls with the number.
+    """
+    critical = critical_value()
+
+    def above(number: float) -> float:
+        return -_upper_end(difference(number), critical)
+
+    def below(number: float) -> float:
+        return -_upper_end([stratum.mirrored() for stratum in difference(number)], critical)
+
+    return _Excesses(above, below)
 
 
 def _end(function: Callable[[float], float], inside: float, step: float) -> float:

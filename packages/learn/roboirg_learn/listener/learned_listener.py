@@ -85,12 +85,7 @@ class LearnedListener(ScriptedPolicy):
         A goal that the scene does not have cannot be executed. What was understood stays in
         `understood`, for the record.
         """
-        given = SaidAndShown(
-            task=env.episode.task,
-            text=instruction,
-            demonstration=self._demonstration,
-            take_picture=lambda: env.picture("front"),
-        )
+        given = SaidAndShown.of(env, instruction, self._demonstration)
         self._demonstration = {}
         self.understood = self._namer.name_goal(given)
         return self.understood if self.understood in goals_of(env.episode) else None

@@ -14,6 +14,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from dataclasses import dataclass, replace
 from typing import Any
@@ -50,6 +51,7 @@ from roboirg.policies.by_name.policy_kinds import (
 )
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.contract_check import check_policy
+from roboirg.policies.contract.goal_naming import GoalNamer
 from roboirg.policies.contract.policy_urls import is_url
 from roboirg.policies.contract.policy_version import content_of, file_fingerprint, read_version
 from roboirg.policies.planners import OF_MODELS, make_planner
@@ -111,6 +113,12 @@ def rewriting_in(ref: PolicyRef) -> Rewriting:
     return read_rewriting(ref.spec, ref.target, dict(ref.options))
 
 
+@functools.lru_cache(maxsize=16)
+def follower_of(ref: PolicyRef) -> PolicyRef:
+    """Return the policy behind a rewriter; it is read once in a process, as each episode asks."""
+    return read_policy(rewriting_in(ref).policy)
+
+
 def _read_rewritten(ref: PolicyRef) -> PolicyRef:
     """Return a policy behind a rewriter, read like `read_policy` from what its spec combines.
 
@@ -123,7 +131,8 @@ def _read_rewritten(ref: PolicyRef) -> PolicyRef:
         )
     rewriting = rewriting_in(ref)
     follower = read_policy(rewriting.policy)
-    options = _changed_options(namer_of(rewriting, 0), dict(rewriting.options))
+    namer = namer_of(rewriting, 0)
+    options = _changed_options(namer, dict(rewriting.options))
     options[BEHIND] = makeup_text(follower.makeup)
     if rewriting.wordings is not None:
         options["wordings"] = rewriting.wordings
@@ -135,17 +144,17 @@ def _read_rewritten(ref: PolicyRef) -> PolicyRef:
         place="behind" if follower.is_hosted else follower.place,
         makeup=_joined(f"{RESOLVE}:{rewriting.namer}", options, SCRIPTED),
     )
-    return behind_rewriter(ref, follower)
+    return behind_rewriter(ref, namer, follower)
 
 
-def behind_rewriter(ref: PolicyRef, follower: PolicyRef) -> PolicyRef:
+def behind_rewriter(ref: PolicyRef, namer: GoalNamer, follower: PolicyRef) -> PolicyRef:
     """Return a policy behind a rewriter with what namer and policy declare together.
 
     Args:
         ref: of the whole.
+        namer: of the rewriter.
         follower: of the policy behind the rewriter, as far as it is known now.
     """
-    namer = namer_of(rewriting_in(ref), 0)
     needs = follower.needs
     if needs is not None:
         needs = needs.merge(PolicyNeeds.of_planner(namer))
@@ -393,7 +402,7 @@ def _refuse_undeclared(ref: PolicyRef, made: object) -> None:
     """
     foreign_part = made
     if isinstance(made, ResolvingPolicy):
-        _refuse_undeclared(read_policy(rewriting_in(ref).policy), made.policy)
+        _refuse_undeclared(follower_of(ref), made.policy)
         return
     if ref.place == "split" or isinstance(made, PlannerAlone):
         # With scripted hands the whole has attach; the planner, which is all that is foreign, must

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, NamedTuple, Protocol, Self, runtime_checkable
 
 from roboirg.core.episode import Goal
-from roboirg.core.observations import Demonstration, Pixels
+from roboirg.core.observations import FRONT, Demonstration, Pixels
+
+if TYPE_CHECKING:
+    from roboirg.envs.environment import RoboIRGEnv
 
 
 class SaidAndShown(NamedTuple):
@@ -23,6 +26,11 @@ class SaidAndShown(NamedTuple):
     text: str
     demonstration: Demonstration
     take_picture: Callable[[], Pixels]
+
+    @classmethod
+    def of(cls, env: RoboIRGEnv, text: str, demonstration: Demonstration) -> Self:
+        """Return what a namer gets in the episode of an environment."""
+        return cls(env.episode.task, text, demonstration, lambda: env.picture(FRONT))
 
 
 @runtime_checkable

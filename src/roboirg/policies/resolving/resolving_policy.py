@@ -9,7 +9,7 @@ from roboirg.core.actions import Actions
 from roboirg.core.episode import Goal
 from roboirg.core.inference_facts import InferenceFacts, inference_facts
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.observations import FRONT, Demonstration, Observation
+from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.language import instruct_with
 from roboirg.language.scenarios.wording_store import open_wordings
@@ -114,12 +114,7 @@ class ResolvingPolicy(PlannerParts):
     def _resolve(self) -> None:
         """Let the namer name the goal, and replace the command, if it names one."""
         env = self.env
-        given = SaidAndShown(
-            task=env.episode.task,
-            text=" ".join(self._heard),
-            demonstration=self._shown,
-            take_picture=lambda: env.picture(FRONT),
-        )
+        given = SaidAndShown.of(env, " ".join(self._heard), self._shown)
         self._goal = self.namer.name_goal(given)
         self._has_resolved = self._goal is not None
         if self._goal is not None:

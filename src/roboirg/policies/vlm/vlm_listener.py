@@ -205,12 +205,7 @@ class VLMListener(ScriptedPolicy):
 
         Called once an episode, when all has been said. Keeps the goal for the records in any case.
         """
-        given = SaidAndShown(
-            task=env.episode.task,
-            text=instruction,
-            demonstration=self._demonstration,
-            take_picture=lambda: env.picture(CAMERA),
-        )
+        given = SaidAndShown.of(env, instruction, self._demonstration)
         goal = self.namer.name_goal(given)
         self.understood = goal
         if goal is not None and goal not in goals_of(env.episode):

@@ -9,7 +9,7 @@ from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import RESOLVE, SCRIPTED, PolicyRef
 from roboirg.policies.by_name.finding import behind_rewriter, read_policy, rewriting_in
-from roboirg.policies.by_name.policy_kinds import make_follower
+from roboirg.policies.by_name.policy_kinds import make_follower, namer_of
 from roboirg.policies.contract.batch_policy import forget_batched
 from roboirg.policies.opening import opened
 from roboirg.policies.planners.hierarchical_policy import joint_version
@@ -42,8 +42,9 @@ def open_policy(
     if not ref.is_foreign:
         return ref
     if ref.kind == RESOLVE:
-        follower = read_policy(rewriting_in(ref).policy)
-        return behind_rewriter(ref, open_policy(follower, limit_s, settings))
+        rewriting = rewriting_in(ref)
+        follower = open_policy(read_policy(rewriting.policy), limit_s, settings)
+        return behind_rewriter(ref, namer_of(rewriting, 0), follower)
     forget_batched(ref.body)
     if ref.place == "python":
         return opened(ref)

@@ -26,7 +26,7 @@ from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import SCRIPTED, PolicyRef
-from roboirg.policies.by_name.finding import make_policy, read_policy, rewriting_in
+from roboirg.policies.by_name.finding import follower_of, make_policy, rewriting_in
 from roboirg.policies.by_name.policy_kinds import make_follower, put_behind
 from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_calls import GUESSED, policy_usage
@@ -297,9 +297,8 @@ def _hosted(
         hands = make_follower(SCRIPTED, seed)
         return HierarchicalPolicy(planner, hands, f"{ref.kind}:{ref.target}")
     if ref.place == "behind":
-        rewriting = rewriting_in(ref)
-        follower = _hosted(hosts, read_policy(rewriting.policy), seed, limit_s, alone=alone)
-        return put_behind(rewriting, follower, seed)
+        follower = _hosted(hosts, follower_of(ref), seed, limit_s, alone=alone)
+        return put_behind(rewriting_in(ref), follower, seed)
     return HostedPolicy(hosts, ref, seed, limit_s, alone=alone)
 
 

@@ -77,18 +77,8 @@ class HttpModel:
             query = query._replace(schema=None)
         service = self.options.service
         # No error is chained: the service's message may hold the key, and tracebacks are recorded.
-        came = ""
         try:
             response = self._post(service.write(query, self.options, self._key))
-            if response.status == HTTPStatus.OK:
-                beginning = _quote(response.content[:_MOST_READ].decode(errors="replace"))
-                kind = _quote(response.headers.get("content-type"))
-                came = f", {kind} that begins {beginning[:_MOST_SHOWN]!r}"
-                content = json.loads(response.content)
-                if content.get("error"):
-                    raise ValueError("it reports an error")
-                reply = service.read(content)
-                return reply._replace(text=without_keys(reply.text))
         except (TimeoutError, httpx.TimeoutException):
             raise PolicyTimeoutError(
                 f"{self._name} did not answer within {self.options.timeout_s:g} s; raise "
@@ -99,10 +89,9 @@ class HttpModel:
                 f"{self._name} cannot be reached ({type(error).__name__}: {_quote(error)})."
             ) from None
         except MALFORMED as error:
-            raise UnknownCostError(
-                f"{self._name} replied with something else{came} ({type(error).__name__}: "
-                f"{_quote(error)})."
-            ) from None
+            raise self._not_a_reply(error) from None
+        if response.status == HTTPStatus.OK:
+            return self._read(response)
         text = response.content.decode(errors="replace")
         words = f"HTTP status {response.status}: {_quote(text)}"
         if response.status in BUSY:
@@ -110,6 +99,27 @@ class HttpModel:
                 f"{self._name} is not available: {words}", retry_after_s(response.headers)
             )
         raise PolicyReplyError(f"{self._name} refused or failed: {words}")
+
+    def _read(self, response: _Response) -> ModelReply:
+        """Return the reply in a response of status 200; raise UnknownCostError if there is none."""
+        try:
+            content = json.loads(response.content)
+            if content.get("error"):
+                raise ValueError("it reports an error")
+            reply = self.options.service.read(content)
+        except MALFORMED as error:
+            beginning = _quote(response.content[:_MOST_READ].decode(errors="replace"))
+            kind = _quote(response.headers.get("content-type"))
+            came = f", {kind} that begins {beginning[:_MOST_SHOWN]!r}"
+            raise self._not_a_reply(error, came) from None
+        return reply._replace(text=without_keys(reply.text))
+
+    def _not_a_reply(self, error: Exception, came: str = "") -> UnknownCostError:
+        """Return the error about what is no reply, with what came instead, if that is known."""
+        return UnknownCostError(
+            f"{self._name} replied with something else{came} ({type(error).__name__}: "
+            f"{_quote(error)})."
+        )
 
     def _new_client(self) -> httpx.Client:
         """Return a client without connections, which end with this object at the latest."""
