@@ -11,8 +11,6 @@ from roboirg.core.inference_facts import InferenceFacts, inference_facts
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.policy_needs import PolicyNeeds
-from roboirg.language import instruct_with
-from roboirg.language.scenarios.wording_store import open_wordings
 from roboirg.policies.contract.base import Policy, SubgoalEnd, tell_policy
 from roboirg.policies.contract.goal_naming import GoalNamer, SaidAndShown
 from roboirg.policies.planners.hierarchical_policy import PlannerParts, joint_version
@@ -53,6 +51,9 @@ class ResolvingPolicy(PlannerParts):
     """
 
     def __init__(self, namer: GoalNamer, policy: Policy, wordings: str | None = None) -> None:
+        # The language is imported where it is needed: other policies do without.
+        from roboirg.language.scenarios.wording_store import open_wordings
+
         super().__init__(namer, policy)
         self.namer = namer
         self.policy = policy
@@ -113,6 +114,8 @@ class ResolvingPolicy(PlannerParts):
 
     def _resolve(self) -> None:
         """Let the namer name the goal, and replace the command, if it names one."""
+        from roboirg.language import instruct_with
+
         env = self.env
         given = SaidAndShown.of(env, " ".join(self._heard), self._shown)
         self._goal = self.namer.name_goal(given)
