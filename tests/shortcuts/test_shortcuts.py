@@ -469,10 +469,15 @@ def test_how_far_a_shortcut_exceeds_chance_is_printed_with_sign_and_interval(val
 
 
 def test_the_caption_of_a_table_names_the_adjustment_of_its_intervals():
-    """Two rows are two comparisons with chance."""
-    rows = [ShortcutRow((name,), 9, {}, Excess(0.1, 0.02)) for name in ("direct", "spatial")]
-    caption = str(shortcut_table(rows, "Shortcuts").caption)
-    assert caption.endswith("with 95 % intervals, Bonferroni-adjusted for 2 rows.")
+    """Two rows with an interval are two comparisons with chance; that of 49 texts has none."""
+    counts = {"direct": 50, "spatial": 80, "grounded": 49}
+    rows = [ShortcutRow((name,), count, {}, Excess(0.1, 0.02)) for name, count in counts.items()]
+
+    table = shortcut_table(rows, "Shortcuts")
+
+    assert "95 % intervals, Bonferroni-adjusted for 2 rows;" in str(table.caption)
+    *_, excesses = table.columns
+    assert list(excesses.cells)[-1] == "+10.0 (too few texts)"
 
 
 @pytest.mark.parametrize(
