@@ -155,7 +155,7 @@ def lowest_coverage(design: Design, simulations: int) -> list[float]:
 def main() -> None:
     """Print a line of the table for each design, in percent."""
     for design in DESIGNS:
-        simulations = 1000 if len(design.episodes) == 1 else 500
+        simulations = 4000 if len(design.episodes) == 1 else 500
         shares = lowest_coverage(design, simulations)
         texts = [f"{100 * share:.1f}" for share in shares]
         line = f"| {design.name} | {design.seeds} | {' | '.join(texts)} |"
