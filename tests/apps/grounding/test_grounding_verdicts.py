@@ -164,7 +164,7 @@ def test_inspect_says_what_is_wrong(data):
     ids=["a draft of a letter", "a draft of slots", "whole slots, cut off after them"],
 )
 def test_a_draft_that_was_cut_off_is_no_answer(question, reply, understood):
-    """It may have been followed by another answer, so it is unreadable instead of right or wrong."""
+    """Another answer may have followed, so it is unreadable instead of right or wrong."""
     item = next(item for item in items() if item.task == "PickXtimes")
 
     verdict = judge_reply(item, question, reply + CUT_OFF)
