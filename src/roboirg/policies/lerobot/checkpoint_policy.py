@@ -25,7 +25,12 @@ from pydantic import Field
 from roboirg.core.actions import Actions
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.core.observations import PICTURE_SIZE, Demonstration, Observation
+from roboirg.core.observations import (
+    PICTURE_SIZE,
+    Demonstration,
+    Observation,
+    proprioception,
+)
 from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.policies.contract.option_checking import NOT_COMPARED
 from roboirg.policies.contract.policy_urls import UrlOptions, read_options, split_url
@@ -228,11 +233,9 @@ class LeRobotPolicy:
         """
         import torch
 
-        states = []  # seven joints and the first finger
-        for observation in observations:
-            states.append(np.append(observation["joint_positions"], observation["gripper"][0]))
+        states = np.stack([proprioception(observation) for observation in observations])
         batch: dict[str, Any] = {
-            STATE: torch.from_numpy(np.stack(states).astype(np.float32)),
+            STATE: torch.from_numpy(states),
             "task": [observation["instruction"] for observation in observations],
         }
         for camera, width in self._sizes.items():
