@@ -72,14 +72,14 @@ def refuse_links(folder: Path) -> None:
         ForeignPathError: there is a symbolic link, a pipe or a device, or a file in the folder has
             another name, too (a hard link). The folder itself may be a link.
     """
-    for path in folder.glob("*"):  # nothing if there is no folder yet
-        is_written = path.is_file() and path.name != PLAN_FILE
-        if is_written and path.stat().st_nlink > 1:
+    for path in folder.rglob("*"):  # nothing if there is no folder yet
+        # Files below are replaced, and so is the plan: a hard link keeps what it has.
+        is_appended_to = path.parent == folder and path.name != PLAN_FILE and path.is_file()
+        if is_appended_to and path.stat().st_nlink > 1:
             raise ForeignPathError(
                 f"{path} has another name elsewhere (a hard link), where a run would change it, "
                 "too; put a copy in its place."
             )
-    for path in folder.rglob("*"):
         if path.exists() and not (path.is_file() or path.is_dir()):
             raise ForeignPathError(f"{path} is neither a file nor a folder; remove it.")
         if path.is_symlink():

@@ -118,7 +118,11 @@ def test_depth_and_matrices_are_named_if_a_policy_wants_them():
 
 def test_what_is_not_compared_with_the_expert_is_named():
     told = check_policy(f"{__name__}:Waypoints", record_expert=print)[-1]
-    assert told == ("expert", "note", "Not checked: a waypoint takes many control steps.")
+    assert told == (
+        "expert",
+        "note",
+        "Not checked: the expert acts in joint_angle, not in waypoint.",
+    )
 
 
 def test_a_sound_policy_passes_everything():

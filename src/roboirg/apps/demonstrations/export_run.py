@@ -19,7 +19,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.apps.demonstrations import data_card
-from roboirg.apps.demonstrations.dataset_part import DatasetPart, RecordedInstructions
+from roboirg.apps.demonstrations.dataset_part import (
+    DatasetPart,
+    RecordedInstructions,
+    write_episode_table,
+)
 from roboirg.apps.demonstrations.export_plan import (
     ORACLE,
     ExportPlan,
@@ -342,6 +346,7 @@ def _finish(
         facts: of all trajectories, those that were left out, too.
     """
     write_atomically(out / "README.md", data_card.card_text(plan, parts, facts, out))
+    write_episode_table(out, parts)
     plan.file_format.finish(out, parts)
     content = {"fingerprint": plan.fingerprint(), "roboirg": __version__, "format": plan.format}
     write_atomically(out / EXPORT_FILE, json.dumps(content, indent=2) + "\n")

@@ -18,8 +18,6 @@ MIN_MOMENTS = 4
 GRIPPER_GAP = 0.1
 """Between the answers for open and for closed, relative to their range."""
 
-POSITION_SIZE = 3
-
 _NAME = "expert"
 
 
@@ -27,7 +25,7 @@ def check_expert(player: PolicyPlayer, record: RecordExpert | None) -> Iterator[
     """Compare a policy's answers with what the expert did at the same moments of an episode.
 
     Holding still is the yardstick: answers that are hardly nearer to the expert's actions get a
-    note. Policies whose actions take many control steps are not compared.
+    note. Only policies that act in joint angles, as the expert does, are compared.
 
     Args:
         player: of the policy.
@@ -35,8 +33,8 @@ def check_expert(player: PolicyPlayer, record: RecordExpert | None) -> Iterator[
     """
     if record is None:
         return
-    if player.space.takes_many_steps:
-        message = f"Not checked: a {player.space.name} takes many control steps."
+    if player.space is not JOINT_ANGLE:
+        message = f"Not checked: the expert acts in joint_angle, not in {player.space.name}."
         yield CheckResult(_NAME, "note", message)
         return
     rows = max(map(len, player.first_rollout.chunks))
@@ -52,32 +50,28 @@ def check_expert(player: PolicyPlayer, record: RecordExpert | None) -> Iterator[
     holding_still = [np.tile(moment.still, (len(moment.actions), 1)) for moment in moments]
     still_error = _error(holding_still, moments)
     answer_error = _error(answers, moments)
-    unit = "rad" if player.space is JOINT_ANGLE else "m"
     most = FITS * still_error
     yield CheckResult(
         _NAME,
         "pass" if answer_error <= most else "note",
         f"Distance from what an expert did at {len(moments)} moments: expected at most {most:.3g} "
-        f"{unit}, half of that of holding still, got {answer_error:.3g}.",
+        f"rad, half of that of holding still, got {answer_error:.3g}.",
     )
 
 
 def _error(chunks: Chunks, moments: Sequence[ExpertMoment]) -> float:
     """Return how far chunks of actions are from the expert's, on average over the moments.
 
-    The distance of an action is that of its farthest joint, rad, or coordinate, m. A pose's angles
-    are left out, as different numbers can mean the same rotation, and so is the gripper.
+    The distance of an action is that of its farthest joint, rad; the gripper is left out.
 
     Args:
-        chunks: (n, size), one for each moment; rows beyond the expert's do not count.
+        chunks: (n, 7) or more columns, one for each moment; rows beyond the expert's do not count.
         moments: of the expert's episode.
     """
     distances: list[float] = []
     for chunk, moment in zip(chunks, moments, strict=True):
-        size = len(moment.still)
-        columns = size if size == ARM_JOINTS else POSITION_SIZE  # joints, or a pose's position
         rows = min(len(chunk), len(moment.actions))
-        difference = np.abs(chunk[:rows, :columns] - moment.actions[:rows, :columns])
+        difference = np.abs(chunk[:rows, :ARM_JOINTS] - moment.actions[:rows, :ARM_JOINTS])
         farthest = difference.max(axis=1)
         distances.append(float(farthest.mean()))
     return float(np.mean(distances))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -9,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.observations import Observation
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
@@ -17,7 +17,6 @@ from roboirg.policies.contract.base import Policy
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
-    from roboirg.simulation.proprioception import Proprioception
 
 TASK = "PickXtimes"
 SETTING = "explicit"
@@ -30,7 +29,7 @@ MAX_ROWS = 16
 
 
 Rows = NDArray[np.float64]
-"""Actions or poses, one a row; or one alone."""
+"""Actions, one a row; or the joints of one moment."""
 
 
 class ExpertMoment(NamedTuple):
@@ -38,8 +37,7 @@ class ExpertMoment(NamedTuple):
 
     Attributes:
         observation: as the policy requires it.
-        actions: of the expert from then on, (n, size), in the policy's action space: joint targets,
-            or the tool's pose after each control step; and the gripper.
+        actions: of the expert from then on, (n, 8): joint targets (rad) and the gripper.
     """
 
     observation: Observation
@@ -47,10 +45,8 @@ class ExpertMoment(NamedTuple):
 
     @property
     def still(self) -> Rows:
-        """The joints (7,) or the pose (6,) of the robot at this moment, without the gripper."""
-        if self.actions.shape[1] == JOINT_ANGLE.size:
-            return np.asarray(self.observation["joint_positions"], np.float64)
-        return np.asarray(self.observation["end_effector"], np.float64)
+        """The joints of the robot at this moment, (7,), rad."""
+        return np.asarray(self.observation["joint_positions"], np.float64)
 
 
 class ExpertEpisode(NamedTuple):
@@ -75,7 +71,7 @@ def record_expert(policy: Policy, rows: int) -> ExpertEpisode:
     """Play the expert in the simulator, and keep what the policy would see.
 
     Args:
-        policy: whose needs the environment meets.
+        policy: whose needs the environment meets; it acts in joint angles, as the expert does.
         rows: actions in a chunk of the policy.
 
     Raises:
@@ -84,28 +80,18 @@ def record_expert(policy: Policy, rows: int) -> ExpertEpisode:
     """
     from roboirg.envs.factory import make
 
-    needs = PolicyNeeds.of(policy)
-    shown = replace(needs, actions=JOINT_ANGLE.name, grounded=False).env_options
-    env = make(TASK, setting=SETTING, split=SPLIT, episode=EPISODE, **shown)
-    keeper = None
-    if needs.actions != JOINT_ANGLE.name:
-        keeper = _PoseKeeper()
-        env.set_frame_hook(keeper.keep)
-    try:
-        return _play(env, min(rows, MAX_ROWS), keeper)
-    finally:
-        env.close()
+    needs = replace(PolicyNeeds.of(policy), grounded=False)
+    env = make(TASK, setting=SETTING, split=SPLIT, episode=EPISODE, **needs.env_options)
+    with contextlib.closing(env):
+        return _play(env, min(rows, MAX_ROWS))
 
 
-def _play(env: RoboIRGEnv, rows: int, keeper: _PoseKeeper | None) -> ExpertEpisode:
+def _play(env: RoboIRGEnv, rows: int) -> ExpertEpisode:
     """Play the expert, and keep the moments at which the policy would have been asked.
 
     Args:
         env: where it plays.
         rows: the expert's actions from one moment to the next.
-        keeper: notes the tool's pose after each control step, as a hook of `env`, for a policy
-            whose actions are poses; None for one whose actions are joint angles, as the expert's
-            are.
     """
     observation, info = env.reset()
     instruction = observation["instruction"]
@@ -115,12 +101,8 @@ def _play(env: RoboIRGEnv, rows: int, keeper: _PoseKeeper | None) -> ExpertEpiso
     expert.reset(instruction, demonstration)
     moments: list[ExpertMoment] = []
     for piece in _pieces(expert, rows):
-        before = cast("Observation", observation)
-        if keeper is not None:
-            keeper.poses.clear()
+        moments.append(ExpertMoment(cast("Observation", observation), piece))
         observation, _, is_over, is_late, _ = env.step_chunk(piece)
-        actions = piece if keeper is None else keeper.with_gripper(piece)
-        moments.append(ExpertMoment(before, actions))
         if is_over or is_late:
             break
     return ExpertEpisode(instruction, demonstration, moments)
@@ -139,31 +121,3 @@ def _pieces(expert: OraclePolicy, rows: int) -> Iterator[Rows]:
         for start in range(0, len(chunk), rows):
             yield chunk[start : start + rows]
         steps += len(chunk)
-
-
-class _PoseKeeper:
-    """Keeps the tool's pose after each control step.
-
-    Attributes:
-        poses: (6,) each.
-    """
-
-    def __init__(self) -> None:
-        self.poses: list[Rows] = []
-        self._reader: Proprioception | None = None
-
-    def keep(self, env: RoboIRGEnv, is_demonstration: bool) -> None:  # noqa: ARG002 - a hook
-        """Keep the pose of the tool now; called by the environment after each control step."""
-        if self._reader is None:
-            from roboirg.simulation.proprioception import Proprioception
-
-            self._reader = Proprioception(env.session.world.robot)
-        self._reader.update()
-        self.poses.append(self._reader.read()["end_effector"])
-
-    def with_gripper(self, actions: Rows) -> Rows:
-        """Return the poses, (n, 7), each with the gripper of the action that led to it.
-
-        If the episode ended early, there are fewer poses than actions.
-        """
-        return np.column_stack([self.poses, actions[: len(self.poses), -1:]])

@@ -15,6 +15,7 @@ from typing import NamedTuple
 from roboirg.core.error_words import MAX_CAUSE_LENGTH
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
+from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.core.versions import NO_VERSION, Mismatch
 from roboirg.policies.vlm.models.reply_store import ReplySettings
 from roboirg.records.film import VIDEO_FOLDER
@@ -343,10 +344,11 @@ def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> Non
         policy = planned.get(name)
         if policy is None:
             continue
-        # If the policy cannot be opened now, its version is unknown, and equal to another unknown
-        # one: a verdict with that may still be of another version. An error with it does no harm.
-        may_differ = outcome != "error" or versions.policy_version != policy.version
-        if policy.problem is not None and may_differ:
+        # If a policy cannot be opened, its version is unknown, and equal to another unknown one: a
+        # verdict with that may still be of another version. An error with it does no harm.
+        if outcome == "error" and versions.policy_version == UNKNOWN_VERSION:
+            versions = versions._replace(policy_version=None)
+        elif policy.problem is not None:
             raise StoreError(
                 f"{folder} holds episodes of {name} version {versions.policy_version}, but the "
                 f"policy cannot be opened to read its version now ({policy.problem}); choose "
