@@ -135,11 +135,11 @@ def _wanted(
     Raises:
         InvalidValueError: none is left.
     """
-    pairs = zip(jobs, facts, strict=True)
-    wanted = [spoken for spoken, recorded in pairs if _is_wanted(plan, recorded)]
-    found = [
-        RecordedInstructions(spoken.job.path(folder), spoken.instructions) for spoken in wanted
-    ]
+    found = []
+    for spoken, recorded in zip(jobs, facts, strict=True):
+        if _is_wanted(plan, recorded):
+            path = spoken.job.path(folder)
+            found.append(RecordedInstructions(path, spoken.instructions))
     if not found:
         raise InvalidValueError(
             f"None of the {len(jobs)} trajectories is a success; ask for `outcomes: all`."

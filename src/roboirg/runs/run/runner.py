@@ -346,8 +346,9 @@ def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> Non
             continue
         # If a policy cannot be opened, its version is unknown, and equal to another unknown one: a
         # verdict with that may still be of another version. An error with it does no harm.
+        known = versions
         if outcome == "error" and versions.policy_version == UNKNOWN_VERSION:
-            versions = versions._replace(policy_version=None)
+            known = versions._replace(policy_version=None)
         elif policy.problem is not None:
             raise StoreError(
                 f"{folder} holds episodes of {name} version {versions.policy_version}, but the "
@@ -355,7 +356,7 @@ def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> Non
                 "another --out."
             )
         what = f"{folder} holds episodes of {name}"
-        check_same(what, versions.differences(policy.versions))
+        check_same(what, known.differences(policy.versions))
 
 
 @contextlib.contextmanager

@@ -198,8 +198,8 @@ def make_study(
     Raises:
         InvalidValueError: a name is missing, unknown or given twice, or a number is out of range.
     """
-    policies_named = [name_and_spec(policy) for policy in policies]
-    names = tuple(name for name, _ in policies_named)
+    refs = [_planned_policy(policy) for policy in policies]
+    names = tuple(ref.name for ref in refs)
     if settings is None:
         settings = _shared_settings(tasks)
     _check_each_once(names, tasks, settings)
@@ -209,7 +209,6 @@ def make_study(
     _check_known(names, tasks, settings)
 
     rng = np.random.default_rng(seed)
-    refs = [replace(unknown_policy(name), spec=spec) for name, spec in policies_named]
     blocks = _blocks(tasks, trials, rng)  # drawn in turns with the orders of their trials
     return StudyPlan(
         seed=seed,
@@ -217,6 +216,12 @@ def make_study(
         trials=_trials(blocks, settings, refs, rng),
         demonstrations=_demonstrations(tasks, demonstrations, rng),
     )
+
+
+def _planned_policy(text: str) -> PolicyRef:
+    """Return the policy that a spec, NAME=SPEC or a label names; nothing of it is looked up."""
+    name, spec = name_and_spec(text)
+    return replace(unknown_policy(name), spec=spec)
 
 
 def write_study(plan: StudyPlan, folder: Path) -> Path:
