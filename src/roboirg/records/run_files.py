@@ -52,8 +52,7 @@ def run_file(folder: Path, name: str) -> Path:
         ForeignPathError: it is outside of the run's folder, perhaps by a symbolic link.
     """
     path = folder / name
-    is_valid = len(name) <= MOST_PATH_LETTERS and re.fullmatch(RELATIVE_PATH, name)
-    if not is_valid or not _is_below(path, folder):
+    if not is_relative(name) or not _is_below(path, folder):
         shown = printable(name[:MOST_PATH_LETTERS])
         raise ForeignPathError(
             f"{shown!r} is not a file below {folder}: its name is longer than "
@@ -61,6 +60,11 @@ def run_file(folder: Path, name: str) -> Path:
             "or a link leads elsewhere."
         )
     return path
+
+
+def is_relative(name: str) -> bool:
+    """Return whether a name can be that of a file below a folder: ``logs/a.txt``, not ``../x``."""
+    return len(name) <= MOST_PATH_LETTERS and re.fullmatch(RELATIVE_PATH, name) is not None
 
 
 def refuse_links(folder: Path) -> None:

@@ -345,7 +345,7 @@ def _finish(
         parts: of the dataset, all written.
         facts: of all trajectories, those that were left out, too.
     """
-    write_atomically(out / "README.md", data_card.card_text(plan, parts, facts, out))
+    write_atomically(out / "README.md", data_card.card_text(plan, facts, out))
     write_episode_table(out, parts)
     plan.file_format.finish(out, parts)
     content = {"fingerprint": plan.fingerprint(), "roboirg": __version__, "format": plan.format}

@@ -239,11 +239,9 @@ class LeRobotPolicy:
             "task": [observation["instruction"] for observation in observations],
         }
         for camera, width in self._sizes.items():
-            pictures = [seen[f"{camera}_rgb"] for seen in observations]  # type: ignore[literal-required]
-            if width is not None and width != len(pictures[0]):
-                pictures = [scaled_square(picture, width) for picture in pictures]
+            pictures = torch.from_numpy(_pictures(observations, camera, width))
             # In LeRobot's layout of memory, on which a model's rounding depends.
-            channels_first = torch.from_numpy(np.stack(pictures)).permute(0, 3, 1, 2).contiguous()
+            channels_first = pictures.permute(0, 3, 1, 2).contiguous()
             batch[PICTURE.format(camera)] = channels_first.float() / _MAX_BRIGHTNESS
         return batch
 
@@ -302,6 +300,16 @@ class LeRobotPolicy:
         self._takes_batches = self._noise is not None or draws_nothing
         self.metadata = _describe(config, self._before, self._after)
         self.model = model.to(self.options.device).eval()
+
+
+def _pictures(
+    observations: Sequence[Mapping[str, Any]], camera: str, width: int | None
+) -> NDArray[np.uint8]:
+    """Return the pictures of a camera, (n, width, width, 3); None for their own width."""
+    pictures = [observation[f"{camera}_rgb"] for observation in observations]
+    if width is not None and width != len(pictures[0]):
+        pictures = [scaled_square(picture, width) for picture in pictures]
+    return np.stack(pictures)
 
 
 def _filled_up(items: Sequence[Item], size: int) -> list[Item]:

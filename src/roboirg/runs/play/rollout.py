@@ -194,14 +194,13 @@ class EpisodeRunner:
             except EpisodeError as error:
                 record.record_error(error.kind, error.cause, error.details)
 
-        log = None  # of the actions
-        if loop is not None:
-            loop.conclude()
-            log = loop.log
         if limit is not None:
             with contextlib.suppress(InvalidValueError):
                 audit_record(record, prepared, limit)
-        return PlayedJob(record, log)
+        if loop is None:
+            return PlayedJob(record)
+        loop.conclude()
+        return PlayedJob(record, loop.log)
 
     def _load(self, prepared: PreparedJob, hosts: socket | None, *, alone: bool) -> Policy:
         """Make the policy of a job, in a process of its own if `hosts` leads to one."""
