@@ -59,7 +59,7 @@ def unwrap_angles(
     """
     if np.abs(angles - previous).max() < math.pi:
         return angles + 0.0  # no negative zero
-    return np.unwrap([previous, angles], axis=0)[1]
+    return np.asarray(np.unwrap([previous, angles], axis=0)[1])
 
 
 def euler_angles(pose: sapien.Pose) -> NDArray[np.float64]:

@@ -59,7 +59,7 @@ class PlannerParts:
     def hear(self, text: str, step: int) -> None:
         """Pass an utterance on to all parts that remember language."""
         for part in self._all:
-            tell_policy(part, [{"text": text, "step": step}])
+            tell_policy(part, text, step)
 
     def usage(self) -> dict[str, float]:
         """Return the costs of all parts, added up by name: ``{"calls": 3.0, ...}``."""

@@ -69,7 +69,7 @@ class Service(ABC):
             step: control steps that the client has shown since the policy's turn began.
         """
         if said != self.said:
-            tell_policy(self.policy, [{"text": said, "step": step}])
+            tell_policy(self.policy, said, step)
         self.said = said
 
     def act(self, observation: Observation) -> tuple[NDArray[np.float64], float]:

@@ -93,7 +93,7 @@ class ResolvingPolicy(PlannerAndPolicy, AttachedPolicy):
         self._last_words = text
         if len(self._heard) == len(self.env.instruction.utterances):
             self._resolve()
-        tell_policy(self.policy, [{"text": self._last_words, "step": step}])
+        tell_policy(self.policy, self._last_words, step)
 
     def _resolve(self) -> None:
         """Let the namer name the goal, and replace the command, if it names one."""

@@ -316,15 +316,19 @@ def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> N
     what = f"{folder} holds episodes"
     for record in records:
         check_same(what, other_versions(record), _HERE)
-    scenes = {(record.task, record.split, record.episode, record.seed) for record in records}
-    for task, split, episode, seed in scenes:
-        expected: str | int = NO_VERSION
-        with contextlib.suppress(InvalidValueError):
-            expected = get_episode(task, split, episode).seed
-        if seed != expected:
-            of_scene = f"{what} of {task} {split}/{episode}"
-            check_same(of_scene, [Mismatch("scene seed", seed, expected)], _HERE)
+    for scene in {(record.task, record.split, record.episode, record.seed) for record in records}:
+        _check_scene(what, *scene)
     _check_policies(plan, records, folder)
+
+
+def _check_scene(what: str, task: str, split: str, episode: int, seed: int) -> None:
+    """Raise if an episode has another seed here than in records; `what` holds them."""
+    expected: str | int = NO_VERSION
+    with contextlib.suppress(InvalidValueError):
+        expected = get_episode(task, split, episode).seed
+    if seed != expected:
+        of_scene = f"{what} of {task} {split}/{episode}"
+        check_same(of_scene, [Mismatch("scene seed", seed, expected)], _HERE)
 
 
 def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> None:
