@@ -31,7 +31,7 @@ def test_merging_two_parts_of_a_run_gives_the_whole_without_duplicates(tmp_path)
 
     merged = merge_runs([first, last], tmp_path / "out")
 
-    assert (merged.added, merged.duplicates, merged.conflicts) == (8, 2, ())
+    assert (merged.added, merged.duplicates, merged.conflicts) == (8, 2, [])
     assert read_records(tmp_path / "out") == records
 
 
@@ -70,7 +70,7 @@ def test_merging_keeps_a_verdict_rather_than_an_error_and_the_first_of_two_error
     merged = merge_runs(sources, tmp_path / "out")
 
     assert read_records(tmp_path / "out") == (won, connection), "of two errors the first"
-    assert (merged.added, merged.duplicates, merged.conflicts) == (2, 3, ())
+    assert (merged.added, merged.duplicates, merged.conflicts) == (2, 3, [])
 
 
 def test_merging_keeps_the_first_of_two_verdicts_and_reports_the_other_as_a_conflict(tmp_path):
@@ -97,7 +97,7 @@ def test_merging_warns_of_verdicts_by_other_code_but_not_in_episodes_without_ins
     )
 
     assert read_records(tmp_path / "out") == (first, second, silent)
-    assert [warning.partition(".")[0] for warning in merged.warnings] == [
+    assert [warning.partition(".")[0] for warning in merged.warnings()] == [
         f"Mixed states of the code that decides verdicts: {first.verdict_code}, old"
     ]
 

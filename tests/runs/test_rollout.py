@@ -355,7 +355,7 @@ def test_a_full_disk_costs_the_video_but_not_the_verdict(
     def add(writer: VideoWriter, frame: np.ndarray) -> None:
         nonlocal count
         if count == after:
-            writer._video = writer._video._replace(container=FullDiskContainer())  # type: ignore[union-attr]
+            writer._video.container = FullDiskContainer()  # type: ignore[union-attr,assignment]
         count += 1
         real(writer, frame)
 

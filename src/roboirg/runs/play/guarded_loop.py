@@ -315,7 +315,8 @@ class GuardedLoop:
         if self._writer is not None:
             self._writer.caption = " ".join(utterance["text"] for utterance in self._heard)
         with self._guard.policy("policy's hear()", "policy_hear"):
-            tell_policy(self.policy, utterances)
+            for utterance in utterances:
+                tell_policy(self.policy, utterance["text"], utterance["step"])
             self._read_metadata()
 
     def keep_actions(self) -> None:
