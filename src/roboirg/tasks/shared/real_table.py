@@ -16,7 +16,7 @@ from roboirg.core import object_sizes
 from roboirg.core.episode import Color, ObjectKind, Scene, SceneObject
 from roboirg.core.footprints import Footprint, Region
 from roboirg.core.motions import Point
-from roboirg.tasks.shared.fixtures import disc_area, placed
+from roboirg.tasks.shared.fixtures import ItemPlan, disc_area, placed
 from roboirg.util.random_draws import shuffled
 
 BOX_YAW = math.radians(15.0)
@@ -58,22 +58,18 @@ def draw_box(rng: np.random.Generator, name: str, color: Color, region: Region) 
 
 
 def draw_tape(
-    rng: np.random.Generator,
-    name: str,
-    color: Color,
-    region: Region,
-    gap: float,
-    obstacles: Sequence[Footprint],
+    rng: np.random.Generator, plan: ItemPlan, obstacles: Sequence[Footprint]
 ) -> SceneObject:
-    """Draw a roll of tape that lies in the region, with any yaw, `gap` meters from all obstacles.
+    """Draw a roll of tape as planned, with any yaw, away from all obstacles.
 
-    Draws again until there is room; see `roboirg.tasks.shared.fixtures.placed`.
+    Draws place and yaw, in this order, again until there is room; see
+    `roboirg.tasks.shared.fixtures.placed`.
     """
 
     def draw() -> SceneObject:
-        x, y = region.draw(rng, inset=object_sizes.TAPE_RADIUS)
+        x, y = plan.region.draw(rng, inset=object_sizes.TAPE_RADIUS)
         yaw = 2.0 * math.pi * rng.random()
         position = Point(x, y, object_sizes.TAPE_HALF)
-        return SceneObject(name, "tape", position, yaw, color)
+        return SceneObject(plan.name, "tape", position, yaw, plan.color)
 
-    return placed(name, draw, lambda tape: disc_area(tape, gap), obstacles)
+    return placed(plan.name, draw, lambda tape: disc_area(tape, plan.gap), obstacles)

@@ -86,7 +86,7 @@ def _draw_initiators(
     swap_count = draw_number(rng, SWAPS[difficulty])
     names = [container.name for container in containers]
     with_cube = names[: len(COLORS)]  # cubes are under the first three
-    first, second, _ = shuffled(rng, with_cube)
-    others = [name for name in names if name not in (first, second)]
-    third = draw(rng, others)
-    return (first, second, third)[:swap_count]
+    initiators = shuffled(rng, with_cube)[:2]
+    others = [name for name in names if name not in initiators]
+    initiators.append(draw(rng, others))
+    return tuple(initiators[:swap_count])
