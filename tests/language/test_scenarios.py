@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from language_variants import first_episodes, said_where_possible
+from language_variants import expressible_options, first_episodes, said_where_possible
 from wording_stand_ins import BIRTHDAY, WOBBLY, report_on, take_words
 
 from roboirg.apps.language_lab.scenarios.leaks import find_leaks
@@ -45,7 +45,7 @@ from roboirg.language.scenarios.scenario_file import (
 from roboirg.language.scenarios.spoken import say_chosen
 from roboirg.language.scenarios.wording_file import parse_wordings
 from roboirg.language.settings import all_settings, settings_of
-from roboirg.language.variants import expressible_options, instructions
+from roboirg.language.variants import instructions
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode, split_episodes
 

@@ -127,11 +127,10 @@ def _landmarks(scene: Scene, kind: ObjectKind, frame: Frame) -> Iterator[SpokenP
     """
     is_paired = kind in PAIRED
     for selector in selectors(scene, kind, frame):
-        landmark = selector.landmark
-        if landmark.is_in_depth:
+        if selector.is_in_depth:
             continue  # it may be wrong by distance
-        spot = landmark.phrase if is_paired else None
-        yield from _place_if_any(PlaceClass.UNUSUAL, selector.select(), landmark.phrase, spot)
+        spot = selector.phrase if is_paired else None
+        yield from _place_if_any(PlaceClass.UNUSUAL, selector.select(), selector.phrase, spot)
 
 
 def _places_of(scene: Scene, things: Things, frame: Frame) -> Iterator[SpokenPlace]:
@@ -157,7 +156,7 @@ def things_at(scene: Scene, kind: ObjectKind, frame: Frame) -> Mapping[str, Scen
     """
     found: dict[str, SceneObject | None] = {}
     for selector in selectors(scene, kind, frame):
-        found[selector.landmark.phrase] = selector.select()
+        found[selector.phrase] = selector.select()
     for place in spoken_places(scene, kind, frame):
         for words in (place.attributive, place.spot):
             if words is not None:

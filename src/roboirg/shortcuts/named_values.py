@@ -169,7 +169,7 @@ def thing_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
     """
     counts = [1, len(command_ranks(text))]
     for slot, slot_vocabulary in vocabulary.items():
-        if slot_vocabulary.is_sequence:
+        if slot_vocabulary.longest > 1:
             counts.append(len(stated_values(text, slot, slot_vocabulary)))
     nouns = (thing, f"{thing}s", f"{thing}es")
     counts.append(sum(word in nouns for word in command_words(text)))
