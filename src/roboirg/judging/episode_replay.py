@@ -62,9 +62,11 @@ class Decision(NamedTuple):
     step: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EpisodeReplay:
     """One episode, step by step. Steps count since the world began.
+
+    Two replays are never equal, so that one can be a key, as of the cache of `find_slips`.
 
     Attributes:
         episode: the episode.
@@ -101,6 +103,11 @@ class EpisodeReplay:
         The first one if the episode ended in the demonstration.
         """
         return max(self.judge.index - len(self.episode.demonstration), 0)
+
+    @property
+    def stages_left(self) -> range:
+        """Indices of the policy's stages from the expected one to the last."""
+        return range(self.expected_stage, len(self.stages))
 
     @property
     def acted_since(self) -> int:

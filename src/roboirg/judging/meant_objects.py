@@ -7,7 +7,7 @@ still meant depends on all stages that expect the same, since these may be done 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 
 from roboirg.core.conditions import Fact, facts_of
@@ -39,15 +39,23 @@ def meant_objects(
         return frozenset({*subjects, stage.primitive.subject})
 
     looks = {name: _look(name, scene) for name in subjects}
-    # How many objects of each look the stages take, less those that are done for good.
     still_needed: Counter[_Look] = Counter()
-    for other in stages:
-        if other.primitive.kind == stage.primitive.kind and _subjects(other) == subjects:
-            still_needed[looks[other.primitive.subject]] += 1
+    for name in _taken_in_any_order(stages, stage):
+        still_needed[looks[name]] += 1
     for fact in facts:
         if fact.traits.lasts:
             still_needed[looks[fact.subject]] -= 1
     return frozenset(name for name, look in looks.items() if still_needed[look] > 0)
+
+
+def _taken_in_any_order(stages: Sequence[Stage], stage: Stage) -> Iterator[str]:
+    """Yield what the oracle takes in each stage with the same movement and objects as a stage.
+
+    The stage itself is among them; they may be done in any order. A name may come several times.
+    """
+    for other in stages:
+        if other.primitive.kind == stage.primitive.kind and _subjects(other) == _subjects(stage):
+            yield other.primitive.subject
 
 
 def _look(name: str, scene: Scene) -> _Look:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import itertools
 import warnings
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, cast, get_args
 
@@ -91,18 +91,27 @@ class LearnerInput(NamedTuple):
         whose values are not all mentioned has no candidates.
         """
         episode, instruction = instructed
-        introduced = cast("Mapping[str, list[Value]]", instruction.metadata["candidates"])
-        # An antecedent introduces what the command refers back to.
-        antecedents = [
-            mention.value for mention in instruction.mentions if mention.role == "antecedent"
-        ]
-        candidates: dict[str, tuple[Value, ...]] = {}
-        for slot, values in introduced.items():
-            mentioned = [value for value in antecedents if value in values]
-            each_once = tuple(dict.fromkeys(mentioned))
-            if len(each_once) == len(values):
-                candidates[slot] = each_once
+        candidates = _candidates_in(instruction)
         return cls(instruction.text, open_slots(instructed), candidates, scene_facts(episode.scene))
+
+
+def _candidates_in(instruction: Instruction) -> dict[str, tuple[Value, ...]]:
+    """Return the values that a text introduces on equal terms, by slot, in the order of mention.
+
+    *Red or blue? …* -> ``{"color": ("red", "blue")}``. A slot whose values are not all mentioned is
+    left out.
+    """
+    introduced = cast("Mapping[str, list[Value]]", instruction.metadata["candidates"])
+    # An antecedent introduces what the command refers back to.
+    antecedents: dict[Value, None] = {}  # each once, in order
+    for mention in instruction.mentions:
+        if mention.role == "antecedent":
+            antecedents[mention.value] = None
+    candidates: dict[str, tuple[Value, ...]] = {}
+    for slot, values in introduced.items():
+        if antecedents.keys() >= set(values):
+            candidates[slot] = tuple(value for value in antecedents if value in values)
+    return candidates
 
 
 def open_slots(instructed: InstructedEpisode) -> frozenset[str]:
@@ -145,11 +154,10 @@ class GoalLearner:
         # By slot, a learner for each value that the slot may hold: the first color, the second.
         self._learners: dict[str, list[_ValueLearner]] = {}
         for slot, vocabulary in self._vocabulary.items():
+            positions = [_SlotPosition(slot, at, vocabulary) for at in range(vocabulary.longest)]
             self._learners[slot] = [
-                _ValueLearner(
-                    _SlotPosition(slot, index, vocabulary), training_examples, validation_examples
-                )
-                for index in range(vocabulary.longest)
+                _ValueLearner(position, training_examples, validation_examples)
+                for position in positions
             ]
 
     def guesses(self, floor: LearnedFloor, inputs: Sequence[LearnerInput]) -> list[TextGuess]:
@@ -160,26 +168,28 @@ class GoalLearner:
         read from it, unless the floor sees no words; models predict all others.
         """
         guesses: list[dict[str, tuple[Candidates, ...]]] = [{} for _ in inputs]
-        for slot, learners in self._learners.items():
-            # The values of all instructions at once, which is faster: a list for each position.
-            predictions = [learner.predict(floor, inputs) for learner in learners]
-            for number, given in enumerate(inputs):
-                values = self._stated(floor, given, slot)
-                if not values:
-                    values = _without_none(position[number] for position in predictions)
-                guesses[number][slot] = tuple(certain(values))
+        for slot in self._learners:
+            slot_values = self._guessed_values(floor, inputs, slot)
+            for guess, values in zip(guesses, slot_values, strict=True):
+                guess[slot] = tuple(certain(values))
         return list(guesses)
+
+    def _guessed_values(
+        self, floor: LearnedFloor, inputs: Sequence[LearnerInput], slot: str
+    ) -> Iterator[tuple[Value, ...]]:
+        """Yield the values of a slot that a floor guesses for each instruction, in order."""
+        # All instructions at once, which is faster: a list for each position of the slot.
+        predictions = [learner.predict(floor, inputs) for learner in self._learners[slot]]
+        for given, predicted in zip(inputs, zip(*predictions, strict=True), strict=True):
+            stated = self._stated(floor, given, slot)
+            # None predicts that the goal has no such value.
+            yield stated or tuple(value for value in predicted if value is not None)
 
     def _stated(self, floor: LearnedFloor, given: LearnerInput, slot: str) -> tuple[Value, ...]:
         """Return the values of a slot that a command states; none if the floor sees no words."""
         if slot in given.open_slots or "words" not in _VIEWS_OF_FLOOR[floor]:
             return ()
         return stated_values(given.text, slot, self._vocabulary[slot])
-
-
-def _without_none(values: Iterable[Value | None]) -> tuple[Value, ...]:
-    """Return the values that are there, without None for those that a goal does not have."""
-    return tuple(value for value in values if value is not None)
 
 
 class _Example(NamedTuple):

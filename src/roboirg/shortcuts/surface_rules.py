@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.reader.tokens import Sentence, number_of
 from roboirg.shortcuts.goal_vocabulary import SlotVocabulary, Value
-from roboirg.shortcuts.named_values import EXCLUSIONS, ORDINAL_TYPES
+from roboirg.shortcuts.named_values import EXCLUSIONS, is_ordinal_slot
 
 Candidates = tuple[Value, ...]
 """Equally likely values for one position of a slot. ``("red",)`` is certain."""
@@ -75,7 +74,7 @@ class SlotWords:
     @property
     def is_ordinal(self) -> bool:
         """Whether the slot holds an ordinal, such as the number of a visit."""
-        return SLOT_TYPE_NAMES.get(self.slot) in ORDINAL_TYPES
+        return is_ordinal_slot(self.slot)
 
 
 def certain(values: Iterable[Value]) -> list[Candidates]:

@@ -31,6 +31,7 @@ from roboirg.shortcuts.named_values import (
 )
 from roboirg.shortcuts.surface_rules import SURFACE_RULES, Candidates, SlotWords, certain
 from roboirg.tasks import get_task, goals_of
+from roboirg.util.random_draws import draw
 
 TextGuess = Mapping[str, tuple[Candidates, ...]]
 """A guess of a goal: by slot, the candidates for each position, of which each is as likely.
@@ -147,14 +148,19 @@ def draw_goal(guess: TextGuess, goals: Iterable[Goal], rng: np.random.Generator)
     """
     drawn: dict[str, tuple[Value, ...]] = {}
     for slot, positions in guess.items():
-        values = [candidates[int(rng.integers(len(candidates)))] for candidates in positions]
-        drawn[slot] = tuple(values)
+        drawn[slot] = tuple(draw(rng, candidates) for candidates in positions)
     for goal in goals:
-        for ordered_goal in in_every_order(goal):
-            goal_values = {slot: values_in(content) for slot, content in ordered_goal.slots}
-            if goal_values == drawn:
-                return goal
+        if _can_be_said_as(goal, drawn):
+            return goal
     return None
+
+
+def _can_be_said_as(goal: Goal, values: Mapping[str, tuple[Value, ...]]) -> bool:
+    """Return whether a goal has some values by slot, in an order in which it can be said."""
+    for ordered_goal in in_every_order(goal):
+        if values == {slot: values_in(content) for slot, content in ordered_goal.slots}:
+            return True
+    return False
 
 
 def _probability(guess: TextGuess, goal: Goal) -> Fraction:

@@ -182,16 +182,8 @@ def read_head(text: str, where: str) -> FileFields:
     Raises:
         InvalidValueError: it is no TOML, lacks tasks, or has fields that no such file has.
     """
-    data = parse_toml(text, where)
-    for task in every_task():
-        if task in data:
-            raise InvalidValueError(
-                f"{where} has the table [{task}] of an earlier format; write its commands under "
-                "[commands], and import RoboMME's sentences again with `roboirg language "
-                "import-robomme`."
-            )
     mistakes = Mistakes(where)
-    head = read_table(data, FileFields, mistakes)
+    head = read_table(parse_toml(text, where), FileFields, mistakes)
     mistakes.raise_if_any()
     if head is None or not head.tasks:
         raise InvalidValueError(f'{where} has no tasks; add a line such as tasks = ["PickXtimes"].')
