@@ -14,8 +14,8 @@ from roboirg.core.footprints import Rectangle, Region
 from roboirg.judging import Status
 from roboirg.tasks import all_tasks, every_task, find_tasks, get_task, pick_by_count, put_in_box
 from roboirg.tasks.pick_by_count import WAIT_STEPS
-from roboirg.tasks.shared.fixtures import ItemPlan
-from roboirg.tasks.shared.real_table import draw_regions, draw_tape, left_to_right
+from roboirg.tasks.shared.fixtures import ItemPlan, draw_item
+from roboirg.tasks.shared.real_table import draw_regions, left_to_right
 
 REAL = ("PutInBox", "PickByCount")
 MODULES = {"PutInBox": put_in_box, "PickByCount": pick_by_count}
@@ -98,7 +98,7 @@ def test_a_scene_without_room_for_the_tape_is_rejected():
     region = Region(0, 0, 0.1, 0.1)
     full = [Rectangle(0, 0, 1, 1)]
     with pytest.raises(SceneRejectedError, match="no place for tape"):
-        draw_tape(np.random.default_rng(0), ItemPlan("tape", "yellow", region, 0.0), full)
+        draw_item(np.random.default_rng(0), ItemPlan("tape", "yellow", region, 0.0, "tape"), full)
 
 
 def judged_in_first_scene(task, goal, *steps):

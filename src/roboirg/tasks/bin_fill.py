@@ -25,7 +25,7 @@ from roboirg.core.episode import (
     SceneObject,
     Stage,
 )
-from roboirg.core.footprints import Region
+from roboirg.core.footprints import Obstacle, Region
 from roboirg.core.motions import Away, Motion, Vanish
 from roboirg.core.plain_text import counted
 from roboirg.tasks.shared.fixtures import (
@@ -78,8 +78,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     # RoboMME places the bin without looking at the button; here its walls stay off the base.
     bin_ = draw_bin(rng, BIN_REGION, [footprint(button)])
     wanted = _draw_wanted(rng, difficulty)
-    cube_plans = _numbered(_draw_cube_colors(rng, difficulty, wanted))
-    cubes = draw_cubes(rng, cube_plans, [button_keep_out(button), bin_keep_out(bin_)])
+    cubes = _draw_cubes(rng, difficulty, wanted, [button_keep_out(button), bin_keep_out(bin_)])
     scene = Scene(
         objects=(button, bin_, *cubes),
         motions=plan_motions(cubes, late=is_late),
@@ -123,17 +122,22 @@ def _draw_cube_colors(
     return shuffled(rng, colors)
 
 
-def _numbered(colors: list[Color]) -> list[ItemPlan]:
-    """Return cubes of the given colors, numbered within their color.
+def _draw_cubes(
+    rng: np.random.Generator,
+    difficulty: Difficulty,
+    wanted: Mapping[Color, int],
+    obstacles: Sequence[Obstacle],
+) -> list[SceneObject]:
+    """Draw the cubes on the table, numbered within their color, away from all obstacles.
 
     Red, blue, red -> ``cube_red_0``, ``cube_blue_0``, ``cube_red_1``.
     """
     plans: list[ItemPlan] = []
     numbers: Counter[Color] = Counter()
-    for color in colors:
+    for color in _draw_cube_colors(rng, difficulty, wanted):
         plans.append(ItemPlan(f"cube_{color}_{numbers[color]}", color, CUBE_REGION, CUBE_GAP))
         numbers[color] += 1
-    return plans
+    return draw_cubes(rng, plans, obstacles)
 
 
 def _named(wanted: Mapping[Color, int]) -> list[Color]:
@@ -163,11 +167,17 @@ def plan_motions(cubes: Sequence[SceneObject], *, late: bool) -> tuple[Motion, .
     vanishing: list[Motion] = []
     for color in COLORS:
         names = [cube.name for cube in cubes if cube.color == color]
-        for number, name in enumerate(names):
-            if late and number > 0:
-                appearing.append(Away(name, 0, APPEAR_STEPS * number))
-            vanishing.append(Vanish(name, Fact("binned", name, "bin")))
+        if late:
+            appearing += _appearing(names)
+        vanishing += [Vanish(name, Fact("binned", name, "bin")) for name in names]
     return (*appearing, *vanishing)
+
+
+def _appearing(names: Sequence[str]) -> Iterator[Away]:
+    """Yield the motions by which the cubes of a color but the first appear one after the other."""
+    for number, name in enumerate(names):
+        if number > 0:
+            yield Away(name, 0, APPEAR_STEPS * number)
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:

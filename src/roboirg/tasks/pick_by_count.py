@@ -18,10 +18,11 @@ from roboirg.tasks.shared.fixtures import (
     ItemPlan,
     counted_goals,
     disc_area,
+    draw_item,
     draw_number,
     draw_target,
 )
-from roboirg.tasks.shared.real_table import draw_regions, draw_tape
+from roboirg.tasks.shared.real_table import draw_regions
 from roboirg.tasks.shared.stages import placing_stages
 from roboirg.tasks.task import GoalThings, SceneAndGoal, Task
 from roboirg.util.random_draws import draw
@@ -52,8 +53,8 @@ def _draw_tapes(rng: np.random.Generator, target: SceneObject) -> list[SceneObje
     """Draw a tape of each color, ``tape_yellow`` and ``tape_gray``, one on either side."""
     tapes: list[SceneObject] = []
     for color, region in draw_regions(rng, TAPES, LEFT_TAPE_REGION).items():
-        plan = ItemPlan(f"tape_{color}", color, region, TAPE_GAP)
-        tapes.append(draw_tape(rng, plan, [disc_area(target)]))
+        plan = ItemPlan(f"tape_{color}", color, region, TAPE_GAP, "tape")
+        tapes.append(draw_item(rng, plan, [disc_area(target)]))
     return tapes
 
 

@@ -47,8 +47,9 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     placed = draw_button_and_cubes(rng, difficulty, WORK_REGION, CUBE_GAP)
     target = draw_target(rng, TARGET, placed.obstacles)
     chosen = draw(rng, placed.cubes)
+    scene = Scene((placed.button, *placed.cubes, target))
     goal = Goal.of(color=str(chosen.color), repeats=repeats)
-    return Scene((placed.button, *placed.cubes, target)), goal
+    return scene, goal
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
@@ -60,10 +61,12 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     color = goal.text("color")
     cubes = scene.of_kind("cube")
     wrong_picks = facts_of_others("picked", cubes, f"cube_{color}")
-    plan = placing_stages("cube", color, goal.number("repeats"))
-    before_press = [stage.forbidding(*wrong_picks, PRESSED) for stage in plan]
+    plan: list[Stage] = []
+    for stage in placing_stages("cube", color, goal.number("repeats")):
+        plan.append(stage.forbidding(*wrong_picks, PRESSED))
     press = press_stage("press the button {at} to stop")
-    return (*before_press, press.forbidding(*facts_of_all("picked", cubes)))
+    plan.append(press.forbidding(*facts_of_all("picked", cubes)))
+    return tuple(plan)
 
 
 TASK = Task(

@@ -54,7 +54,11 @@ def sample(rng: np.random.Generator, _difficulty: Difficulty) -> SceneAndGoal:
     visit = draw(rng, VISITS)
     run = _draw_run(rng, target.position, interval)
     shuttle = SceneObject("shuttle", "shuttle", run.begin, rgb=(red, green, blue))
-    return Scene((button, target, shuttle), motions=(run,)), Goal.of(visit=visit)
+    scene = Scene(
+        objects=(button, target, shuttle),
+        motions=(run,),
+    )
+    return scene, Goal.of(visit=visit)
 
 
 def _draw_target(rng: np.random.Generator) -> SceneObject:

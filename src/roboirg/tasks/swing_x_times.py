@@ -68,7 +68,8 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     targets = draw_targets(rng, TARGETS, placed.obstacles)
     chosen = draw(rng, placed.cubes)
     scene = make_scene(placed.button, placed.cubes, targets, chosen.name)
-    return scene, Goal.of(color=str(chosen.color), repeats=repeats)
+    goal = Goal.of(color=str(chosen.color), repeats=repeats)
+    return scene, goal
 
 
 def make_scene(
@@ -102,10 +103,11 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     cube = f"cube_{color}"
     wrong_picks = facts_of_others("picked", scene.of_kind("cube"), cube)
     too_often = _too_often(cube, len(SIDES) * repeats)
-    before_press: list[Stage] = []
+    plan: list[Stage] = []
     for stage in _carrying(color, repeats):
-        before_press.append(stage.forbidding(*wrong_picks, PRESSED, too_often))
-    return (*before_press, press_stage().forbidding(*wrong_picks, too_often))
+        plan.append(stage.forbidding(*wrong_picks, PRESSED, too_often))
+    plan.append(press_stage().forbidding(*wrong_picks, too_often))
+    return tuple(plan)
 
 
 def _carrying(color: str, repeats: int) -> Iterator[Stage]:

@@ -102,8 +102,11 @@ def make_scene(
         stage=SWAP_STAGE,
         partners=partners,
     )
-    past = (Fact("picked", target), Fact("lying", target))
-    return Scene((button, *cubes), motions, past)
+    return Scene(
+        objects=(button, *cubes),
+        motions=motions,
+        past=(Fact("picked", target), Fact("lying", target)),
+    )
 
 
 def _draw_cubes(

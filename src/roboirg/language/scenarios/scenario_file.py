@@ -454,14 +454,17 @@ def _read_sentences(
     texts: dict[str, tuple[Text, ...]] = {}
     names = sentence_names(stated)
     for name, value in flat.items():
-        if name not in names:
-            continue
-        alternatives = [value]  # most fields have one sentence only
-        if isinstance(value, list) and name.startswith(_FIELDS_WITH_ALTERNATIVES):
-            alternatives = value
-        part = mistakes.at(name)
-        texts[name] = tuple(reader.read(text, part) for text in alternatives)
+        if name in names:
+            part = mistakes.at(name)
+            texts[name] = tuple(reader.read(text, part) for text in _alternatives(name, value))
     return texts
+
+
+def _alternatives(name: str, value: object) -> list[Any]:
+    """Return the sentences of a field, as written: the alternatives, or the only one."""
+    if isinstance(value, list) and name.startswith(_FIELDS_WITH_ALTERNATIVES):
+        return value
+    return [value]
 
 
 def _operations(fields: ScenarioFields | None) -> set[str]:

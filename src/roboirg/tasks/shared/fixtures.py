@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,12 @@ ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
 BIN_YAW = math.radians(20.0)
 """Largest rotation of the bin to either side."""
+
+HALF_SIZES = {
+    "cube": (object_sizes.CUBE_HALF, object_sizes.CUBE_HALF),
+    "tape": (object_sizes.TAPE_RADIUS, object_sizes.TAPE_HALF),
+}
+"""Half the width of an item that lies on the table, and half its height, m."""
 
 LINE_TURNS = (None, None, 0.0, math.pi / 2)
 """Direction, from a cube's yaw, of the line that stands for the cube; None for its square."""
@@ -81,12 +87,14 @@ class ItemPlan(NamedTuple):
         color: of it.
         region: in which it lies.
         gap: to all that is there already, m.
+        kind: ``cube`` or ``tape``.
     """
 
     name: str
     color: Color
     region: Region
     gap: float
+    kind: Literal["cube", "tape"] = "cube"
 
 
 class DiscPlan(NamedTuple):
@@ -153,22 +161,33 @@ def cube_obstacle(cube: SceneObject) -> Rectangle | Line:
     return Line(x, y, object_sizes.CUBE_HALF, cube.yaw + turn)
 
 
-def draw_cube(
+def draw_item(
     rng: np.random.Generator, plan: ItemPlan, obstacles: Sequence[Obstacle]
 ) -> SceneObject:
-    """Draw a cube as planned, with any yaw, away from all obstacles.
+    """Draw a cube or a roll of tape as planned, with any yaw, away from all obstacles.
 
     Draws place and yaw, in this order, again until there is room. Raises SceneRejectedError after
     256 draws without any.
     """
+    half_width, half_height = HALF_SIZES[plan.kind]
 
     def draw() -> SceneObject:
-        x, y = plan.region.draw(rng, inset=object_sizes.CUBE_HALF)
+        x, y = plan.region.draw(rng, inset=half_width)
         yaw = 2.0 * math.pi * rng.random()
-        position = Point(x, y, object_sizes.CUBE_HALF)
-        return SceneObject(plan.name, "cube", position, yaw, plan.color)
+        return SceneObject(
+            name=plan.name,
+            kind=plan.kind,
+            position=Point(x, y, half_height),
+            yaw=yaw,
+            color=plan.color,
+        )
 
-    return placed(plan.name, draw, lambda cube: footprint(cube).grown(plan.gap), obstacles)
+    def clearance(item: SceneObject) -> Footprint:
+        if plan.kind == "tape":
+            return disc_area(item, plan.gap)
+        return footprint(item).grown(plan.gap)
+
+    return placed(plan.name, draw, clearance, obstacles)
 
 
 def draw_cubes(
@@ -181,7 +200,7 @@ def draw_cubes(
     taken = list(obstacles)
     drawn: list[SceneObject] = []
     for plan in plans:
-        cube = draw_cube(rng, plan, taken)
+        cube = draw_item(rng, plan, taken)
         drawn.append(cube)
         taken.append(cube_obstacle(cube))
     return drawn
@@ -236,8 +255,13 @@ def draw_target(
 
     def draw() -> SceneObject:
         x, y = plan.region.draw(rng, inset=plan.radius)
-        place = Point(x, y, object_sizes.TARGET_HEIGHT)
-        return SceneObject(plan.name, "target", place, radius=plan.radius, rgb=plan.rgb)
+        return SceneObject(
+            name=plan.name,
+            kind="target",
+            position=Point(x, y, object_sizes.TARGET_HEIGHT),
+            radius=plan.radius,
+            rgb=plan.rgb,
+        )
 
     return placed(plan.name, draw, lambda target: disc_area(target, plan.gap), obstacles)
 
@@ -265,9 +289,12 @@ def marker_over(target: SceneObject) -> SceneObject:
     """
     name = target.name.replace("target", "marker")
     x, y, z = target.position
-    position = Point(x, y, z - object_sizes.MARKER_DEPTH)
-    radius = object_sizes.MARKER_RADIUS_SHARE * target.half_width
-    return SceneObject(name, "marker", position, radius=radius)
+    return SceneObject(
+        name=name,
+        kind="marker",
+        position=Point(x, y, z - object_sizes.MARKER_DEPTH),
+        radius=object_sizes.MARKER_RADIUS_SHARE * target.half_width,
+    )
 
 
 def draw_bin(
@@ -282,8 +309,12 @@ def draw_bin(
         x, y = region.draw(rng)
         # Uniform, to either side.
         yaw = (2.0 * rng.random() - 1.0) * BIN_YAW
-        position = Point(x, y, object_sizes.BIN_HEIGHT / 2)
-        return SceneObject("bin", "bin", position, yaw)
+        return SceneObject(
+            name="bin",
+            kind="bin",
+            position=Point(x, y, object_sizes.BIN_HEIGHT / 2),
+            yaw=yaw,
+        )
 
     return placed("bin", draw, footprint, obstacles)
 

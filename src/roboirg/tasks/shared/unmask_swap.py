@@ -52,11 +52,11 @@ def sample(
     covers = shuffled(rng, containers[: len(COLORS)])
     cubes = hide_cubes(rng, covers)
     initiators = _draw_initiators(rng, difficulty, containers)
+    picks = draw_number(rng, PICKS[difficulty])
     scene = Scene(
         objects=(*buttons, *containers, *cubes),
         motions=plan_motions(containers, cubes, initiators),
     )
-    picks = draw_number(rng, PICKS[difficulty])
     return scene, goal_of(cubes[:picks])
 
 

@@ -67,8 +67,11 @@ def draw_table(
     # As in RoboMME, cubes may lie on the site; discs may not.
     obstacles = (*placed.obstacles, disc_area(site))
     targets = _draw_discs(rng, discs, obstacles)
-    objects = (site, placed.button, *placed.cubes, *targets)
-    return PlaceTable(objects, targets, cube=draw(rng, placed.cubes))
+    return PlaceTable(
+        objects=(site, placed.button, *placed.cubes, *targets),
+        discs=targets,
+        cube=draw(rng, placed.cubes),
+    )
 
 
 def _draw_discs(
@@ -172,8 +175,10 @@ def place_stages(scene: Scene, color: str, answer: str) -> tuple[Stage, ...]:
     the episode.
     """
     cube = f"cube_{color}"
-    discs = [item.name for item in scene.of_kind("target")]
-    wrong_discs = [Fact("placed", cube, disc) for disc in discs if disc != answer]
     wrong_picks = facts_of_others("picked", scene.of_kind("cube"), cube)
+    pick = pick_stage(cube).forbidding(*wrong_picks)
     put = place_stage(cube, answer, "place the cube onto the correct target {at}")
-    return pick_stage(cube).forbidding(*wrong_picks), put.forbidding(*wrong_discs)
+    for disc in scene.of_kind("target"):
+        if disc.name != answer:
+            put = put.forbidding(Fact("placed", cube, disc.name))
+    return pick, put

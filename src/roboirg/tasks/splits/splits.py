@@ -249,15 +249,18 @@ def check_stages(task: str, scene: Scene, stages: Iterable[Stage]) -> None:
     """
     kinds = {item.name: item.kind for item in scene.objects}
     kinds[ROBOT] = ROBOT
-    facts: list[Fact] = []
-    for stage in stages:
-        for condition in (stage.expects, *stage.forbids):
-            facts += facts_of(condition)
-    for fact in facts:
+    for fact in _facts_in(stages):
         check_names("kind of fact", [fact.kind], FACT_TRAITS)
         problem = _problem_of(fact, kinds)
         if problem is not None:
             raise InvalidValueError(f"{task}: {fact!r} can never hold: {problem}.")
+
+
+def _facts_in(stages: Iterable[Stage]) -> Iterator[Fact]:
+    """Yield all facts that some stages expect or forbid, stage by stage."""
+    for stage in stages:
+        for condition in (stage.expects, *stage.forbids):
+            yield from facts_of(condition)
 
 
 def _problem_of(fact: Fact, kinds: Mapping[str, str]) -> str | None:
