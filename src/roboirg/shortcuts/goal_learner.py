@@ -24,7 +24,12 @@ from roboirg.core.episode import Episode, Goal, values_in
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.extras import extra_needed
 from roboirg.language.instruction import Instruction, hidden_slots
-from roboirg.shortcuts.goal_vocabulary import SlotVocabulary, Value, goal_vocabulary
+from roboirg.shortcuts.goal_vocabulary import (
+    GoalVocabulary,
+    SlotVocabulary,
+    Value,
+    goal_vocabulary,
+)
 from roboirg.shortcuts.named_values import marked_text, named_values, stated_values
 from roboirg.shortcuts.scene_facts import SceneFacts, scene_facts
 from roboirg.shortcuts.surface_rules import Candidates, certain
@@ -153,12 +158,9 @@ class GoalLearner:
         validation_examples = _examples(validation)
         # By slot, a learner for each value that the slot may hold: the first color, the second.
         self._learners: dict[str, list[_ValueLearner]] = {}
-        for slot, vocabulary in self._vocabulary.items():
-            positions = [_SlotPosition(slot, at, vocabulary) for at in range(vocabulary.longest)]
-            self._learners[slot] = [
-                _ValueLearner(position, training_examples, validation_examples)
-                for position in positions
-            ]
+        for position in _positions(self._vocabulary):
+            learner = _ValueLearner(position, training_examples, validation_examples)
+            self._learners.setdefault(position.slot, []).append(learner)
 
     def guesses(self, floor: LearnedFloor, inputs: Sequence[LearnerInput]) -> list[TextGuess]:
         """Return the goal that a floor guesses for each of some instructions of the task.
@@ -229,6 +231,13 @@ class _SlotPosition(NamedTuple):
         return [example for example in examples if self.slot in example.given.open_slots]
 
 
+def _positions(vocabulary: GoalVocabulary) -> Iterator[_SlotPosition]:
+    """Yield every value that a goal may have, slot by slot: the first color, the second."""
+    for slot, slot_vocabulary in vocabulary.items():
+        for index in range(slot_vocabulary.longest):
+            yield _SlotPosition(slot, index, slot_vocabulary)
+
+
 class _ValueLearner:
     """Predicts one value of a goal, such as the second color, with the best model of each floor.
 
@@ -290,7 +299,7 @@ class _ValueLearner:
         Its inputs are what the view of the model shows of them.
         """
         labels = [self._label(spec.view, example) for example in examples]
-        features = self._model_inputs(spec.view, [example.given for example in examples])
+        features = [self._model_input(spec.view, example.given) for example in examples]
         model = _unfitted_model(spec, is_constant=len(set(labels)) == 1)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that an iteration more would be better
@@ -301,12 +310,10 @@ class _ValueLearner:
 
         None predicts that the goal has no such value.
         """
-        labels = self._models[spec].predict(self._model_inputs(spec.view, inputs))
+        features = [self._model_input(spec.view, given) for given in inputs]
+        labels = self._models[spec].predict(features)
         pairs = zip(inputs, labels, strict=True)
         return [self._value_of_label(spec.view, given, label) for given, label in pairs]
-
-    def _model_inputs(self, view: View, inputs: Sequence[LearnerInput]) -> list[str | SceneFacts]:
-        return [self._model_input(view, given) for given in inputs]
 
     def _model_input(self, view: View, given: LearnerInput) -> str | SceneFacts:
         """Return what a model sees of an instruction: features of the scene, or a text.

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from roboirg.core.episode import SlotValue, Split, values_in
-from roboirg.tasks import get_task
+from roboirg.tasks import goals_of
 from roboirg.tasks.splits.splits import split_episodes
 
 Value = str | int
@@ -42,7 +42,7 @@ def goal_vocabulary(task: str) -> GoalVocabulary:
     """
     contents: dict[str, set[SlotValue]] = {}
     for episode in split_episodes([task], [SPLIT]):
-        for goal in get_task(task).goals(episode.scene):
+        for goal in goals_of(episode):
             for slot, content in goal.slots:
                 contents.setdefault(slot, set()).add(content)
     return {slot: _vocabulary(found) for slot, found in contents.items()}

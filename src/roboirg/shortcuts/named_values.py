@@ -164,15 +164,18 @@ def thing_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
         thing: noun for what the task handles, in the singular: ``cube``.
         vocabulary: of the task's goals.
     """
-    counts = [1, len(command_ranks(text))]
+    counts = [1, len(command_ranks(text)), _noun_count(text, thing)]
     for slot, slot_vocabulary in vocabulary.items():
         if slot_vocabulary.longest > 1:
             counts.append(len(stated_values(text, slot, slot_vocabulary)))
-    nouns = (thing, f"{thing}s", f"{thing}es")
-    counts.append(sum(word in nouns for word in command_words(text)))
-
     longest = max(slot.longest for slot in vocabulary.values())
     return min(longest, max(counts))
+
+
+def _noun_count(text: str, noun: str) -> int:
+    """Return how often a command has a noun, in the singular or plural: *cube* or *cubes*."""
+    forms = (noun, f"{noun}s", f"{noun}es")
+    return sum(word in forms for word in command_words(text))
 
 
 def command_ranks(text: str) -> tuple[int, ...]:

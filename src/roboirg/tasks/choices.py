@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from roboirg.core.choices import Choice
 from roboirg.core.episode import ROBOT, Episode, ObjectKind, Primitive, Scene
-from roboirg.tasks import get_task
+from roboirg.tasks import get_task, goals_of
 
 _WORDS = {
     "pick_cube": "pick up the {subject}",
@@ -36,9 +36,8 @@ def choices_of(episode: Episode) -> tuple[Choice, ...]:
     A choice is a labeled motion that a program can ask for. PickXtimes -> a *pick up the cube*, b
     *place it on the target*, c *press the button*; with a, a point of the picture says which cube.
     """
-    scene = episode.scene
-    each_once = list(dict.fromkeys(_motions(scene, episode)))
-    motions = _with_buttons(each_once, scene)
+    each_once = list(dict.fromkeys(_motions(episode)))
+    motions = _with_buttons(each_once, episode.scene)
     labeled = zip(string.ascii_lowercase, motions, strict=False)
     return tuple(_choice(label, motion, episode) for label, motion in labeled)
 
@@ -62,7 +61,7 @@ def _with_buttons(motions: list[Primitive], scene: Scene) -> list[Primitive]:
     return ordered
 
 
-def _motions(scene: Scene, episode: Episode) -> Iterator[Primitive]:
+def _motions(episode: Episode) -> Iterator[Primitive]:
     """Yield the motions of all goals' stages, those for the same choice being equal.
 
     Names of objects become kinds: picking ``cube_red`` and ``cube_blue`` are both picking a
@@ -70,7 +69,8 @@ def _motions(scene: Scene, episode: Episode) -> Iterator[Primitive]:
     Callers drop repeats.
     """
     task = get_task(episode.task)
-    for goal in task.goals(scene):
+    scene = episode.scene
+    for goal in goals_of(episode):
         for stage in task.stages(scene, goal):
             motion = stage.primitive
             if motion.kind in _PRESSES:

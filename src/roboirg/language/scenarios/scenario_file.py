@@ -125,7 +125,7 @@ def _words_in_file_of(owner: Task | Setting | None) -> Mapping[str, TaskScenario
     Empty if it names no file, or is None.
     """
     path = _named_file(owner)
-    return read_scenario_file(path) if path else {}
+    return read_task_scenarios(read_text(path), path.name) if path else {}
 
 
 def words_in(setting: str, task: str) -> TaskScenarios | None:
@@ -672,8 +672,3 @@ def _parse_or_report(text: object, mistakes: Mistakes) -> Text:
     except ValueError as error:
         mistakes.add(str(error))
         return (TaggedText(excerpt(text)),)
-
-
-def read_scenario_file(path: Path) -> Mapping[str, TaskScenarios]:
-    """Read a file of scenarios from anywhere, like `read_task_scenarios`."""
-    return read_task_scenarios(read_text(path), path.name)

@@ -399,8 +399,9 @@ def _unclear_references(instruction: Instruction, scenario: Scenario) -> Iterato
     """Yield a complaint for each word that points back, such as *it*, without a clear antecedent.
 
     An antecedent is an earlier mention of the value, such as *red* before *it*; there must be
-    exactly one. Once a word such as *the former* has chosen from a list, later ones may mean it.
-    Values in distracting remarks do not count.
+    exactly one. *Red and blue are nice. Lift it.* -> *'it' can mean red or blue*. Once a word such
+    as *the former* has chosen from a list, later ones may mean it: *Red or blue? Let's take the
+    former. Lift it.* Values in distracting remarks do not count.
 
     Args:
         instruction: with its mentions in the order of speaking.
