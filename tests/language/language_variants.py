@@ -71,12 +71,8 @@ def expressible_options(
             words.
     """
     for name in settings_of(get_task(episode.task)):
-        plain_options = InstructionOptions(name, wordings=wordings)
-        expressible: list[InstructionOptions] = []
-        for changes in all_settings()[name].variants:
-            options = replace(plain_options, **changes)
-            if find_refusal(episode, options) is None:
-                expressible.append(options)
+        usual = InstructionOptions(name, wordings=wordings)
+        variants = [replace(usual, **changes) for changes in all_settings()[name].variants]
+        possible = [options for options in variants if find_refusal(episode, options) is None]
         for form in FORMS:
-            for options in expressible:
-                yield replace(options, form=form)
+            yield from (replace(options, form=form) for options in possible)

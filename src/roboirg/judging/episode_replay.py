@@ -337,14 +337,7 @@ class Event(NamedTuple):
 
     def as_dict(self) -> dict[str, str | int | bool | None]:
         """Return the event as plain JSON values, for records."""
-        kind, subject, place = self.fact
-        return {
-            "step": self.step,
-            "kind": kind,
-            "subject": subject,
-            "place": place,
-            "holds": self.holds,
-        }
+        return {"step": self.step, **self.fact._asdict(), "holds": self.holds}
 
 
 def changes(step: int, before: AbstractSet[Fact], now: AbstractSet[Fact]) -> tuple[Event, ...]:

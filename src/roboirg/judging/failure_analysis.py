@@ -98,7 +98,8 @@ def attribute_failure(
     if replay.judge.status is Status.SUCCESS or not has_failed:
         return None
 
-    deviation = _first_deviation(replay)
+    # The first deviation comes before the end, as what follows it can no longer succeed.
+    deviation = min(_deviations(replay), key=lambda deviation: deviation.step, default=None)
     if deviation is None:
         failure = _attribute_end(replay, timed_out=timed_out, cause=cause)
     else:
@@ -114,11 +115,6 @@ def _attribute_deviation(replay: EpisodeReplay, deviation: _Deviation) -> Failur
     if deviation.act is None:
         return _attribute_time(replay, deviation)
     return _attribute_act(replay, deviation, deviation.act)
-
-
-def _first_deviation(replay: EpisodeReplay) -> _Deviation | None:
-    """Return the first moment from which on a violation could not be avoided; None if none was."""
-    return min(_deviations(replay), key=lambda deviation: deviation.step, default=None)
 
 
 def _attribute_end(
@@ -180,23 +176,16 @@ def _slip_behind(replay: EpisodeReplay, act: FactInterval) -> Slip | None:
 def _failure_by_rule(replay: EpisodeReplay, deviation: _Deviation, act: Fact) -> FailureName | None:
     """Return the failure that the violated rule names, but for presses; None if it names none.
 
-    A press is judged by its moment where a task asks for one, and is a touch if the fingertips of
-    an empty hand did not do it.
+    A press is judged by its moment where a task asks for one. It is a touch if the hand holds
+    something or is not at the button: then its side pressed, or the arm.
     """
-    if act.traits.role is FactRole.PRESS and _is_touched(replay, deviation.step):
+    roles = replay.roles_at(deviation.step)
+    is_by_fingertips = FactRole.GRIP not in roles and FactRole.APPROACH in roles
+    if act.traits.role is FactRole.PRESS and not is_by_fingertips:
         return "touched_button"
     if deviation.failure == "mistimed":
         return judge_moment(replay, deviation.step)
     return deviation.failure
-
-
-def _is_touched(replay: EpisodeReplay, step: int) -> bool:
-    """Return whether something else pressed a button than the fingertips of an empty hand.
-
-    The hand holds something, or is not at the button: then it was its side, or the arm.
-    """
-    roles = replay.roles_at(step)
-    return FactRole.GRIP in roles or FactRole.APPROACH not in roles
 
 
 def _deviations(replay: EpisodeReplay) -> Iterator[_Deviation]:

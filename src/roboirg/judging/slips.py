@@ -152,7 +152,10 @@ def _missed_grasps(replay: EpisodeReplay) -> Iterator[Slip]:
     The fingers closed on nothing next to it, they held it for a while without lifting it, or they
     were at what is expected and did not close.
     """
-    missed = [*replay.tried("clutched"), *_fruitless_holds(replay)]
+    missed = list(replay.tried("clutched"))
+    for hold in _holds_let_go(replay):
+        if not _lifts_during(replay, hold):
+            missed.append(hold)
     closed = [*missed, *replay.started(FactRole.GRIP, after=0)]
     missed += _idle_touches(replay, [interval.start for interval in closed])
     # Several objects that were missed at the same step are one try: it is not clear at which.
@@ -161,13 +164,6 @@ def _missed_grasps(replay: EpisodeReplay) -> Iterator[Slip]:
         names_by_step.setdefault(interval.start, set()).add(interval.subject)
     for step, names in names_by_step.items():
         yield Slip(step, "missed_grasp", frozenset(names))
-
-
-def _fruitless_holds(replay: EpisodeReplay) -> Iterator[FactInterval]:
-    """Yield when the fingers held something that did not come up."""
-    for hold in _holds_let_go(replay):
-        if not _lifts_during(replay, hold):
-            yield hold
 
 
 def _idle_touches(replay: EpisodeReplay, closing_steps: Sequence[int]) -> Iterator[FactInterval]:
@@ -288,10 +284,8 @@ def _releases(replay: EpisodeReplay) -> Iterator[_Release]:
 
 def _is_lowered(replay: EpisodeReplay, name: str, step: int) -> bool:
     """Return whether the hand has lowered an object, to put it down, when it lets go."""
-    for lowered in replay.tried("lowered", name):
-        if lowered.start < step and lowered.lasts_until(step):
-            return True
-    return False
+    attempts = replay.tried("lowered", name)
+    return any(lowered.start < step and lowered.lasts_until(step) for lowered in attempts)
 
 
 def _has_landed(replay: EpisodeReplay, release: _Release) -> bool:

@@ -11,7 +11,6 @@ scene's goals (`constraints`).
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -61,7 +60,7 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
     Raises:
         UnknownNameError: there is no such task.
     """
-    goals = _possible_goals(scene, task)
+    goals = get_task(task).goals(scene)
     command, remarks = _split_off_command(split_sentences(text))
     unread = [sentence for sentence in command if not sentence.is_command]
     clauses: list[Clause] = []
@@ -118,12 +117,6 @@ class _SplitText(NamedTuple):
 
     command: list[ParsedSentence]
     remarks: list[Sentence]
-
-
-@functools.lru_cache(maxsize=64)
-def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
-    # Cached, because a scene is read about in many settings.
-    return get_task(task).goals(scene)
 
 
 def _split_off_command(sentences: Sequence[Sentence]) -> _SplitText:

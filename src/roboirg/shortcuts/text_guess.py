@@ -31,7 +31,6 @@ from roboirg.shortcuts.named_values import (
 )
 from roboirg.shortcuts.surface_rules import SURFACE_RULES, Candidates, SlotWords, certain
 from roboirg.tasks import get_task, goals_of
-from roboirg.util.random_draws import draw
 
 TextGuess = Mapping[str, tuple[Candidates, ...]]
 """A guess of a goal: by slot, the candidates for each position, of which each is as likely.
@@ -148,7 +147,8 @@ def draw_goal(guess: TextGuess, goals: Iterable[Goal], rng: np.random.Generator)
     """
     drawn: dict[str, tuple[Value, ...]] = {}
     for slot, positions in guess.items():
-        drawn[slot] = tuple(draw(rng, candidates) for candidates in positions)
+        values = [candidates[int(rng.integers(len(candidates)))] for candidates in positions]
+        drawn[slot] = tuple(values)
     for goal in goals:
         if _can_be_said_as(goal, drawn):
             return goal
