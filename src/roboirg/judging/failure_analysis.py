@@ -94,8 +94,9 @@ def attribute_failure(
         intent: what the policy declared, which comes before what it did; None if it did not.
     """
     replay = rejudge(episode, events, policy_start_step, elapsed_steps, attempts)
-    has_failed = replay.judge.violation is not None or timed_out or cause is not None
-    if replay.judge.status is Status.SUCCESS or not has_failed:
+    if replay.judge.status is Status.SUCCESS:
+        return None
+    if replay.judge.violation is None and not timed_out and cause is None:
         return None
 
     # The first deviation comes before the end, as what follows it can no longer succeed.
@@ -107,7 +108,9 @@ def attribute_failure(
     failure = refine_wrong_object(failure, replay, mirrored or {}, deviation)
     # Up to here, steps count since the world began; a declaration counts them in the policy's turn.
     failure = failure._replace(step=failure.step - policy_start_step)
-    return failure if intent is None else intent.revise(failure, episode)
+    if intent is None:
+        return failure
+    return intent.revise(failure, episode)
 
 
 def _attribute_deviation(replay: EpisodeReplay, deviation: _Deviation) -> FailureAttribution:

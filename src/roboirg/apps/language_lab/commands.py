@@ -105,15 +105,18 @@ def score_shortcuts(
 
     Example: roboirg language shortcuts --settings reasoning --by pattern
     """
-    from roboirg.runs.plan.option_parsing import parse_splits
     from roboirg.shortcuts.shortcut_tables import GROUPINGS, shortcut_rows, shortcut_table
 
     # What is not given here stands in the plan, if one is named.
     words = PlanWords(context, plan)
     split = words.given("split", split)
-    splits = () if split.strip().lower() == "none" else parse_splits(split)
-    grouping = None if by is None else known_name("row", by, GROUPINGS)
-    scenes = _scenes_to_learn_from(split, splits) if learned else None
+    splits = _scored_splits(split)
+    grouping = None
+    if by is not None:
+        grouping = known_name("row", by, GROUPINGS)
+    scenes = None
+    if learned:
+        scenes = _scenes_to_learn_from(split, splits)
     options = replace(words.options(), form=words.form())
     names = words.tasks(tasks, options.wordings)
     chosen = words.settings(settings, names)
@@ -122,21 +125,30 @@ def score_shortcuts(
         raise InvalidValueError(
             f"There is nothing to score: no episode of {', '.join(names)} in {', '.join(chosen)}."
         )
-    title = f"Shortcuts, {options.form} form, {_sources(splits, seeds)}"
-    _print(shortcut_table(rows, title, grouping))
+    _print(shortcut_table(rows, _title(options.form, splits, seeds), grouping))
 
 
-def _sources(splits: Sequence[str], seeds: int) -> str:
-    """Return which scenes are scored, for a title: ``test and 200 random scenes per task``.
+def _scored_splits(split: str) -> Sequence[str]:
+    """Return the splits for the text of an option: ``all`` gives all, ``none`` none."""
+    from roboirg.runs.plan.option_parsing import parse_splits
+
+    if split.strip().lower() == "none":
+        return ()
+    return parse_splits(split)
+
+
+def _title(form: str, splits: Sequence[str], seeds: int) -> str:
+    """Return the title of a table: ``Shortcuts, implicit form, test and 200 random scenes …``.
 
     Args:
-        splits: names.
+        form: of the instructions.
+        splits: names of those whose scenes are scored.
         seeds: number of random scenes for each task; 0 for none.
     """
     sources = list(splits)
     if seeds:
         sources.append(f"{seeds:,} random scenes per task")
-    return " and ".join(sources)
+    return f"Shortcuts, {form} form, {' and '.join(sources)}"
 
 
 def _scenes_to_learn_from(split: str, splits: Sequence[str]) -> int:
