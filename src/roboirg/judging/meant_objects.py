@@ -38,7 +38,7 @@ def meant_objects(
     if len(subjects) <= 1:
         return frozenset({*subjects, stage.primitive.subject})
 
-    looks = {name: _look(name, scene) for name in subjects}
+    looks = {name: (scene[name].kind, scene[name].color) for name in subjects}
     still_needed: Counter[_Look] = Counter()
     for name in _taken_in_any_order(stages, stage):
         still_needed[looks[name]] += 1
@@ -56,12 +56,6 @@ def _taken_in_any_order(stages: Sequence[Stage], stage: Stage) -> Iterator[str]:
     for other in stages:
         if other.primitive.kind == stage.primitive.kind and _subjects(other) == _subjects(stage):
             yield other.primitive.subject
-
-
-def _look(name: str, scene: Scene) -> _Look:
-    """Return what an object looks like: ``("cube", "red")``."""
-    item = scene[name]
-    return item.kind, item.color
 
 
 def _subjects(stage: Stage) -> set[str]:

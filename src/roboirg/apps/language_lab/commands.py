@@ -132,9 +132,7 @@ def _scored_splits(split: str) -> Sequence[str]:
     """Return the splits for the text of an option: ``all`` gives all, ``none`` none."""
     from roboirg.runs.plan.option_parsing import parse_splits
 
-    if split.strip().lower() == "none":
-        return ()
-    return parse_splits(split)
+    return () if split.strip().lower() == "none" else parse_splits(split)
 
 
 def _title(form: str, splits: Sequence[str], seeds: int) -> str:
