@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from language_variants import PAIRS, TASKS, first_episodes
+from language_variants import PAIRS, TASKS, expressible_options, first_episodes
 from plan_files import plan_file
 from typer.testing import CliRunner
 
@@ -21,7 +21,6 @@ from roboirg.core.episode import values_in
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct, instruct_with
-from roboirg.language.variants import expressible_options
 from roboirg.main import app
 from roboirg.shortcuts import SURFACE_RULES, draw_goal, goal_share, guess_goal
 from roboirg.shortcuts.goal_learner import LEARNED_FLOORS

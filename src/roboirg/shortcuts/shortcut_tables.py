@@ -268,13 +268,22 @@ def score_texts(
         tested = _episodes(task, splits, range(seeds))
         present = settings_of(get_task(task))
         for setting in settings:
-            if setting not in present:
-                continue
-            texts = _instructed(tested, setting, options)
-            scores = [rule_scores(pair) for pair in texts]
-            if learning is not None and texts:
-                _add_learned(scores, texts, options, learning)
-            yield from zip(texts, scores, strict=True)
+            if setting in present:
+                yield from _score_setting(task, tested, replace(options, setting=setting), learning)
+
+
+def _score_setting(
+    task: str, tested: Sequence[Episode], options: InstructionOptions, learning: int | None
+) -> Iterator[Scored]:
+    """Yield the instruction of each episode of a task in one setting, with its scores.
+
+    `learning` is as in `shortcut_rows`.
+    """
+    texts = _instructed(tested, options)
+    scores = [rule_scores(instructed) for instructed in texts]
+    if learning is not None and texts:
+        _add_learned(scores, texts, learn_goals(task, options, learning))
+    yield from zip(texts, scores, strict=True)
 
 
 def _episodes(task: str, splits: Sequence[Split], random_scenes: range) -> list[Episode]:
@@ -285,10 +294,10 @@ def _episodes(task: str, splits: Sequence[Split], random_scenes: range) -> list[
 
 
 def _instructed(
-    episodes: Iterable[Episode], setting: str, options: InstructionOptions
+    episodes: Iterable[Episode], options: InstructionOptions
 ) -> list[InstructedEpisode]:
-    """Return the instruction of each episode in a setting, paired with its episode."""
-    return list(instructions(episodes, (setting,), (options.form,), options))
+    """Return the instruction of each episode, paired with it, where the setting can express it."""
+    return list(instructions(episodes, (options.setting,), (options.form,), options))
 
 
 def learn_goals(task: str, options: InstructionOptions, scenes: int) -> GoalLearner:
@@ -309,28 +318,23 @@ def learn_goals(task: str, options: InstructionOptions, scenes: int) -> GoalLear
     in_train = replace(options, wordings=options.wordings or "train")
     in_test = replace(options, wordings=options.wordings or "test")
     return GoalLearner(
-        _instructed(learned, options.setting, in_train),
-        _instructed(judged, options.setting, in_test),
+        _instructed(learned, in_train),
+        _instructed(judged, in_test),
     )
 
 
 def _add_learned(
     scores: Sequence[dict[str, ShortcutScore]],
     texts: Sequence[InstructedEpisode],
-    options: InstructionOptions,
-    scenes: int,
+    learner: GoalLearner,
 ) -> None:
-    """Learn the floors of a task and setting, and add their scores to those of each instruction.
+    """Add the scores of the learned floors to those of each instruction.
 
     Args:
         scores: by shortcut, for each instruction; changed in place.
-        texts: the instructions in the same order, all of one task and setting.
-        options: of the instructions.
-        scenes: number of random scenes to learn from.
+        texts: the instructions in the same order, all of the learner's task and setting.
+        learner: of the floors.
     """
-    episode, instruction = texts[0]
-    options = replace(options, setting=instruction.setting)
-    learner = learn_goals(episode.task, options, scenes)
     inputs = [LearnerInput.of(pair) for pair in texts]
     for floor in LEARNED_FLOORS:
         guesses = learner.guesses(floor, inputs)
