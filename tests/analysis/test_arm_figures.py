@@ -105,8 +105,8 @@ def test_who_follows_the_words_is_told_from_who_does_the_same_whatever_it_hears(
     assert found.gap.episodes == 24, "12 scenes of 2 tasks"
     assert found.p_holm < 0.001
     assert found.interval.low <= use <= found.interval.high
-    other_interval = rate_interval(found.others.values())
-    assert other_interval.low <= habit <= other_interval.high
+    low, high = rate_interval(found.others.values())
+    assert low <= habit <= high
 
 
 @pytest.mark.parametrize("contrast", ["words' worth", "order's worth"])

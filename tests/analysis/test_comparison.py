@@ -69,8 +69,7 @@ def test_episodes_without_instruction_do_not_count_in_a_comparison():
     second = make_results("01", policy="forgetful")
     silent = make_results("00", arm="silent")
 
-    with_arm = comparison_of([*first, *silent], second)
-    assert repr(with_arm) == repr(comparison_of(first, second))
+    assert repr(comparison_of([*first, *silent], second)) == repr(comparison_of(first, second))
 
 
 def test_episodes_without_instruction_are_compared_if_there_is_nothing_else():
