@@ -172,7 +172,7 @@ def _version_labels(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> 
 
     For example ``["language 5"]`` if another policy run heard the language's version 4.
     """
-    labels_by_trait: dict[str, str] = {}
+    labels_by_trait = {}
     for other in policy_runs:
         other_versions = other.versions
         if other.policy != policy_run.policy:

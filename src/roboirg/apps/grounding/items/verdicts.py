@@ -133,11 +133,13 @@ def _judge_points(item: GroundingItem, reply: str) -> ReplyVerdict:
     points = _read_points(reply)
     parts = {}
     for number, target in enumerate(item.points):
-        candidates = points[number : number + 1] if item.points_in_order else points
+        candidates = points
+        if item.points_in_order:
+            candidates = points[number : number + 1]
         parts[str(number + 1)] = any(_hits(target, point) for point in candidates)
     if not points:
         return ReplyVerdict(False, None, parts)
-    is_right = all(parts.values()) and len(points) == len(item.points)
+    is_right = len(points) == len(item.points) and all(parts.values())
     return ReplyVerdict(is_right, msgspec.json.encode(points).decode(), parts)
 
 
