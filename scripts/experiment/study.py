@@ -54,7 +54,7 @@ class Study(BaseModel, extra="forbid"):
         seeds: of training.
         readers: named after the settings whose words they have learned; or `TRUTH`.
         tasks: names of tasks; they are learned and played.
-        settings: of what is said, as in the plan of a run; so are the next five.
+        settings: of what is said, as in the plan of a run; so are the next six.
         scenes: in which bodies are trained, and readers; the next four are of `BodyPlan`.
         reader_epochs: of each reader.
         same_code: fingerprints of earlier code that was proven to play alike; its plays count.
@@ -75,6 +75,7 @@ class Study(BaseModel, extra="forbid"):
     split: str = "test"
     episodes: str = "all"
     wordings: str = "test"
+    max_steps: int = 1300
     scenes: int = 240
     drawn: int = 120
     detector_epochs: int = 8
@@ -98,7 +99,16 @@ class Study(BaseModel, extra="forbid"):
 
     def trials(self) -> Iterator[Trial]:
         """Yield every row with every episode in all its words."""
-        said = {"tasks", "settings", "forms", "stages", "split", "episodes", "wordings"}
+        said = {
+            "tasks",
+            "settings",
+            "forms",
+            "stages",
+            "split",
+            "episodes",
+            "wordings",
+            "max_steps",
+        }
         plan = make_plan("oracle", **self.model_dump(include=said, exclude_none=True))
         jobs = [msgspec.structs.replace(job, policy="", ref=None) for job in plan.jobs()]
         for row in self.rows():
