@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from experiment.hearing import heard_goal
 from experiment.store import Entry, Key
-from experiment.study import Study, Trial, body_of, show
+from experiment.study import Study, Trial, body_of, circumstances, show
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import encode
@@ -72,7 +72,8 @@ def play_missing(study: Study) -> None:
                 missing[str(wanted.key)] = wanted
         # Plays of a scene follow each other, because a worker keeps its video.
         ordered = sorted(missing.values(), key=lambda wanted: wanted.key["episode"])
-        print(f"plays: {len(plays):,}, missing {len(ordered):,}", flush=True)
+        code = circumstances()["code"]
+        print(f"plays: {len(plays):,}, missing {len(ordered):,} of code {code}", flush=True)
         jobs: deque[Job] = deque()
         for number, wanted in enumerate(ordered):
             job = wanted.trial.job

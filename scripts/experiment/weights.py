@@ -14,8 +14,7 @@ from roboirg_learn.policy.policy_training import trained_body_file, trained_read
 def train_missing(study: Study) -> None:
     """Train the bodies and readers that the results lack; each is there when it is finished.
 
-    All share recordings and detector. An interrupted training
-    goes on after its last pass.
+    All share recordings and detector. An interrupted training goes on after its last pass.
     """
     tasks = find_tasks(study.tasks.split(","))
     for row in study.rows():
