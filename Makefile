@@ -54,7 +54,7 @@ every-test: dev
 	$(PYTEST)
 
 test-learn: dev learn ## the tests of what learns, with PyTorch
-	$(PYTEST) packages/learn/tests
+	$(PYTEST) packages/learn/tests tests/scripts/test_play_experiment.py
 
 net: dev ## compare words, prints, golden runs and packs with what is stored of them; takes minutes
 	$(PYTHON) tests/net/net.py compare

@@ -18,7 +18,7 @@ from roboirg.runs.plan.plan_sections import WorkerNeeds
 from roboirg.runs.plan.stored_plans import write_plan
 from roboirg.tasks import all_tasks
 
-NAMED_PLANS_TESTED_ELSEWHERE = ("challenge", "paper", "paper-context", "paper-small", "standard")
+NAMED_PLANS_TESTED_ELSEWHERE = ("challenge", "paper", "paper-context", "standard")
 """Named plans with a test of their own, or of the package that brings them."""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from roboirg_learn.listener.listener_training import TrainingPlan
     from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.policy.policy_files import PolicyFiles
-    from roboirg_learn.policy.policy_plan import BodyPlan
     from roboirg_learn.trainer import Progress
 
 # Heavy modules are imported inside the commands, so that --help is fast.
@@ -41,12 +40,11 @@ LISTENER_OPTIONS = (
 """What a plan may have under `training` for a listener."""
 POLICY_OPTIONS = (
     "scenes", "drawn", "goals", "detector_epochs", "body_epochs", "reader_epochs", "seed",
-    "encoders", "memories", "parts", "played",
+    "encoders",
 )  # fmt: skip
 """What it may have for a policy."""
 READER_OPTIONS = ("scenes", "goals", "reader_epochs", "seed", "encoders")
 """What it may have for a reader of words alone."""
-USUAL_MEMORY = "recurrent"
 LISTENER_EPOCHS = 6
 """Usual passes over all instructions of a listener's reader."""
 
@@ -150,24 +148,15 @@ def learn_policy(
         typer.Option(
             help="What it remembers: none, recurrent, ttt, framesamp, subgoal or keyframes."
         ),
-    ] = USUAL_MEMORY,
+    ] = "recurrent",
     plan: PlanName = None,
-    paper: Annotated[
-        bool,
-        typer.Option(
-            "--paper",
-            help="Train a policy for each mechanism of the paper, play the paper's experiment with "
-            "them, and write a page with the published results next to these.",
-        ),
-    ] = False,
     workers: Workers = None,
 ) -> None:
     """Train a policy that acts on pictures and words: records the expert, then learns.
 
     It becomes two files: a body, and a reader of words for it. What is there already is used again.
     A plan may have, under `training`: scenes, drawn, goals, detector_epochs, body_epochs,
-    reader_epochs, seed, encoders; with --paper also memories, parts (main, resolved, context,
-    planner), played (settings), and at its top episodes and split.
+    reader_epochs, seed, encoders.
 
     Example: roboirg learn policy --tasks PickXtimes --out learned
     """
@@ -178,14 +167,9 @@ def learn_policy(
     reader_plan = _reader_plan(command_plan, command_plan.tasks(tasks), settings)
     memory = known_name("memory", memory, MEMORY_NAMES)
     body_plan = BodyPlan(reader_plan.tasks, memory, **command_plan.choices(BodyPlan))
-    if paper and memory != USUAL_MEMORY:
-        raise InvalidValueError("--paper has its memories from the plan: training.memories.")
     _check_folder(out, "--out needs a folder")
     check_learn_support()
     with locked(out / ".lock", f"Another command learns in {str(out)!r}."):
-        if paper:
-            _play_paper(body_plan, reader_plan, command_plan, out, worker_count(workers))
-            return
         from roboirg_learn.policy.policy_training import trained_files
 
         files = trained_files(body_plan, reader_plan, out, worker_count(workers), _print_tenths())
@@ -274,63 +258,6 @@ def print_policy(files: PolicyFiles, plan: ReaderPlan) -> None:
         "--wordings test --out runs/learned"
     )
     typer.echo(f"Play it with: roboirg run --policy {quote(files.spec)} {options}")
-
-
-def _play_paper(
-    body_plan: BodyPlan, reader_plan: ReaderPlan, command_plan: PlanWords, out: Path, workers: int
-) -> None:
-    """Train a policy for each memory, play the paper's experiment, and print the page's path.
-
-    Args:
-        body_plan: of the bodies; the experiment sets the memory of each.
-        reader_plan: of their reader.
-        command_plan: the command's options and its plan file, which has the experiment.
-        out: folder for files, runs and the page.
-        workers: processes that record and play.
-    """
-    import roboirg
-    from roboirg.extension.commands import write_atomically
-    from roboirg_learn.policy.paper_experiment import (
-        MAIN,
-        RESOLVED,
-        RUNS,
-        ExperimentPlan,
-        check_experiment,
-        part_options,
-        train_rows,
-    )
-    from roboirg_learn.policy.paper_page import INTRODUCTION, answers_text
-
-    experiment = ExperimentPlan(**command_plan.choices(ExperimentPlan))
-    check_experiment(experiment)
-    files = train_rows(experiment, body_plan, reader_plan, out, workers, _print_tenths())
-    changes = _plan_changes(command_plan, reader_plan.tasks)
-    results = {}
-    for part in experiment.parts:
-        options = part_options(part, experiment, files, changes)
-        run = MAIN if part == RESOLVED else part
-        results[run] = roboirg.evaluate(**options, out=out / RUNS / run, workers=workers)
-
-    # The page: an introduction, the paper's tables with our rows, and its questions.
-    texts = [INTRODUCTION]
-    for run, result in results.items():
-        texts.append(result.table(run, "markdown", published=True))
-    texts.append(answers_text({run: result.frame for run, result in results.items()}))
-    page = out / "paper.md"
-    write_atomically(page, "\n".join([*texts, ""]))
-    typer.echo(str(page))
-
-
-def _plan_changes(command_plan: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
-    """Return the options of runs that hold in all parts of the paper's experiment.
-
-    They are the tasks, and ``episodes`` and ``split`` if the plan file has them.
-    """
-    changes: dict[str, Any] = {"tasks": tasks}
-    for name in ("episodes", "split"):
-        if name in command_plan.fields:
-            changes[name] = command_plan.fields[name]
-    return changes
 
 
 def _print_tenths() -> Progress:

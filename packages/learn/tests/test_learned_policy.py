@@ -310,7 +310,6 @@ def test_impossible_training_options_are_refused_before_anything_is_recorded(tmp
         (out, ("--tasks", "StopCube", "--settings", "spatial"), "None of these tasks has the"),
         (out, ("--plan", plan_file(training={"encoders": {"bert": {}}})), "no encoder 'bert'"),
         (out, ("--plan", plan_file(training={"encoders": {"pixels": {}}})), "reader has none"),
-        (out, ("--paper", "--memory", "none"), "training.memories"),
         (tmp_path / "file", (), "is a file; --out needs a folder"),
         (tmp_path / "file" / "policy", (), "Cannot write"),
     ):

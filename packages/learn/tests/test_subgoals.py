@@ -26,7 +26,6 @@ from roboirg_learn.policy.subgoals import (
     encode_request,
     recorded_subgoals,
     subgoals_due,
-    templates_of,
 )
 
 OBJECTS = ObjectClasses(
@@ -160,29 +159,13 @@ def test_training_inputs_equal_those_of_a_planner_that_is_always_right():
 @pytest.fixture(params=["subgoal", "keyframes"])
 def saved_policy(request, tmp_path):
     """Return the files of a policy with a planner that has learned nothing."""
-    torch = pytest.importorskip("torch")
-    from untrained import reader_for
+    pytest.importorskip("torch")
+    from untrained import save_policy
 
-    from roboirg_learn.listener.vocabulary import parts_of_tasks
-    from roboirg_learn.policy.moves import Move
-    from roboirg_learn.policy.object_detector import ObjectDetector
     from roboirg_learn.policy.policy_files import PolicyFiles
-    from roboirg_learn.policy.policy_plan import HANDS, BodyPlan
-    from roboirg_learn.policy.trained_body import GoalLayout, TrainedBody, make_body, save_body
-    from roboirg_learn.policy.trained_reader import save_reader
 
-    torch.manual_seed(0)
-    goals = GoalLayout(("PickXtimes",), parts_of_tasks(["PickXtimes"]))
-    moves = Move(True, 0.0, 0.0, 0.15, "align", 0.0), Move(False, 0.0, 0.0, 0.1, "keep", 0.0)
-    templates = templates_of([get_episode("PickXtimes", "train", 0)])
-    acts = make_body(OBJECTS, goals, moves, HANDS)
-    plans = make_body(OBJECTS, goals, templates, request.param)
-    plan = BodyPlan(goals.tasks, request.param).about
-    detector = ObjectDetector(len(OBJECTS.names))
-    body = TrainedBody(OBJECTS, detector, goals, moves, acts, plan, templates, plans)
     files = PolicyFiles(tmp_path / "a.body", tmp_path / "a.reader")
-    save_body(body, files.body)
-    save_reader(reader_for(OBJECTS.names, goals), files.reader)
+    save_policy(files, request.param, OBJECTS)
     return files
 
 

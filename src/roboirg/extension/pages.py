@@ -1,24 +1,17 @@
-"""The paper's plans and rates, statistics, and tables in Markdown."""
+"""Statistics, and tables in Markdown."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from roboirg.analysis.published import published_gap_interval, published_rows
 from roboirg.analysis.tables.rendering.markdown import markdown
 from roboirg.analysis.tables.table import Row, Table, named_columns
-from roboirg.runs.plan.plan_file import read_plan_file
 from roboirg.stats.intervals import ALPHA, interval_of_values
-from roboirg.stats.paired_tests import holm
 
 __all__ = [
     "ALPHA",
-    "holm",
     "interval_of_values",
     "markdown_table",
-    "published_gap_interval",
-    "published_rows",
-    "read_plan_file",
 ]
 
 

@@ -29,7 +29,7 @@ from roboirg_learn.policy.trained_reader import TrainedReader, load_reader
 
 FIRST_LOOKS = (0, LATER_STEP // LOOK_EVERY)
 """Numbers of the looks at a video that the reader of words sees, two seconds apart."""
-_BATCH = 32
+SEEN_TOGETHER = 32
 """Pictures that go through the detector together."""
 
 
@@ -120,8 +120,8 @@ class SeenEpisode:
         """
         # Without a video the reader of words sees the first picture only.
         first_looks = FIRST_LOOKS if is_video else FIRST_LOOKS[:1]
-        for start in range(0, len(pictures), _BATCH):
-            part = slice(start, start + _BATCH)
+        for start in range(0, len(pictures), SEEN_TOGETHER):
+            part = slice(start, start + SEEN_TOGETHER)
             found = self._model.body.see(pictures[part])
             for detections, tool in zip(found, tools[part], strict=True):
                 if len(self._history) in first_looks:
@@ -132,7 +132,8 @@ class SeenEpisode:
 
     def understand(self, text: str) -> NDArray[np.float32]:
         """Return the goal that an instruction means, as `GoalLayout.encode` does: (size,)."""
-        return self._model.reader.understand(text, self._first_looks, self._model.body.goals)
+        heard = self._model.reader.hear(text, self._first_looks)
+        return self._model.body.goals.encode(heard.task, heard.answer)
 
     @property
     def looks(self) -> int:

@@ -79,23 +79,47 @@ def trained_files(
         InvalidValueError: no episode of a task could be recorded, a plan cannot be followed, or
             the folder holds what another plan recorded or learned.
     """
-    reader_name = f"{reader_plan.heard}-{reader_plan.seed}"
-    files = PolicyFiles(
-        body=folder / f"{plan.memory}-{plan.seed}.body{END}",
-        reader=folder / f"{reader_name}.reader{END}",
-    )
     check_words(reader_plan)
+    body = trained_body_file(plan, folder, workers, progress)
+    reader = trained_reader_file(body, reader_plan, folder, workers, progress)
+    return PolicyFiles(body, reader)
+
+
+def trained_body_file(plan: BodyPlan, folder: Path, workers: int, progress: Progress) -> Path:
+    """Train the body of a policy unless the folder has it; return its file.
+
+    Arguments and errors are those of `trained_files`.
+    """
     _check_folder(plan, folder)
-    if not files.body.exists():
-        save_body(_trained_body(plan, folder, workers, progress), files.body)
-    # Of the file, because the reader's plan names the file's version.
-    body = load_body(files.body)
-    _check_plan(files.body, body.plan, plan.about)
-    if not files.reader.exists():
-        reader = train_policy_reader(body, reader_plan, folder, reader_name, workers, progress)
-        save_reader(reader, files.reader)
-    _check_plan(files.reader, load_reader(files.reader).plan, reader_plan.about)
-    return files
+    path = folder / f"{plan.memory}-{plan.seed}.body{END}"
+    if not path.exists():
+        save_body(_trained_body(plan, folder, workers, progress), path)
+    _check_plan(path, load_body(path).plan, plan.about)
+    return path
+
+
+def trained_reader_file(
+    body: Path, plan: ReaderPlan, folder: Path, workers: int, progress: Progress
+) -> Path:
+    """Train a reader of words for a body unless the folder has it; return the reader's file.
+
+    Args:
+        body: file of the body, whose detector sees the scenes.
+        plan: how the reader learns.
+        folder: for checkpoints and for the file.
+        workers: processes that render; 0 uses this one.
+        progress: called with a kind of work, what is done of it, and all of it.
+
+    Raises:
+        InvalidValueError: the folder has the reader of another plan.
+    """
+    name = f"{plan.heard}-{plan.seed}"
+    path = folder / f"{name}.reader{END}"
+    if not path.exists():
+        reader = train_policy_reader(load_body(body), plan, folder, name, workers, progress)
+        save_reader(reader, path)
+    _check_plan(path, load_reader(path).plan, plan.about)
+    return path
 
 
 def _check_plan(path: Path, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -22,8 +22,14 @@ from roboirg_learn.listener.reader_plan import WORDLESS
 from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary
 from roboirg_learn.policy.task_net import TaskNet
 from roboirg_learn.policy.tracks import Detections
-from roboirg_learn.policy.trained_body import GoalLayout
 from roboirg_learn.trained_file import TrainedFile, load_trained, save_trained
+
+
+class HeardGoal(NamedTuple):
+    """A goal that was heard: its task, and its values as canonical JSON: ``{"color": "red"}``."""
+
+    task: str
+    answer: str
 
 
 @dataclass(frozen=True)
@@ -51,17 +57,14 @@ class TrainedReader:
         """Its networks by the names that they have in its file."""
         return nn.ModuleDict({"task_net": self.task_net, "reader": self.net})
 
-    def understand(
-        self, text: str, looks: Sequence[Detections], goals: GoalLayout
-    ) -> NDArray[np.float32]:
-        """Return the goal that an instruction means, as `GoalLayout.encode` does: (size,).
+    def hear(self, text: str, looks: Sequence[Detections]) -> HeardGoal:
+        """Return the goal that an instruction means.
 
         First the task is named, then the goal of that task with the best score.
 
         Args:
             text: everything that was said; ignored by a reader that was trained without words.
             looks: objects found at the first look, and at a later one of the video if there is one.
-            goals: how goals are encoded.
         """
         heard = "" if self.plan["words"] == WORDLESS else text
         seen = seen_things(looks, self.corners, self.vocabulary.classes)
@@ -70,7 +73,7 @@ class TrainedReader:
             task = self.vocabulary.tasks[int(task_scores.argmax())]
             (goal_scores,) = self.net([ListenerInput(task, heard, seen)])
         answers = list(goal_schema(task).goals)
-        return goals.encode(task, answers[int(goal_scores.argmax())])
+        return HeardGoal(task, answers[int(goal_scores.argmax())])
 
 
 def seen_things(

@@ -56,6 +56,7 @@ class GuardedLoop:
         writer: gets the frames of a video.
 
     Attributes:
+        start_step: control steps of the world before the policy's turn.
         has_begun: whether the policy's turn came.
         answers: what was executed of each answer of the policy, (n, size).
         log: the executed actions; None if the policy's turn never came, or the world broke.
@@ -86,7 +87,7 @@ class GuardedLoop:
         self._reports_ends = bool(getattr(policy, "reports", False))
         self._noted_ends = 0
 
-        self._start_step = 0  # of the policy's turn, since the episode began
+        self.start_step = 0
         self._heard: list[Mapping[str, Any]] = []
         self._last_info: dict[str, Any] | None = None
         self.has_begun = False
@@ -114,7 +115,7 @@ class GuardedLoop:
         conclude(
             record,
             self._prepared,
-            self._start_step,
+            self.start_step,
             timed_out=info["status"] == "timeout",
             original=info.get("original"),
         )
@@ -137,7 +138,7 @@ class GuardedLoop:
                 record.render_device = device
             record.demonstration_steps = len(info["demonstration"]["joint_positions"])
             record.demonstration_source = info["demonstration_source"]
-            self._start_step = int(info["elapsed_steps"])
+            self.start_step = int(info["elapsed_steps"])
             self._add_events(info)
             self._add_heard(info["heard"])
         with self._guard.policy("policy's reset()", "policy_reset"):
@@ -187,7 +188,7 @@ class GuardedLoop:
 
     def _add_events(self, info: Mapping[str, Any]) -> None:
         """Record the facts that changed, which the environment reports in its info."""
-        self._record.events += recorded_events(info.get("events", ()), self._start_step)
+        self._record.events += recorded_events(info.get("events", ()), self.start_step)
 
     def _add_heard(self, utterances: Sequence[Mapping[str, Any]]) -> None:
         """Record utterances that the policy now hears."""
@@ -328,7 +329,7 @@ class GuardedLoop:
         numbers, state_hash = self.env.end_state()
         self._record.end_state = state_hash
         attempts = [attempt.as_dict() for attempt in self.env.attempts]
-        self._record.attempts = recorded_events(attempts, self._start_step)
+        self._record.attempts = recorded_events(attempts, self.start_step)
 
         first_rows = []
         count = 0

@@ -1,0 +1,1 @@
+"""The paper's experiment on the small body: every memory crossed with every reader of words."""

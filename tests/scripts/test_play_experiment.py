@@ -1,0 +1,207 @@
+"""The paper's experiment on the small body: what is stored, what it depends on, and its proof."""
+
+import re
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from experiment.store import Entry, Store
+from msgspec.structs import replace
+from selection import slow_but
+
+from roboirg.core.environment_options import EnvironmentOptions
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.records.record_codec import StoreError
+
+SCRIPTS = Path(__file__).parents[2] / "scripts"
+KEY = {"body": "a1b2", "code": "new"}
+ADDING = """
+import sys
+from pathlib import Path
+from experiment import store
+
+store.PACKED_BYTES = 300
+with store.Store(Path(sys.argv[1])) as added:
+    for number in range(len(added), 100_000):
+        added.add(store.Entry({"number": str(number), "code": "new"}, f"{number} steps"))
+        print(number, flush=True)
+"""
+"""Adds entries until it is killed, and prints each that is stored; packs have some ten entries."""
+
+
+@pytest.mark.parametrize("seed", slow_but([0, 1], range(12)))
+def test_a_kill_at_any_moment_loses_no_entry_that_was_stored(seed, tmp_path):
+    """Would find an entry that is lost between the open lines and a pack, or a torn line read."""
+    rng = np.random.default_rng(seed)
+    stored = 0
+    for _ in range(3):
+        words = (sys.executable, "-c", ADDING, str(tmp_path))
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, cwd=SCRIPTS)
+        first = process.stdout.readline()
+        time.sleep(rng.uniform(0, 0.1))
+        process.kill()
+        process.wait()
+        printed = process.stdout.read()
+
+        assert int(first) in (stored, stored + 1)
+        stored = int(first) + 1 + printed.count("\n")
+    with Store(tmp_path) as store:
+        assert len(store) in (stored, stored + 1)
+
+
+def add(folder, verdict, **key):
+    with Store(folder) as store:
+        store.add(Entry({**KEY, **key}, verdict))
+
+
+def test_an_unfinished_line_is_moved_aside(tmp_path):
+    add(tmp_path, "success 20")
+    (tmp_path / "open.jsonl").write_bytes(b'{"key":{"body":"c3')
+    add(tmp_path, "failure 30", body="c3d4")
+    with Store(tmp_path) as store:
+        assert len(store) == 2
+        assert store.get(KEY).verdict == "success 20"
+
+
+def join(first, second):
+    """Copy the packs of the second store to the first."""
+    for path in second.glob("*.xz"):
+        shutil.copy(path, first / path.name)
+
+
+def test_stores_are_joined_by_copying_their_packs(tmp_path):
+    """Both have one entry in common, and each has one more."""
+    first = tmp_path / "first"
+    second = tmp_path / "second"
+    for folder in (first, second):
+        add(folder, "success 20")
+        add(folder, "failure 30", body=folder.name)
+
+    join(first, second)
+
+    with Store(first) as store:
+        assert len(store) == 3
+        assert store.get({**KEY, "body": "second"}).verdict == "failure 30"
+
+
+def test_entries_that_contradict_each_other_are_refused_with_both_files(tmp_path):
+    add(tmp_path, "success 20")
+    add(tmp_path / "second", "failure 30")
+    join(tmp_path, tmp_path / "second")
+    files = sorted(map(str, tmp_path.glob("*.xz")))
+
+    with pytest.raises(StoreError, match=".*".join(map(re.escape, files))):
+        Store(tmp_path)
+
+
+def test_a_damaged_pack_is_refused(tmp_path):
+    add(tmp_path, "success 20")
+    (pack,) = tmp_path.glob("*.xz")
+    pack.write_bytes(pack.read_bytes()[:-9])
+
+    with pytest.raises(StoreError, match=f"{pack.name} is damaged"):
+        Store(tmp_path)
+
+
+def test_entries_of_earlier_code_count_only_if_it_is_named(tmp_path):
+    add(tmp_path, "success 20", code="old")
+    with Store(tmp_path) as store:
+        assert store.get(KEY) is None
+    with Store(tmp_path, ["older", "old"]) as store:
+        assert store.get(KEY).verdict == "success 20"
+
+
+@pytest.fixture
+def study(tmp_path):
+    """A study of one row, which plays an episode of PickXtimes in explicit words."""
+    pytest.importorskip("torch")
+    from experiment.study import Study
+
+    return Study(
+        name="small", memories="recurrent", seeds="0", readers="all", tasks="PickXtimes",
+        settings="explicit", split="val", episodes="1", max_steps=90,
+        results=tmp_path / "results", work=tmp_path / "work", workers=0,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def play_key(study, monkeypatch):
+    """Return the key of a play after some changes of what it depends on."""
+    from experiment import study as module
+    from experiment.study import Trial
+
+    from roboirg_learn.policy.trained_reader import HeardGoal
+
+    circumstances = {"code": "a", "environment": "1", "torch": "2", "processor": "x86"}
+    monkeypatch.setattr(module, "circumstances", lambda: circumstances)
+    (usual,) = study.trials()
+
+    def make(name="a", weights=b"1", heard=("PickXtimes", "red"), circumstance="", **job):
+        row = usual.row._replace(memory=name, weights=study.work)
+        row.body.parent.mkdir(exist_ok=True)
+        row.body.write_bytes(weights)
+        changed = replace(usual.job, episode=2)  # its scene has another goal, too
+        if circumstance:
+            monkeypatch.setitem(circumstances, circumstance, "other")
+        return Trial(row, replace(changed, **job)).play_key(HeardGoal(*heard))
+
+    return make
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"weights": b"2", "name": "b"},
+        {"episode": 3},
+        {"arm": "other-goal"},
+        {"heard": ("BinFill", "red")},
+        {"heard": ("PickXtimes", "blue")},
+        {"environment": EnvironmentOptions(max_steps=900)},
+        {"circumstance": "code"},
+        {"circumstance": "environment"},
+        {"circumstance": "torch"},
+        {"circumstance": "processor"},
+    ],
+)
+def test_the_key_of_a_play_changes_with_all_that_decides_it(changes, play_key):
+    """Else a play would stand for another one."""
+    assert play_key() != play_key(**changes)
+
+
+def test_the_key_of_a_play_does_not_change_with_words_or_the_name_of_a_file(play_key):
+    assert play_key() == play_key("b", options=InstructionOptions("direct", "resolved"))
+
+
+@pytest.mark.sim
+@pytest.mark.slow
+@pytest.mark.parametrize("memory", ["recurrent", "subgoal"])
+def test_a_hearing_and_a_play_are_what_a_run_with_words_records(memory, study, capsys):
+    """Would find motion that depends on words in another way than through the goal."""
+    import pandas as pd
+    from experiment.frame import found_plays, prove, write_frame
+    from experiment.hearing import hear_missing
+    from experiment.playing import play_missing
+    from untrained import save_policy
+
+    from roboirg_learn.policy.policy_files import PolicyFiles
+    from roboirg_learn.policy.sight import ObjectClasses
+
+    study.memories = [memory]
+    (row,) = study.rows()
+    row.body.parent.mkdir(parents=True)
+    objects = ObjectClasses(("button", "cube red", "target"), np.array([0.01, 0.02, 0.005]))
+    save_policy(PolicyFiles(row.body, row.reader), memory, objects)
+
+    hear_missing(study)
+    play_missing(study)
+    prove(study)
+    write_frame(study)
+
+    assert "proof: 1 trials were played in the ordinary way, 0 differ" in capsys.readouterr().out
+    ((_, play),) = found_plays(study)
+    (line,) = pd.read_csv(study.results / "small.csv.xz").to_dict("records")
+    assert f"{line['outcome']} {line['steps']} " in play.verdict
