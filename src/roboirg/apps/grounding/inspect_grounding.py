@@ -149,9 +149,10 @@ def log_answers(log: EvalLog) -> list[Answer]:
 
 def _reply_text(output: ModelOutput) -> str:
     """Return what a model replied, marked if the limit of tokens cut it off."""
+    text = str(output.completion)
     if output.stop_reason == "max_tokens":
-        return output.completion + CUT_OFF
-    return output.completion
+        text += CUT_OFF
+    return text
 
 
 def _sample(item: GroundingItem, kind: QuestionKind, folder: Path) -> Sample:
