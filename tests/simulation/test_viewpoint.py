@@ -9,8 +9,6 @@ from hypothesis import strategies as st
 from roboirg.core.observations import PICTURE_SIZE
 from roboirg.simulation.rendering.viewpoint import (
     FOCAL_LENGTH,
-    FRONT_EYE,
-    FRONT_TARGET,
     reach_pixels,
     to_front_camera,
 )
@@ -40,7 +38,7 @@ def covered(corners, shift):
 
 
 @st.composite
-def random_triangles(draw):
+def triangles_in_the_window(draw):
     """Triangles (n, 3, 3) in the window, from specks to ones that fill it; some have no area."""
     random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     count = draw(st.integers(1, 60))
@@ -55,43 +53,61 @@ def random_triangles(draw):
 
 
 @settings(max_examples=40)
-@given(random_triangles(), st.integers(0, 99))
+@given(triangles_in_the_window(), st.integers(0, 99))
 def test_no_triangle_that_covers_a_pixel_is_left_out(corners, seed):
     """Compares with a renderer that tries every triangle, with corners shifted by rounding."""
-    shown = reach_pixels(corners)
     random = np.random.default_rng(seed)
-    for size in (0.0, 0.01, 0.01, 0.01):
-        assert shown[covered(corners, random.uniform(-size, size, (*corners.shape[:2], 2)))].all()
+    shift = random.uniform(-0.01, 0.01, (*corners.shape[:2], 2))
+
+    shown = reach_pixels(corners)
+
+    assert shown[covered(corners, 0.0)].all()
+    assert shown[covered(corners, shift)].all()
 
 
 def square_across_the_view(depth, half, center=(0.0, 0.0)):
-    """Two triangles across the view, `half` pixels from the center to the sides."""
+    """Return two triangles (2, 3, 3), m: a square, `half` pixels from its center to its sides."""
     ends = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=float) * half + center
     points = np.column_stack([ends / FOCAL_LENGTH, np.ones(4)]) * depth
     return points[[(0, 2, 1), (0, 3, 2)]]
 
 
-def test_a_square_between_pixel_centers_is_left_out():
-    """Half its width is 0.4 pixels, so it covers a
-    center only where it is moved by half a pixel."""
-    assert not reach_pixels(square_across_the_view(1.0, 0.4)).any()
-    assert reach_pixels(square_across_the_view(1.0, 0.4, center=(0.5, 0.5))).all()
-    assert reach_pixels(square_across_the_view(1.0, 0.49)).all(), (
-        "it may be rounded to where it is shown"
-    )
+@pytest.mark.parametrize(
+    ("half", "center", "kept"),
+    [
+        (0.4, (0.0, 0.0), False),
+        (0.4, (0.5, 0.5), True),
+        (0.49, (0.0, 0.0), True),
+        (8.0, (256.0, 0.0), False),
+    ],
+    ids=["between centers", "over a center", "within rounding of centers", "beside the picture"],
+)
+def test_a_square_is_kept_if_it_may_cover_the_center_of_a_pixel(half, center, kept):
+    """In pixels from the middle of the picture, where four pixels meet: centers are 0.5 away."""
+    square = square_across_the_view(1.0, half, center)
+
+    assert reach_pixels(square).tolist() == [kept, kept]
 
 
-def test_a_square_outside_the_picture_is_left_out_and_one_behind_the_eye_is_kept():
-    beside = square_across_the_view(1.0, 8, center=(PICTURE_SIZE, 0))
-    behind = square_across_the_view(1.0, 8) * [1, 1, -1]
-    assert reach_pixels(np.concatenate([beside, behind])).tolist() == [False] * 2 + [True] * 2
+def test_a_square_behind_the_eye_is_kept():
+    """Its projection means nothing."""
+    behind = square_across_the_view(1.0, 8.0) * [1, 1, -1]
+
+    assert reach_pixels(behind).tolist() == [True, True]
 
 
 def test_the_front_camera_s_matrix_puts_its_target_straight_ahead():
+    """The camera is at (0.3, 0, 0.4) and looks at (0, 0, -0.2), 0.6708 m away."""
     matrix = to_front_camera(sapien.Pose())
-    far = np.linalg.norm(np.subtract(FRONT_TARGET, FRONT_EYE))
 
-    assert matrix @ [*FRONT_TARGET, 1] == pytest.approx([0, 0, far, 1], abs=1e-6)
-    # The camera looks back at the robot: the world's y is to its right, up is against its y.
-    assert matrix[0, 1] == pytest.approx(1, abs=1e-6)
-    assert matrix[1, 2] < 0
+    assert matrix @ [0.0, 0.0, -0.2, 1.0] == pytest.approx([0.0, 0.0, 0.6708, 1.0], abs=1e-4)
+
+
+def test_the_front_camera_has_the_world_s_y_to_its_right_and_up_against_its_y():
+    """It looks back at the robot."""
+    matrix = to_front_camera(sapien.Pose())
+
+    right = matrix[:3, :3] @ [0, 1, 0]
+    up = matrix[:3, :3] @ [0, 0, 1]
+    assert right == pytest.approx([1, 0, 0], abs=1e-6)
+    assert up[1] < 0
