@@ -9,8 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,7 +22,7 @@ from roboirg.util.parallel_map import parallel_map
 from roboirg.util.process_guard import descendants
 
 
-def answer_messages(connection: Connection) -> None:
+def answer_messages(connection):
     serve(connection, obey_message)
 
 
@@ -45,7 +43,7 @@ def is_alive(pid):
         return False
 
 
-def wait_for(what: Callable[[], bool]) -> bool:
+def wait_for(what):
     deadline = time.monotonic() + 60
     while not what() and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -89,7 +87,7 @@ def test_closing_does_not_wait_for_a_child_that_the_kernel_cannot_end():
     Here `join` is `abs`, which fails without an argument.
     """
     stuck = SimpleNamespace(exitcode=None, kill=str, pid=2**30, join=abs, close=str)
-    assert ChildProcess(stuck, stuck).close() == ChildExit(None)  # type: ignore[arg-type]
+    assert ChildProcess(stuck, stuck).close() == ChildExit(None)
 
 
 def test_a_child_that_cannot_start_is_reported_with_what_would_help():
@@ -136,7 +134,7 @@ def test_descendants_are_found_although_their_names_contain_brackets_and_line_en
     name = r"b'\xff) R 1\n(\xfe'"
     script = f"import ctypes; ctypes.CDLL(None).prctl(15, {name}); print(flush=True); input()"
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen([sys.executable, "-c", script], **pipes) as child:  # type: ignore[call-overload]
+    with subprocess.Popen([sys.executable, "-c", script], **pipes) as child:
         assert child.stdout.readline()
         assert child.pid in descendants(os.getpid())
         child.kill()
@@ -186,4 +184,4 @@ def test_a_parallel_map_that_is_closed_early_ends_its_processes():
     """Two of three sleep for an hour, so the test would not end."""
     found = parallel_map(time.sleep, [0.0, 3600.0, 3600.0], 2)
     assert next(found) == (0.0, None)
-    found.close()  # type: ignore[attr-defined]
+    found.close()

@@ -13,7 +13,7 @@ from roboirg.cli import doctor
 from roboirg.cli.doctor import Check
 
 
-def run_module(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+def run_module(*arguments, **environment):
     return subprocess.run(
         [sys.executable, "-m", "roboirg.cli.doctor", *arguments],
         env=os.environ | environment,

@@ -35,7 +35,7 @@ Signed-By:
 """
 
 
-def bash(code: str, apt_dir: Path | None = None) -> subprocess.CompletedProcess[str]:
+def bash(code, apt_dir=None):
     environment = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}
     if apt_dir is not None:
         environment["ROBOIRG_APT_DIR"] = str(apt_dir)
@@ -171,7 +171,7 @@ def checkout(tmp_path):
     return tmp_path
 
 
-def extras_installed_by(checkout: Path, words: str = "") -> list[str]:
+def extras_installed_by(checkout, words=""):
     """Set the checkout up; return which sets of extras were installed."""
     done = subprocess.run(
         ["bash", "-c", f"source scripts/setup; {FUNCTIONS_THAT_INSTALL_NOTHING} main {words}"],

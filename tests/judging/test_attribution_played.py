@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import pytest
 from selection import slow_but
 
 import roboirg
 from roboirg.core.episode import Goal
-from roboirg.envs.environment import RoboIRGEnv
-from roboirg.judging import FailureAttribution, attribute_failure
+from roboirg.judging import attribute_failure
 from roboirg.language import instruct, mirrored_objects
 from roboirg.policies import play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
@@ -22,9 +18,7 @@ from roboirg.tasks.splits.splits import get_episode
 pytestmark = pytest.mark.sim
 
 
-def attribution_of(
-    env: RoboIRGEnv, info: dict[str, Any], mirrored: Mapping[str, frozenset[str]] | None = None
-) -> FailureAttribution | None:
+def attribution_of(env, info, mirrored=None):
     return attribute_failure(
         env.episode,
         env.events,
@@ -44,11 +38,11 @@ OTHER_KINDS = {"StopCube": "undecided", "VideoUnmaskSwap": "execution"}
 class OracleWithAnotherGoal(ScriptedPolicy):
     """The oracle's hands with another goal in mind."""
 
-    def __init__(self, goal: Goal) -> None:
+    def __init__(self, goal):
         super().__init__()
         self.goal = goal
 
-    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
+    def decide(self, env, instruction):
         return self.goal
 
 

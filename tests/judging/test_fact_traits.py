@@ -13,7 +13,7 @@ import roboirg
 from roboirg.analysis.page.details import event_text
 from roboirg.apps.show.episode_text import fact_words
 from roboirg.core import fact_traits
-from roboirg.core.conditions import Fact, Rule
+from roboirg.core.conditions import Fact
 from roboirg.core.episode import Primitive, Scene, SceneObject, Stage
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.fact_traits import FACT_TRAITS, FactRole, FactTraits, register_fact_kind
@@ -88,7 +88,7 @@ TOPPLED = Fact("toppled", "pillar")
 
 
 @pytest.fixture
-def registered_toppled(monkeypatch: pytest.MonkeyPatch) -> FactTraits:
+def registered_toppled(monkeypatch):
     monkeypatch.setattr(fact_traits, "_TRAITS", added := dict(FACT_TRAITS))
     monkeypatch.setattr(fact_traits, "FACT_TRAITS", added)
     traits = FactTraits(
@@ -108,7 +108,7 @@ def registered_toppled(monkeypatch: pytest.MonkeyPatch) -> FactTraits:
     return traits
 
 
-def stage_that_expects(expects: Fact, *forbids: Fact | Rule) -> Stage:
+def stage_that_expects(expects, *forbids):
     return Stage(expects, Primitive("hold", "robot"), "leave the pillar alone", forbids)
 
 
@@ -161,7 +161,7 @@ def test_a_registered_kind_of_object_is_built_and_its_kind_of_fact_detected(
     from roboirg.simulation.physics_settings import HOME_ACTION
     from roboirg.simulation.world import World
 
-    def build_pillar(scene, item, visible):  # type: ignore[no-untyped-def]
+    def build_pillar(scene, item, visible):
         builder = ActorBuilder()
         builder.add_box_collision(half_size=[0.02, 0.02, 0.05])
         if visible:

@@ -17,7 +17,7 @@ PLACED = Fact("placed", "a", "target")
 PRESSED = Fact("pressed", "button")
 
 
-def stage_with_facts(expects: Fact, *forbids: Fact, lasting: int = 0) -> Stage:
+def stage_with_facts(expects, *forbids, lasting=0):
     primitive = Primitive("press", expects.subject)
     return Stage(expects, primitive, "do {at} it", forbids, points_at="a", lasting=lasting)
 
@@ -105,8 +105,8 @@ facts = st.frozensets(st.sampled_from([PICKED, PLACED, PRESSED, Fact("still", "r
 @given(st.lists(facts, max_size=20))
 def test_the_facts_of_every_step_can_be_rebuilt_from_the_events(history):
     """An event is a change: a fact begins or ceases to hold."""
-    before: frozenset[Fact] = frozenset()
-    rebuilt: set[Fact] = set()
+    before = frozenset()
+    rebuilt = set()
     for step, now in enumerate(history):
         for event in changes(step, before, now):
             assert event.step == step

@@ -7,7 +7,6 @@ import pytest
 from staged import named_facts
 
 from roboirg.core.conditions import facts_of
-from roboirg.core.episode import Episode
 from roboirg.judging import Event, Judge, Status
 from roboirg.judging.episode_replay import completed_stages, decide, facts_by_step, rejudge
 from roboirg.tasks import all_tasks
@@ -16,7 +15,7 @@ from roboirg.tasks.splits.splits import get_episode
 EPISODES = 12
 
 
-def random_events(episode: Episode, rng: np.random.Generator) -> list[Event]:
+def random_events(episode, rng):
     """Facts that the stages expect, in order and held for long, among any of those they name."""
     stages = (*episode.demonstration, *episode.stages)
     named = named_facts(stages)

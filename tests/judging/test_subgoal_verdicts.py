@@ -5,16 +5,13 @@ from __future__ import annotations
 import pytest
 
 from roboirg.core.conditions import Fact
-from roboirg.core.episode import Episode, Stage
 from roboirg.core.subgoal_text import split_point
 from roboirg.judging import judge_subgoal, plain_subgoal
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 
 
-def verdict_on(
-    said: str, due: Stage | None, episode: Episode, pointed_at: set[str | None] | None = None
-) -> str:
+def verdict_on(said, due, episode, pointed_at=None):
     points = None if pointed_at is None else {str(point) for point in pointed_at}
     return judge_subgoal(said, due, points, episode)
 

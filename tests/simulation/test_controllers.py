@@ -59,8 +59,8 @@ def test_pose_actions_reach_the_place_that_joint_angles_reached():
 def test_a_pick_and_place_task_is_solved_with_waypoint_actions():
     """A waypoint is a pose to which the arm moves straight, in as many steps as it takes.
 
-    The last number of an action is the gripper: -1 closes it, 1 opens it, and it keeps as it is at
-    any number in between. The goal is to put the blue cube onto the target, and to press the button.
+    The last number of an action is the gripper: -1 closes it, 1 opens it, and in between it stays
+    as it is. The goal is to put the blue cube onto the target and to press the button.
     """
     env = environment_with_actions("waypoint")
     assert env.episode.goal.as_mapping() == {"color": "blue", "repeats": 1}
@@ -88,7 +88,7 @@ def test_a_pick_and_place_task_is_solved_with_waypoint_actions():
 def test_a_waypoint_at_the_tool_s_place_moves_the_gripper_only_for_exactly_minus_one(
     gripper, steps, width_m
 ):
-    """At 0.5 the fingers stay open, 0.04 m from the middle each; closing takes about seven steps."""
+    """At 0.5 the fingers stay open, 0.04 m from the middle each; closing takes about 7 steps."""
     env = environment_with_actions("waypoint")
     here = env.session.world.robot.tool_pose.p
 

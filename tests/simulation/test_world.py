@@ -17,7 +17,7 @@ pytestmark = pytest.mark.sim
 TASKS = tuple(every_task())
 
 
-def world_of(task: str, index: int = 3, *, visible: bool = False) -> World:
+def world_of(task, index=3, *, visible=False):
     episode = get_episode(task, "test", index)
     return World(episode.scene, visible=visible)
 
@@ -27,7 +27,7 @@ def test_physics_and_drawing_report_when_they_begin_and_end(monkeypatch):
 
     A picture is begun in the background, and then fetched, so drawing is reported twice.
     """
-    calls: list[tuple[str, float]] = []
+    calls = []
     world = world_of("PickXtimes", visible=True)
     monkeypatch.setattr(waiting, "_native_listeners", [lambda *call: calls.append(call)])
 

@@ -29,7 +29,7 @@ circles = st.builds(Circle, meters_from_the_middle, meters_from_the_middle, size
 footprints = st.one_of(rectangles, circles)
 
 
-def points_all_over(shape: Rectangle | Circle, inside: float) -> np.ndarray:
+def points_all_over(shape, inside):
     """Points all over a shape shrunk (inside > 0) or grown (inside < 0) by some meters."""
     if isinstance(shape, Circle):
         angle, share = np.meshgrid(np.linspace(0, 2 * math.pi, 120), np.linspace(0, 1, 15))
@@ -46,7 +46,7 @@ def points_all_over(shape: Rectangle | Circle, inside: float) -> np.ndarray:
     return np.stack([shape.x + right.ravel(), shape.y + ahead.ravel()])
 
 
-def contains_a_point(shape: Rectangle | Circle, points: np.ndarray, inside: float) -> bool:
+def contains_a_point(shape, points, inside):
     if isinstance(shape, Circle):
         radius = shape.radius - inside
         distance = np.hypot(points[0] - shape.x, points[1] - shape.y)
