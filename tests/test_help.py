@@ -1,5 +1,8 @@
 """The command line stays small, and the help of every command is short and has an example."""
 
+import contextlib
+import functools
+import io
 import re
 import shlex
 from typing import get_type_hints
@@ -19,12 +22,19 @@ from roboirg.runs.plan.plan_file import plan_text, read_plan_file
 from roboirg.runs.plan.plan_maker import make_plan
 
 
-def help_of(name, columns, monkeypatch, capsys):
-    monkeypatch.setenv("COLUMNS", str(columns))
-    monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", columns)
-    with pytest.raises(SystemExit):
+@functools.cache
+def help_of(name, columns):
+    """Return the help of a command in a terminal of so many columns."""
+    printed = io.StringIO()
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        contextlib.redirect_stdout(printed),
+        contextlib.suppress(SystemExit),
+    ):
+        patch.setenv("COLUMNS", str(columns))
+        patch.setattr("typer.rich_utils.MAX_WIDTH", columns)
         typer.main.get_command(app).main([*name.split(), "--help"], "roboirg")
-    return capsys.readouterr().out
+    return printed.getvalue()
 
 
 def test_the_number_of_commands_and_parameters_stays_below_its_limits():
@@ -38,16 +48,16 @@ every_command = pytest.mark.parametrize("name", sorted(all_commands()))
 
 
 @every_command
-def test_help_is_short(name, monkeypatch, capsys):
+def test_help_is_short(name):
     """45 lines of 100 columns; 60 of the command *run*, which has the most options."""
-    lines = help_of(name, 100, monkeypatch, capsys).strip().splitlines()
+    lines = help_of(name, 100).strip().splitlines()
 
     assert len(lines) <= (60 if name == "run" else 45)
 
 
 @every_command
-def test_help_has_an_example_that_the_command_takes(name, monkeypatch, capsys):
-    text = help_of(name, 100, monkeypatch, capsys)
+def test_help_has_an_example_that_the_command_takes(name):
+    text = help_of(name, 100)
 
     (example,) = re.findall(r"Example: roboirg (.*)", text)
 
@@ -58,23 +68,23 @@ def test_help_has_an_example_that_the_command_takes(name, monkeypatch, capsys):
 
 
 @every_command
-def test_help_cuts_no_word_and_is_no_wider_than_the_terminal(name, monkeypatch, capsys):
+def test_help_cuts_no_word_and_is_no_wider_than_the_terminal(name):
     """But addresses, which are written scheme://…."""
-    text = help_of(name, 80, monkeypatch, capsys)
+    text = help_of(name, 80)
 
     assert max(map(len, text.splitlines())) <= 80
     assert not re.search(r"(?<!://)…", text)
 
 
 @every_command
-def test_help_names_all_options(name, monkeypatch, capsys):
+def test_help_names_all_options(name):
     options = set()
     for parameter in all_commands()[name].params:
-        options |= {option for option in parameter.opts if option.startswith("-")}
+        options.update(parameter.opts, parameter.secondary_opts)
 
-    text = help_of(name, 80, monkeypatch, capsys)
+    text = help_of(name, 80)
 
-    assert options <= set(text.split())
+    assert {option for option in options if option.startswith("-")} <= set(text.split())
 
 
 @pytest.mark.parametrize("episodes", ["3,0-2,7", "7,"])  # 7 alone would be the first seven

@@ -95,19 +95,15 @@ class Staged:
         for run in self.episode.scene.motions:
             if not isinstance(run, Shuttle):
                 continue
-            near, stopped = (Fact(kind, run.subject, "target") for kind in ("near", "stopped"))
-            if self._halted:
+            if any(event.fact == Fact("pressed", "button") for event in self.events):
                 continue
+            near = Fact("near", run.subject, "target")
             phase = (self.step / run.interval) % 1.0
             self.now.discard(near)
             if abs(phase - 0.5) <= NEAR_SHARE and self.step < run.passes * run.interval:
                 self.now.add(near)
                 if run.stopped_by in self.now:
-                    self.now.add(stopped)
-
-    @property
-    def _halted(self):
-        return any(event.fact == Fact("pressed", "button") for event in self.events)
+                    self.now.add(Fact("stopped", run.subject, "target"))
 
     def set(self, *facts, off=()):
         """Facts begin and cease to hold, and it is a step later."""
