@@ -144,13 +144,15 @@ def test_a_worker_is_watched_without_shared_memory(monkeypatch, has_memory):
 def test_a_character_that_the_terminal_cannot_show_is_printed_as_a_question_mark(
     monkeypatch, encoding, shown
 ):
-    monkeypatch.setattr(sys, "stdout", out := io.TextIOWrapper(io.BytesIO(), encoding))
-    monkeypatch.setattr(cli, "app", lambda **_: out.write("≠"))
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding)
+    monkeypatch.setattr(sys, "stdout", terminal)
+    monkeypatch.setattr(cli, "app", lambda **_: terminal.write("≠"))
+
     with pytest.raises(SystemExit):
         cli.main()
 
-    out.flush()
-    assert out.buffer.getvalue() == shown
+    terminal.flush()
+    assert terminal.buffer.getvalue() == shown
 
 
 def test_the_doctor_names_a_missing_temporary_folder(monkeypatch, tmp_path):

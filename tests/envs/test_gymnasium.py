@@ -7,7 +7,6 @@ import warnings
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium import wrappers
 
 import roboirg
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -131,18 +130,3 @@ def test_a_fork_after_drawing_fails_at_once_with_the_reason():
         vector.reset()
 
     vector.close(terminate=True)
-
-
-def test_videos_can_be_recorded(tmp_path):
-    pytest.importorskip("moviepy", reason="Gymnasium's RecordVideo needs moviepy")
-    folder = tmp_path / "videos"
-    env = gymnasium.make(NAME, render_mode="rgb_array", **OPTIONS)
-    env = wrappers.RecordVideo(env, str(folder), episode_trigger=lambda _: True)
-    env.reset(options={"episode": 2})
-    env.step(HOME_ACTION)
-    env.step(HOME_ACTION)
-    env.close()
-
-    (video,) = folder.glob("*.mp4")
-
-    assert video.stat().st_size > 0

@@ -5,7 +5,6 @@ import pytest
 
 import roboirg
 from roboirg.core.conditions import Fact
-from roboirg.simulation.physics_settings import HOME_ACTION
 
 pytestmark = pytest.mark.sim
 
@@ -41,19 +40,6 @@ def test_a_pose_action_takes_one_control_step():
     *_, info = env.step([-0.1, 0.1, 0.25, *DOWN, 1.0])
 
     assert info["steps"] == 1
-
-
-def test_pose_actions_reach_the_place_that_joint_angles_reached():
-    joints = environment_with_actions("joint_angle")
-    poses = environment_with_actions("ee_pose")
-    target = HOME_ACTION + np.array([0.1, 0.1, -0.1, -0.1, 0.1, 0.1, 0.1, 0.0])
-    for _ in range(30):
-        wanted, *_ = joints.step(target)
-
-    for _ in range(40):
-        got, *_ = poses.step([*wanted["end_effector"], 1.0])
-
-    assert got["end_effector"] == pytest.approx(wanted["end_effector"], abs=2e-3)
 
 
 def test_a_pick_and_place_task_is_solved_with_waypoint_actions():

@@ -91,14 +91,6 @@ def test_a_planned_path_keeps_the_limits_of_speed_and_acceleration(planner):
         assert np.abs(acceleration).max() <= 1.05 * slack**2 * JOINT_ACCELERATION_LIMIT
 
 
-def test_planning_again_gives_the_same_path(planner):
-    goal = pose_facing_down(0.0, 0.1, 0.1)
-
-    path = planner.plan_straight(HOME, goal)
-
-    assert np.array_equal(planner.plan_straight(HOME, goal), path)
-
-
 def test_inverse_kinematics_finds_joint_positions_within_their_limits(planner):
     """From random positions, with one joint far beyond its limit."""
     rng = np.random.default_rng(2)

@@ -49,13 +49,6 @@ def test_a_roll_of_tape_weighs_50_to_100_grams():
     assert 0.05 <= tape.physics.mass <= 0.1
 
 
-def test_a_roll_of_tape_lies_still():
-    world = rest(world_with_tape(), 40)
-
-    assert world.bodies["tape"].position == pytest.approx((0.0, 0.0, 0.0175), abs=1e-4)
-    assert Fact("lying", "tape") in world.facts
-
-
 def test_a_roll_of_tape_can_be_gripped_around_its_outside():
     world = world_with_tape()
 
