@@ -67,6 +67,7 @@ def test_the_episodes_of_each_task_are_still_those_of_the_shipped_fingerprint(ta
         ("PutInBox", "90bf26fade86"),
         ("PickByCount", "4fc73753291f"),
     ],
+    ids=TASKS,
 )
 def test_the_first_40_random_episodes_of_each_task_are_what_they_were(task, digest):
     """They are drawn anew: a changed figure of a sampler, such as a region, shows here."""

@@ -78,17 +78,17 @@ def test_tasks_of_the_real_robot_have_no_published_episodes():
 
 
 @pytest.mark.parametrize("task", every_task())
-@pytest.mark.parametrize("index", [0, 3])
-def test_scenes_survive_the_codec(task, index):
+def test_scenes_survive_the_codec(task):
     """Through JSON, and the motions are of the same classes."""
-    episode = get_episode(task, "test", index)
+    for index in range(4):
+        episode = get_episode(task, "test", index)
 
-    written = json.loads(json.dumps([encode(episode.scene), encode(episode.goal)]))
-    scene, goal = decode(written)
+        written = json.loads(json.dumps([encode(episode.scene), encode(episode.goal)]))
+        scene, goal = decode(written)
 
-    assert goal == episode.goal
-    assert encode(scene) == encode(episode.scene)
-    assert list(map(type, scene.motions)) == list(map(type, episode.scene.motions))
+        assert goal == episode.goal
+        assert encode(scene) == encode(episode.scene)
+        assert list(map(type, scene.motions)) == list(map(type, episode.scene.motions))
 
 
 numbers = st.floats(-10, 10, allow_nan=False)

@@ -35,7 +35,7 @@ def test_any_subgoal_is_lost_when_no_stage_is_due():
     assert judge_subgoal("pick up the green cube", None, None, episode) == "lost"
 
 
-@pytest.mark.parametrize("task", every_task())
+@pytest.mark.parametrize("task", ["SwingXtimes", "BinFill", "ButtonUnmaskSwap"])
 def test_the_subgoal_of_a_stage_with_another_act_is_not_right(task):
     episode = get_episode(task, "test", 3)
     for stage in episode.stages:
