@@ -360,9 +360,14 @@ def test_ctrl_c_within_a_class_definition_prints_one_sentence():
 
 
 def test_a_run_with_missing_episodes_has_exit_code_2_and_asks_for_the_same_command(capsys):
-    summary = RunSummary(10, 7, (), 3, (), ())  # planned, played, errors, missing
+    planned = 10
+    played = 7
+    missing = 3
+    summary = RunSummary(planned, played, (), missing, (), ())
+
     with pytest.raises(SystemExit, match="2"):
         report_problems(summary, Path("out"))
+
     assert "3 of 10 episodes were not played; run the same command" in capsys.readouterr().err
 
 

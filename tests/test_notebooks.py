@@ -9,8 +9,6 @@ import nbformat
 import pytest
 
 NOTEBOOKS = sorted((Path(__file__).parents[1] / "docs" / "notebooks").glob("*.ipynb"))
-MAX_SIZE = 100_000
-"""Bytes of a notebook, outputs included."""
 
 
 @pytest.fixture(params=NOTEBOOKS, ids=lambda path: path.stem)
@@ -42,11 +40,12 @@ def kinds_of_outputs(cell):
 
 
 def test_a_notebook_is_small_and_shows_its_outputs(notebook):
+    """In bytes, with its outputs, of which none is an error."""
     nbformat.validate(notebook)
     outputs = []
     for cell in notebook.cells:
         outputs += cell.get("outputs", ())
 
-    assert len(nbformat.writes(notebook).encode()) < MAX_SIZE
+    assert len(nbformat.writes(notebook).encode()) < 100_000
     assert outputs
     assert "error" not in {output.output_type for output in outputs}

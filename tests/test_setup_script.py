@@ -23,17 +23,6 @@ Suites: bookworm
 Components: main
 """
 
-SOURCE_WITH_A_KEY_INSIDE = """\
-Types: deb
-URIs: http://mirror.example/ubuntu
-Suites: noble
-Components: main
-Signed-By:
- -----BEGIN PGP PUBLIC KEY BLOCK-----
- .
- abc=
-"""
-
 
 def bash(code, apt_dir=None):
     environment = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}
@@ -83,7 +72,14 @@ def test_backports_use_the_mirror_and_key_of_a_deb822_source(apt_dir):
 
 
 def test_a_key_inside_the_source_is_kept_as_it_is(apt_dir):
-    (apt_dir / "sources.list.d" / "ubuntu.sources").write_text(SOURCE_WITH_A_KEY_INSIDE)
+    (apt_dir / "sources.list.d" / "ubuntu.sources").write_text(
+        "Types: deb\n"
+        "URIs: http://mirror.example/ubuntu\n"
+        "Suites: noble\n"
+        "Components: main\n"
+        "Signed-By:\n -----BEGIN PGP PUBLIC KEY BLOCK-----\n .\n abc=\n"
+    )
+
     source = bash("backports_source noble", apt_dir).stdout
 
     assert "Suites: noble-backports\n" in source

@@ -102,20 +102,20 @@ def test_gymnasium_s_vector_environment_goes_on_with_the_next_episodes(vector):
     assert batch["instruction"][1] == roboirg.make("PickXtimes", episode=6).instruction.text
 
 
-FORKED = f"""
-import gymnasium
-vector = gymnasium.make_vec({NAME!r}, 2, "async", episode=None, **{OPTIONS})
-print(*vector.reset(seed=4)[0]["instruction"], sep="\\n")
-vector.close()
-"""
-
-
 @pytest.mark.slow
 def test_a_fork_before_drawing_works():
     """In a process of its own: forking is refused where pictures have been drawn."""
-    done = subprocess.run(
-        [sys.executable, "-c", FORKED], capture_output=True, text=True, check=False
+    program = (
+        "import gymnasium\n"
+        f"vector = gymnasium.make_vec({NAME!r}, 2, 'async', episode=None, **{OPTIONS})\n"
+        "print(*vector.reset(seed=4)[0]['instruction'], sep='\\n')\n"
+        "vector.close()\n"
     )
+
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+
     said = [roboirg.make("PickXtimes", episode=index).instruction.text for index in (4, 5)]
     assert done.stdout.splitlines() == said, done.stderr
 

@@ -19,11 +19,6 @@ from roboirg.tasks.shared.fixtures import footprint
 from roboirg.tasks.splits.splits import get_episode, make_episode, split_episodes
 
 TASKS = tuple(every_task())
-FRONT_CAMERA = np.array(
-    [[0, 1, 0, 0], [0.89443, 0, -0.44721, -0.08944], [-0.44721, 0, -0.89443, 0.49194]]
-)
-"""RoboMME's: from the world to the camera's right, down and ahead (OpenCV), meters."""
-
 each_task = pytest.mark.parametrize("task", TASKS)
 
 
@@ -248,10 +243,16 @@ def test_objects_to_handle_are_within_the_robot_s_reach(task):
 
 @each_task
 def test_the_front_camera_s_picture_contains_every_object(task):
-    """Projects each object's origin to pixels of the picture: 256 by 256, 90 degrees wide."""
+    """Projects each object's origin to pixels of the picture: 256 by 256, 90 degrees wide.
+
+    RoboMME's camera: the matrix takes the world to right, down and ahead of it, meters.
+    """
+    camera = np.array(
+        [[0, 1, 0, 0], [0.89443, 0, -0.44721, -0.08944], [-0.44721, 0, -0.89443, 0.49194]]
+    )
     for episode in episodes(task):
         for item in episode.scene.objects:
-            right, down, ahead = FRONT_CAMERA @ (*item.position, 1)
+            right, down, ahead = camera @ (*item.position, 1)
             assert ahead > 0
             assert 0 <= 128 + 128 * right / ahead < 256, item
             assert 0 <= 128 + 128 * down / ahead < 256, item
