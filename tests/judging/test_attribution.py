@@ -139,6 +139,15 @@ def test_a_failed_grasp_that_was_repeated_does_not_excuse_a_wrong_count():
     assert failure_of(play) == "wrong_count"
 
 
+def test_one_missed_grasp_does_not_excuse_three_missing_rounds():
+    """The goal is the green cube, three times; it is missed once, then the button pressed."""
+    play = played_without_simulator("PickXtimes", 0)
+
+    play.miss("cube_green").tick(150).press()
+
+    assert failure_of(play) == "wrong_count"
+
+
 def test_a_wrong_container_lifted_before_the_press_is_not_blamed_for_a_timeout():
     """Until the button is pressed, lifting containers is allowed; then nothing happens any more."""
     play = played_without_simulator("ButtonUnmask", 0)  # container_0 is meant
