@@ -60,6 +60,7 @@ def test_a_child_answers_and_exits_when_its_channel_is_closed():
 
 
 def test_a_child_that_ended_is_reported_with_its_exit_code():
+    """Told "leave", a child ends with exit code 3."""
     child = ChildProcess.spawn(answer_messages)
     child.send("leave")
 
@@ -107,6 +108,7 @@ def test_a_child_that_cannot_start_is_reported_with_what_would_help():
 
 
 def test_a_process_that_a_child_has_started_ends_with_the_child():
+    """Told "group", a child starts a process and answers with its number; told "ignore", it hangs."""
     child = ChildProcess.spawn(answer_messages)
     child.send("group")
     grandchild = child.receive()

@@ -65,6 +65,7 @@ def test_failures_with_a_known_cause_get_its_name_in_most_cases(name):
 
 @pytest.mark.parametrize("half", [half for half, path in confusion.HALVES.items() if path.exists()])
 def test_the_documentation_has_the_current_tables_of_attribution(half):
+    """From stored facts of failures that were made, in halves such as *development*."""
     page = confusion.DOCUMENT.read_text()
 
     table = confusion.table(pairs_of(half))

@@ -203,7 +203,8 @@ def test_swing_punishes_a_visit_too_many_before_and_after_the_put_down(side, put
 
 
 def test_swing_visits_of_other_cubes_do_not_count():
-    """A blue cube is over the right target six times, without having been picked up."""
+    """The red cube is to swing twice from right to left. While it is held, a blue cube is over the
+    right target six times, without having been picked up."""
     visits = [[RED_HELD, Fact("over", "cube_blue", "target_right")], [RED_HELD]] * 6
     swings = [*RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT]
 

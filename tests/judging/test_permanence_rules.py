@@ -117,7 +117,7 @@ def test_holding_the_first_container_long_or_lifting_it_again_is_allowed(task):
 
 @each_task
 def test_putting_down_other_containers_does_not_complete_putting_down_the_first(task):
-    """The stage before the last one stays due."""
+    """Two are to be lifted, one after the other. The stage before the last one stays due."""
     made = episode_with_picks(task, 2)
     down = [put_down(name) for name in (made.second, *made.others)]
 
@@ -180,5 +180,6 @@ def test_both_buttons_may_be_pressed_in_any_order(first, other):
 
 @pytest.mark.parametrize("button", [LEFT, RIGHT])
 def test_pressing_the_same_button_twice_completes_only_one_of_two_presses(button):
+    """Also if it is held for ten steps. Each list has the facts of a step."""
     assert stages_complete_after([button], [], [button], [], [button]) == 1
     assert stages_complete_after(*[[button]] * 10) == 1

@@ -74,6 +74,7 @@ def test_cached_meshes_take_at_most_a_sixteenth_of_the_cache(mesh_folder, monkey
 
 
 def test_meshes_that_fill_their_share_displace_no_recorded_actions(monkeypatch, mesh_folder):
+    """The cache may have 160,000 bytes, of which meshes and actions may fill 10,000 each."""
     monkeypatch.setenv("ROBOIRG_CACHE_GIB", str(160_000 / 2**30))
     open_cache("actions").write("a1", bytes(5_000))
 
