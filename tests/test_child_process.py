@@ -108,7 +108,7 @@ def test_a_child_that_cannot_start_is_reported_with_what_would_help():
 
 
 def test_a_process_that_a_child_has_started_ends_with_the_child():
-    """Told "group", a child starts a process and answers with its number; told "ignore", it hangs."""
+    """Told "group", a child starts a process and answers its number; told "ignore", it hangs."""
     child = ChildProcess.spawn(answer_messages)
     child.send("group")
     grandchild = child.receive()
