@@ -2,7 +2,6 @@
 
 import logging
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -20,34 +19,44 @@ def file_names_in(folder):
 
 def test_a_cache_gives_back_what_was_written_last(tmp_path):
     cache = Cache(tmp_path / "deep" / "down", 1000)
-    assert cache.read("a1") is None
+    cache.write("a1", b"first")
 
     cache.write("a1", b"")
-    cache.write("b2", bytes(range(256)))
-    cache.write("b2", bytes(range(200)))
-    assert (cache.read("a1"), cache.read("b2")) == (b"", bytes(range(200)))
-    assert file_names_in(tmp_path / "deep" / "down") == ["a1", "b2"]
+
+    assert cache.read("a1") == b""
+    assert cache.read("b2") is None
+    assert file_names_in(tmp_path / "deep" / "down") == ["a1"]
 
 
-def test_a_full_cache_drops_the_entries_that_were_not_read_for_longest(tmp_path):
-    """It has room for three entries of 100 bytes, each with a head of 40."""
-    cache = Cache(tmp_path, 3 * 140)
-    for age, key in enumerate(("a1", "b2", "c3")):
+@pytest.fixture
+def full_cache(tmp_path):
+    """A cache of three entries of 100 bytes, each with a head of 40, the oldest first."""
+    cache = Cache(tmp_path, 420)
+    for second, key in enumerate(("a1", "b2", "c3")):
         cache.write(key, bytes(100))
-        os.utime(tmp_path / key, (1000 + age, 1000 + age))
-    assert cache.read("a1") == bytes(100)
+        os.utime(tmp_path / key, (1000 + second, 1000 + second))
+    return cache
 
-    # a1 is the oldest, but was just read: b2 goes.
-    cache.write("d4", bytes(100))
+
+def test_a_full_cache_drops_the_entry_that_was_not_read_for_longest(full_cache, tmp_path):
+    """a1 is the oldest, but was just read: b2 goes."""
+    full_cache.read("a1")
+
+    full_cache.write("d4", bytes(100))
+
     assert file_names_in(tmp_path) == ["a1", "c3", "d4"]
 
-    # What is larger than the cache is not kept, and costs no other entry.
-    cache.write("large", bytes(1000))
-    assert file_names_in(tmp_path) == ["a1", "c3", "d4"]
 
-    # 340 bytes of 420: all others go.
-    cache.write("e5", bytes(300))
-    assert file_names_in(tmp_path) == ["e5"]
+def test_a_large_entry_displaces_all_others(full_cache, tmp_path):
+    full_cache.write("d4", bytes(300))
+
+    assert file_names_in(tmp_path) == ["d4"]
+
+
+def test_what_is_larger_than_the_cache_is_not_kept_and_displaces_nothing(full_cache, tmp_path):
+    full_cache.write("d4", bytes(1000))
+
+    assert file_names_in(tmp_path) == ["a1", "b2", "c3"]
 
 
 WAYS_TO_DAMAGE_AN_ENTRY = {
@@ -72,7 +81,6 @@ def test_a_damaged_entry_is_reported_not_returned_and_can_be_written_anew(tmp_pa
 
     cache.write("a1", b"forty-two")
     assert cache.read("a1") == b"forty-two"
-    assert len(caplog.records) == 1
 
 
 PROGRAM_THAT_FILLS_A_CACHE = """
@@ -109,30 +117,27 @@ def test_two_processes_may_fill_a_cache_at_once(tmp_path):
 def test_a_process_killed_while_writing_leaves_no_damaged_entry_in_the_cache(
     tmp_path, caplog, monkeypatch
 ):
-    caught_writing = 0
+    """It is killed when it begins to write, or a little later: in the middle, or between two."""
+    unfinished = set()
     for number in range(4):
         process = process_that_fills(tmp_path, 10**9, 3_000_000)
-        before = set(file_names_in(tmp_path))
-        # As soon as it writes, or a little later: in the middle of it, or between two entries.
-        while not any(name.endswith(".part") for name in set(file_names_in(tmp_path)) - before):
+        while not set(tmp_path.glob("*.part")) - unfinished:
             assert process.poll() is None
             time.sleep(0.0002)
         time.sleep(0.0015 * number)
-        os.kill(process.pid, signal.SIGKILL)
+        process.kill()
         process.communicate(timeout=600)
-        assert process.returncode == -signal.SIGKILL
-        parts = [name for name in file_names_in(tmp_path) if name.endswith(".part")]
-        caught_writing += len(parts) > caught_writing
+        unfinished = set(tmp_path.glob("*.part"))
         cache = Cache(tmp_path, 40_000_000)
-        for key in set(file_names_in(tmp_path)) - set(parts):
-            assert set(cache.read(key)) == set(key.encode())
-    assert caught_writing
+        for path in set(tmp_path.iterdir()) - unfinished:
+            assert set(cache.read(path.name)) == set(path.name.encode())
+    assert unfinished
     assert caplog.records == []
 
     # What was left unfinished is swept out in time.
     monkeypatch.setattr(cache_module, "_ABANDONED_S", -1.0)
     cache.write("0", b"0")
-    assert not any(name.endswith(".part") for name in file_names_in(tmp_path))
+    assert not list(tmp_path.glob("*.part"))
 
 
 def test_a_cache_that_cannot_be_written_is_reported_once_and_does_without(tmp_path, caplog):
@@ -147,25 +152,44 @@ def test_a_cache_that_cannot_be_written_is_reported_once_and_does_without(tmp_pa
     assert "is unusable" in caplog.text
 
 
-def test_environment_variables_set_the_place_and_size_of_the_cache(tmp_path, monkeypatch):
+def test_a_cache_that_is_off_keeps_nothing(monkeypatch):
     monkeypatch.setenv("ROBOIRG_CACHE", "off")
+
     open_cache("actions").write("a1", b"content")
+
     assert open_cache("actions").read("a1") is None
 
+
+def test_each_kind_of_entries_has_a_folder_below_that_of_the_variable(tmp_path, monkeypatch):
     monkeypatch.setenv("ROBOIRG_CACHE", str(tmp_path / "here"))
+
     open_cache("actions").write("a1", b"content")
+
     assert open_cache("actions").read("a1") == b"content"
     assert open_cache("frames").read("a1") is None
 
-    monkeypatch.delenv("ROBOIRG_CACHE")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    open_cache("frames").write("a1", b"content")
-    assert [path.name for path in tmp_path.glob("xdg/roboirgbench/frames/*")] == ["a1"]
 
+def test_the_cache_is_in_the_user_s_cache_folder_by_default(tmp_path, monkeypatch):
+    monkeypatch.delenv("ROBOIRG_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+    open_cache("frames").write("a1", b"content")
+
+    assert (tmp_path / "roboirgbench" / "frames" / "a1").exists()
+
+
+def test_a_variable_sets_the_size_of_the_cache(monkeypatch):
+    """1e-8 GiB are ten bytes."""
     monkeypatch.setenv("ROBOIRG_CACHE_GIB", "1e-8")
+
     open_cache("frames").write("b2", b"content")
+
     assert open_cache("frames").read("b2") is None
-    for wrong in ("0", "-1", "many", "nan", "inf"):
-        monkeypatch.setenv("ROBOIRG_CACHE_GIB", wrong)
-        with pytest.raises(InvalidValueError, match=f"ROBOIRG_CACHE_GIB is '{wrong}'"):
-            open_cache("frames")
+
+
+@pytest.mark.parametrize("wrong", ["0", "-1", "many", "nan", "inf"])
+def test_a_size_of_the_cache_that_is_no_positive_number_is_refused(wrong, monkeypatch):
+    monkeypatch.setenv("ROBOIRG_CACHE_GIB", wrong)
+
+    with pytest.raises(InvalidValueError, match=f"ROBOIRG_CACHE_GIB is '{wrong}'"):
+        open_cache("frames")

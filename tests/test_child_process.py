@@ -9,8 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,7 +22,7 @@ from roboirg.util.parallel_map import parallel_map
 from roboirg.util.process_guard import descendants
 
 
-def answer_messages(connection: Connection) -> None:
+def answer_messages(connection):
     serve(connection, obey_message)
 
 
@@ -45,7 +43,7 @@ def is_alive(pid):
         return False
 
 
-def wait_for(what: Callable[[], bool]) -> bool:
+def wait_for(what):
     deadline = time.monotonic() + 60
     while not what() and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -61,24 +59,25 @@ def test_a_child_answers_and_exits_when_its_channel_is_closed():
     assert child.close() == ChildExit(0) == child.exit
 
 
-@pytest.mark.parametrize(
-    ("message", "words", "was_killed"),
-    [
-        ("leave", "the process ended with exit code 3", False),
-        ("kill", "the process died of signal 9 (Killed)", True),
-    ],
-)
-def test_a_child_that_ended_is_reported_with_its_exit_code_or_signal(message, words, was_killed):
+def test_a_child_that_ended_is_reported_with_its_exit_code():
+    """Told "leave", a child ends with exit code 3."""
     child = ChildProcess.spawn(answer_messages)
-    child.send("who")
-    child.receive()
-    if message == "kill":
-        os.kill(child.pid, signal.SIGKILL)
-    child.send(message)
+    child.send("leave")
+
     ended = child.receive()
 
-    assert (str(ended), ended.was_killed) == (words, was_killed)
+    assert (str(ended), ended.was_killed) == ("the process ended with exit code 3", False)
 
+
+def test_a_child_that_was_killed_is_reported_with_its_signal():
+    """Also when it is asked something more."""
+    child = ChildProcess.spawn(answer_messages)
+    os.kill(child.pid, signal.SIGKILL)
+    child.send("who")
+
+    ended = child.receive()
+
+    assert (str(ended), ended.was_killed) == ("the process died of signal 9 (Killed)", True)
     child.send("who")
     assert isinstance(child.receive(), ChildExit)
 
@@ -89,21 +88,27 @@ def test_closing_does_not_wait_for_a_child_that_the_kernel_cannot_end():
     Here `join` is `abs`, which fails without an argument.
     """
     stuck = SimpleNamespace(exitcode=None, kill=str, pid=2**30, join=abs, close=str)
-    assert ChildProcess(stuck, stuck).close() == ChildExit(None)  # type: ignore[arg-type]
+    assert ChildProcess(stuck, stuck).close() == ChildExit(None)
 
 
 def test_a_child_that_cannot_start_is_reported_with_what_would_help():
     """The limit of open files, 64 here, has been raised to at least 1,024 before that."""
-    resource.setrlimit(resource.RLIMIT_NOFILE, (64, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (64, hard))
+    too_many = OSError(errno.EMFILE, "Too many files")
+
     with (
-        patch.object(SpawnProcess, "start", side_effect=OSError(errno.EMFILE, "Too many files")),
+        patch.object(SpawnProcess, "start", side_effect=too_many),
         pytest.raises(RoboIRGError, match=r"be started: Too many files; use fewer workers, or"),
     ):
         ChildProcess.spawn(answer_messages)
-    assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] >= 1_024
+
+    soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    assert soft >= 1_024
 
 
 def test_a_process_that_a_child_has_started_ends_with_the_child():
+    """Told "group", a child starts a process and answers its number; told "ignore", it hangs."""
     child = ChildProcess.spawn(answer_messages)
     child.send("group")
     grandchild = child.receive()
@@ -115,18 +120,32 @@ def test_a_process_that_a_child_has_started_ends_with_the_child():
     assert wait_for(lambda: not is_alive(grandchild))
 
 
+END_DESCENDANTS_SEEN_AT_THE_SECOND_LOOK = """
+import os, subprocess
+from roboirg.util import process_guard
+child = subprocess.Popen(["sleep", "3600"], stdout=subprocess.DEVNULL, start_new_session=True)
+find = process_guard.descendants
+looks = []
+
+def nothing_at_first(pid):
+    looks.append(pid)
+    return find(pid) if len(looks) > 1 else []
+
+process_guard.descendants = nothing_at_first
+process_guard._end_descendants(2**30)
+print(child.pid)
+"""
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_the_guard_of_a_child_looks_again_until_no_descendant_is_left():
     """Its first look finds none, as if a process had just forked; the second finds `sleep`."""
-    script = (
-        "import subprocess\nfrom roboirg.util import process_guard\n"
-        "child = subprocess.Popen(['sleep', '3600'], stdout=-3, start_new_session=True)\n"
-        "looks = [process_guard.descendants, lambda pid: []]\n"
-        "process_guard.descendants = lambda pid: (looks.pop() if looks[1:] else looks[0])(pid)\n"
-        f"process_guard._end_descendants({2**30})\n"
-        "print(child.pid)\n"
+    ended = subprocess.run(
+        [sys.executable, "-c", END_DESCENDANTS_SEEN_AT_THE_SECOND_LOOK],
+        stdout=subprocess.PIPE,
+        check=True,
     )
-    ended = subprocess.run([sys.executable, "-c", script], stdout=subprocess.PIPE, check=True)
+
     assert not is_alive(int(ended.stdout))
 
 
@@ -136,7 +155,7 @@ def test_descendants_are_found_although_their_names_contain_brackets_and_line_en
     name = r"b'\xff) R 1\n(\xfe'"
     script = f"import ctypes; ctypes.CDLL(None).prctl(15, {name}); print(flush=True); input()"
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen([sys.executable, "-c", script], **pipes) as child:  # type: ignore[call-overload]
+    with subprocess.Popen([sys.executable, "-c", script], **pipes) as child:
         assert child.stdout.readline()
         assert child.pid in descendants(os.getpid())
         child.kill()
@@ -170,20 +189,27 @@ def square_root_but_for_7_and_9(number):
     return number**0.5
 
 
-def test_a_parallel_map_names_the_item_at_which_a_process_died_and_raises_its_exceptions():
-    """The function raises at 7 and ends its process at 9."""
-    assert dict(parallel_map(square_root_but_for_7_and_9, range(5), 3)) == {
-        n: n**0.5 for n in range(5)
-    }
+def test_a_parallel_map_yields_each_item_with_its_result():
+    found = parallel_map(square_root_but_for_7_and_9, [0, 1, 4, 16], 3)
+
+    assert dict(found) == {0: 0.0, 1: 1.0, 4: 2.0, 16: 4.0}
+
+
+def test_a_parallel_map_names_the_item_at_which_a_process_died():
     with pytest.raises(RoboIRGError, match="died at 9: the process ended with exit code 4"):
         list(parallel_map(square_root_but_for_7_and_9, [9], 2))
+
+
+def test_a_parallel_map_raises_an_exception_with_a_note_of_where_it_was_raised():
     with pytest.raises(ValueError, match="seven") as caught:
         list(parallel_map(square_root_but_for_7_and_9, [7], 1))
-    assert "in square_root_but_for_7_and_9" in caught.value.__notes__[0]  # where it was raised
+
+    assert "in square_root_but_for_7_and_9" in caught.value.__notes__[0]
 
 
 def test_a_parallel_map_that_is_closed_early_ends_its_processes():
     """Two of three sleep for an hour, so the test would not end."""
     found = parallel_map(time.sleep, [0.0, 3600.0, 3600.0], 2)
     assert next(found) == (0.0, None)
-    found.close()  # type: ignore[attr-defined]
+
+    found.close()

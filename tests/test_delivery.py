@@ -1,20 +1,12 @@
 """Instructions in turns: when each utterance is heard, and who can use it."""
 
-import itertools
-
 import pytest
 from plan_files import plan_file
 from typer.testing import CliRunner
 
 import roboirg
 from roboirg import language
-from roboirg.core.delivery import (
-    LATEST,
-    SPACING,
-    HeardUtterance,
-    SpokenInstruction,
-    utterance_steps,
-)
+from roboirg.core.delivery import HeardUtterance, SpokenInstruction, utterance_steps
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.settings import all_settings
@@ -27,25 +19,40 @@ from roboirg.tasks.splits.splits import get_episode
 
 def test_an_instruction_delivered_as_a_prompt_is_heard_whole_at_step_0():
     spoken = SpokenInstruction(("It is red.", "Take it."), "prompt")
+
     assert spoken.heard == [("It is red.", 0), ("Take it.", 0)]
     assert (spoken.prompt, spoken.unheard) == ("It is red. Take it.", 0)
 
+
+def test_a_prompt_stays_the_same_for_the_whole_episode():
+    spoken = SpokenInstruction(("It is red.", "Take it."), "prompt")
+
     spoken.hear(100)
-    assert len(spoken.heard) == 2
-    assert spoken.said_at(100) == spoken.prompt
+
+    assert spoken.heard == [("It is red.", 0), ("Take it.", 0)]
+    assert spoken.said_at(100) == "It is red. Take it."
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 9, 100])
-def test_utterances_in_turns_are_spaced_evenly_from_step_0_until_the_latest_step(count):
-    """SPACING steps lie between two, fewer if the last would be after step LATEST."""
-    steps = utterance_steps(count, "turns")
-    assert len(steps) == count
-    assert steps[0] == 0
-    assert list(steps) == sorted(steps)
-    assert steps[-1] == (0 if count == 1 else min((count - 1) * SPACING, LATEST))
-    assert all(late - early <= SPACING for early, late in itertools.pairwise(steps))
-    if count <= LATEST:
-        assert len(set(steps)) == count
+@pytest.mark.parametrize(
+    ("count", "steps"),
+    [
+        (1, (0,)),
+        (2, (0, 20)),
+        (3, (0, 20, 40)),
+        (5, (0, 10, 20, 30, 40)),
+        (9, (0, 5, 10, 15, 20, 25, 30, 35, 40)),
+    ],
+)
+def test_utterances_in_turns_are_spaced_evenly_from_step_0_until_the_latest_step(count, steps):
+    """They are 20 steps apart, one second, but no later than step 40."""
+    assert tuple(utterance_steps(count, "turns")) == steps
+
+
+def test_more_utterances_than_steps_are_said_in_order_until_the_latest_step():
+    steps = list(utterance_steps(100, "turns"))
+
+    assert steps == sorted(steps)
+    assert (steps[0], steps[-1], len(steps)) == (0, 40, 100)
 
 
 def test_an_utterance_is_heard_at_the_first_observation_after_it_was_said():
@@ -64,15 +71,15 @@ def test_an_utterance_is_heard_at_the_first_observation_after_it_was_said():
 
 def test_settings_declare_that_they_can_come_in_turns_if_they_have_several_utterances():
     """They do so by naming *delivery* among the options that they read."""
+    declared = {name for name, setting in all_settings().items() if "delivery" in setting.reads}
+
     several = set()
     for name in all_tasks():
-        for index in (0, 3):
-            episode = get_episode(name, "test", index)
-            for setting in language.expressible(episode):
-                if len(language.instruct(episode, setting).utterances) > 1:
-                    several.add(setting)
+        episode = get_episode(name, "test", 3)
+        for setting in language.expressible(episode):
+            if len(language.instruct(episode, setting).utterances) > 1:
+                several.add(setting)
 
-    declared = {name for name, setting in all_settings().items() if "delivery" in setting.reads}
     assert several == declared
 
 
@@ -115,32 +122,56 @@ class NotesInstructions:
         return [[*observation["joint_positions"], 1.0]] * 15
 
 
-@pytest.mark.sim
-def test_a_policy_in_an_episode_with_turns_hears_each_utterance_once_in_order():
-    env = roboirg.make(
-        "PickXtimes",
-        setting="contextual",
-        cameras=(),
-        observe_every=5,
-        max_steps=70,
-        delivery="turns",
-    )
-    turns = env.instruction.turns
+@pytest.fixture(scope="module")
+def played_in_turns():
+    """A policy after an episode of 70 steps, and its environment.
+
+    Five utterances are said at steps 0, 10, 20, 30 and 40, and observed every 15 steps.
+    """
+    options = {"setting": "contextual", "delivery": "turns", "max_steps": 70}
+    env = roboirg.make("PickXtimes", cameras=(), observe_every=5, **options)
     policy = NotesInstructions()
-    assert play(env, policy)["status"] == "timeout"
-    # Said at 0, 10, 20, 30 and 40; observed every 15 steps.
-    assert policy.told == list(zip(turns, (0, 15, 30, 30, 45), strict=True))
+    play(env, policy)
+    return policy, env
 
-    joined = f"{turns[2]} {turns[3]}"
-    assert policy.prompts == [turns[0], turns[1], joined, turns[4], turns[4]]
 
-    said = [0, 1, 1, 2, 2, 3, 3, 4, 4, 4, 4, 4]  # at 5, 10, ..., 60
-    assert policy.history == [turns[index] for index in said]
+@pytest.mark.sim
+def test_a_policy_in_an_episode_with_turns_hears_each_utterance_once_in_order(played_in_turns):
+    policy, env = played_in_turns
+    first, second, third, fourth, fifth = env.instruction.turns
 
-    first, info = env.reset()
-    assert first["instruction"] == turns[0]
-    assert info["heard"] == [{"text": turns[0], "step": 0}]
-    assert first in env.observation_space
+    assert policy.told == [(first, 0), (second, 15), (third, 30), (fourth, 30), (fifth, 45)]
+
+
+@pytest.mark.sim
+def test_the_instruction_of_an_observation_is_what_is_new_since_the_last_one(played_in_turns):
+    """At steps 0, 15, 30, 45 and 60."""
+    policy, env = played_in_turns
+    first, second, third, fourth, fifth = env.instruction.turns
+
+    assert policy.prompts == [first, second, f"{third} {fourth}", fifth, fifth]
+
+
+@pytest.mark.sim
+def test_the_history_has_what_was_said_last_at_each_of_its_steps(played_in_turns):
+    """At steps 5, 10, ..., 60."""
+    policy, env = played_in_turns
+
+    said = [env.instruction.turns.index(words) for words in policy.history]
+
+    assert said == [0, 1, 1, 2, 2, 3, 3, 4, 4, 4, 4, 4]
+
+
+@pytest.mark.sim
+def test_at_the_reset_of_an_episode_with_turns_the_first_utterance_is_heard():
+    env = roboirg.make("PickXtimes", setting="contextual", cameras=(), delivery="turns")
+
+    observation, info = env.reset()
+
+    first = env.instruction.turns[0]
+    assert observation in env.observation_space
+    assert observation["instruction"] == first
+    assert info["heard"] == [{"text": first, "step": 0}]
 
 
 @pytest.mark.sim
@@ -161,7 +192,8 @@ def test_an_utterance_that_would_come_after_the_end_of_the_episode_is_not_heard(
 def test_all_turns_of_a_stopcube_episode_come_before_its_earliest_press():
     """Else it could not be won in turns: here the button has to be pressed at step 60."""
     told = {"setting": "contextual", "delivery": "turns"}
-    env = roboirg.make("StopCube", episode=3, cameras=(), **told)  # press at step 60
+    env = roboirg.make("StopCube", episode=3, cameras=(), **told)
+
     assert play(env, make_policy("listener", 0))["status"] == "success"
 
 
@@ -173,10 +205,10 @@ def test_a_run_in_turns_records_the_step_of_each_utterance(tmp_path):
     assert result.exit_code == 0, result.output
 
     direct, explicit = read_records(tmp_path)
-    assert (explicit.outcome, direct.outcome) == ("success", "success")
     assert (explicit.options.delivery, direct.options.delivery) == ("prompt", "turns")
     assert [turn.step for turn in explicit.instruction] == [0]
-    assert [turn.step for turn in direct.instruction] == [0, SPACING]
-    assert direct.steps == explicit.steps + SPACING
+    assert [turn.step for turn in direct.instruction] == [0, 20]
+    assert direct.steps == explicit.steps + 20
     for record in (explicit, direct):
+        assert record.outcome == "success"
         assert (tmp_path / record.video).stat().st_size > 1000

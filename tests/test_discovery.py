@@ -36,7 +36,7 @@ def install_entry_points(monkeypatch):
     """Make entry points the only ones that are installed; they are found in any order."""
 
     def add(*loads):
-        entries = [EntryPoint(*load) for load in enumerate(loads)][::-1]
+        entries = [EntryPoint(number, load) for number, load in enumerate(loads)][::-1]
         monkeypatch.setattr(importlib.metadata, "entry_points", lambda *, group: entries)
 
     return add
@@ -51,15 +51,21 @@ def test_another_packages_entry_point_may_name_a_task_or_the_module_that_has_it(
     install_entry_points, thing
 ):
     """An entry point is a name under which an installed package offers something."""
+    own = discovery.discover_in_modules("roboirg.tasks", "TASK", Task)
     install_entry_points(lambda: thing, lambda: SECOND_TASK_OF_THE_LAB)
-    assert tasks_found()[-2:] == [TASK_OF_A_LAB, SECOND_TASK_OF_THE_LAB]
-    assert (
-        len(tasks_found()) == len(discovery.discover_in_modules("roboirg.tasks", "TASK", Task)) + 2
-    )
-    assert (
-        discovery.find_entry("outside-1", "TASK", Task, tasks.ENTRY_POINTS)
-        is SECOND_TASK_OF_THE_LAB
-    )
+
+    found = tasks_found()
+
+    assert found[-2:] == [TASK_OF_A_LAB, SECOND_TASK_OF_THE_LAB]
+    assert len(found) == len(own) + 2
+
+
+def test_an_entry_point_is_found_by_its_name(install_entry_points):
+    install_entry_points(lambda: TASK_OF_A_LAB, lambda: SECOND_TASK_OF_THE_LAB)
+
+    found = discovery.find_entry("outside-1", "TASK", Task, tasks.ENTRY_POINTS)
+
+    assert found is SECOND_TASK_OF_THE_LAB
 
 
 @pytest.mark.parametrize(
@@ -81,6 +87,7 @@ def test_a_bad_entry_point_is_one_sentence_that_names_its_package(
 ):
     get_task("BinFill")  # known before the entry points change
     install_entry_points(load, lambda: SECOND_TASK_OF_THE_LAB)
+
     with pytest.raises(InvalidValueError, match=sentence):
         tasks_found()
 

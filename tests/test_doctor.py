@@ -13,7 +13,7 @@ from roboirg.cli import doctor
 from roboirg.cli.doctor import Check
 
 
-def run_module(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+def run_module(*arguments, **environment):
     return subprocess.run(
         [sys.executable, "-m", "roboirg.cli.doctor", *arguments],
         env=os.environ | environment,
@@ -26,14 +26,16 @@ def run_module(*arguments: str, **environment: str) -> subprocess.CompletedProce
 
 @pytest.mark.sim
 def test_the_doctor_passes_all_checks_on_a_machine_with_everything():
+    """Of two cameras, so an even number; a picture that is not drawn anew would take no time."""
     text = doctor.report(doctor.run_checks(render_s=1))
+
     assert text.endswith("All checks passed.")
-    # Two cameras, so an even number; a picture that is not drawn anew would take no time.
     assert re.search(r"ok    1 s of pictures +\d*[02468] pictures in 1 s\n", text), text
 
 
 def test_without_vulkan_the_doctor_names_what_to_unset_or_install():
     result = run_module(VK_DRIVER_FILES="/nonexistent", VK_ICD_FILENAMES="/nonexistent")
+
     assert result.returncode == 1
     assert "not tried: no device" in result.stdout
     assert (
@@ -45,6 +47,7 @@ def test_without_vulkan_the_doctor_names_what_to_unset_or_install():
 @pytest.mark.sim
 def test_an_unknown_render_device_is_named_with_the_known_ones():
     result = run_module("--frame", ROBOIRG_RENDER_DEVICE="cuda:77")
+
     assert (result.returncode, result.stderr.count("\n")) == (1, 1), "no traceback"
     assert "'cuda:77' does not exist; set ROBOIRG_RENDER_DEVICE to one of " in result.stderr
 

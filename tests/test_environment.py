@@ -20,7 +20,6 @@ from roboirg.core.actions import ACTION_SPACES
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.core.instruction_options import OPTION_NAMES
-from roboirg.core.observations import PICTURE_SIZE
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.envs.env_settings import EnvOptions, EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
@@ -37,7 +36,6 @@ pytestmark = pytest.mark.sim
     ("task", "options"), [("ButtonUnmask", {}), ("VideoUnmask", {"observe_every": 1})]
 )
 def test_the_environment_passes_gymnasiums_own_checker(task, options):
-    # Drawing is tested elsewhere; the checker resets a dozen times.
     env = roboirg.make(task, setting="direct", cameras=(), **options)
     with warnings.catch_warnings():
         # Joint targets are in radians and positions in meters, not in [-1, 1].
@@ -45,71 +43,87 @@ def test_the_environment_passes_gymnasiums_own_checker(task, options):
         check_env(env)
 
 
-def test_observations_and_the_video_have_the_declared_shapes_and_show_what_they_should():
-    """VideoUnmask shows a video in which colored cubes are hidden below containers."""
+@pytest.fixture(scope="module")
+def reset_with_video():
+    """An environment that was reset, its first observation, and info.
+
+    The video shows that colored cubes are hidden below containers; every second moment is drawn.
+    """
     env = roboirg.make("VideoUnmask", setting="spatial", episode=1, demonstration_frames=2)
-    observation, info = env.reset()
+    return env, *env.reset()
+
+
+def test_the_first_observation_has_the_declared_shapes_and_the_words(reset_with_video):
+    env, observation, _ = reset_with_video
+
     assert observation in env.observation_space
-    assert observation["front_rgb"].shape == observation["wrist_rgb"].shape == (256, 256, 3)
+    assert observation["front_rgb"].shape == (256, 256, 3)
+    assert observation["wrist_rgb"].shape == (256, 256, 3)
     assert observation["instruction"] == env.instruction.text
-    assert info["demonstration"]["front_rgb"].shape == (33, 256, 256, 3)
-    assert info["demonstration"]["joint_positions"].shape == (66, 7)
+
+
+def test_the_video_has_all_states_and_the_pictures_that_were_wanted(reset_with_video):
+    """It has 66 steps, before a last one in which the robot goes home; every second is drawn."""
+    _, _, info = reset_with_video
+    video = info["demonstration"]
+
+    assert video["front_rgb"].shape == (33, 256, 256, 3)
+    assert video["joint_positions"].shape == (66, 7)
     assert info["elapsed_steps"] == 67
 
-    # The video shows colored cubes, then only containers; so does the first observation.
-    video = info["demonstration"]["front_rgb"].astype(int)
-    colored = (np.ptp(video, axis=-1) > 200).any(axis=(1, 2))
-    assert colored.tolist() == [True] * 16 + [False] * 17
-    assert not (np.ptp(observation["front_rgb"].astype(int), axis=-1) > 200).any()
 
-    observation, reward, terminated, truncated, info = env.step(HOME_ACTION)
-    assert observation in env.observation_space
-    assert (reward, terminated, truncated, info["steps"]) == (0.0, False, False, 1)
+def has_colored_pixel(pictures):
+    """Return for each picture whether red, green and blue of a pixel are far apart."""
+    return (np.ptp(pictures.astype(int), axis=-1) > 200).any(axis=(-2, -1)).tolist()
+
+
+def test_the_video_shows_colored_cubes_then_only_containers(reset_with_video):
+    """And so does the first observation. The containers appear after 32 steps."""
+    _, observation, info = reset_with_video
+
+    assert has_colored_pixel(info["demonstration"]["front_rgb"]) == [True] * 16 + [False] * 17
+    assert not has_colored_pixel(observation["front_rgb"])
 
 
 def test_depth_and_calibration_are_given_for_the_wanted_camera_alone():
     """Intrinsic and extrinsic matrices are of every step of the video, depth of every 33rd."""
     options = {"episode": 1, "cameras": ("front",), "demonstration_frames": 33}
+    plain, _ = roboirg.make("VideoUnmask", **options).reset()
     env = roboirg.make("VideoUnmask", depth=True, calibration=True, **options)
+
     observation, info = env.reset()
+
+    added = observation.keys() - plain.keys()
+    assert added == {"front_depth", "front_extrinsic", "front_intrinsic"}
     assert observation in env.observation_space
-
-    fields = {
-        "front_depth": ((PICTURE_SIZE, PICTURE_SIZE, 1), np.int16),
-        "front_extrinsic": ((3, 4), np.float32),
-        "front_intrinsic": ((3, 3), np.float32),
+    assert {key: (observation[key].shape, str(observation[key].dtype)) for key in added} == {
+        "front_depth": ((256, 256, 1), "int16"),
+        "front_extrinsic": ((3, 4), "float32"),
+        "front_intrinsic": ((3, 3), "float32"),
     }
-    for key, (shape, kind) in fields.items():
-        assert (observation[key].shape, observation[key].dtype) == (shape, kind)
-        video = info["demonstration"][key]
-        frames = 2 if key == "front_depth" else 66
-        assert (video.shape, video.dtype) == ((frames, *shape), kind)
-    assert not any(key.startswith("wrist") for key in observation)
-
-    plain = roboirg.make("VideoUnmask", **options).reset()[0]
-    assert set(observation) - set(plain) == set(fields)
+    assert {key: info["demonstration"][key].shape for key in added} == {
+        "front_depth": (2, 256, 256, 1),
+        "front_extrinsic": (66, 3, 4),
+        "front_intrinsic": (66, 3, 3),
+    }
     assert np.array_equal(plain["front_rgb"], observation["front_rgb"])
 
 
 def test_a_grounded_subgoal_points_at_the_pixel_of_its_object():
-    """A subgoal is the next act in words; *grounded* adds a pixel (row, column) of the front."""
-    env = roboirg.make("VideoUnmask", episode=1, cameras=(), grounded=True)
-    _, info = env.reset()
-    assert info["demonstration_subgoals"] == ["static"] * 66
+    """A subgoal is the next act in words; *grounded* adds a pixel (row, column) of the front.
 
-    container = env.episode.stages[0].points_at
-    color = env.episode.scene.hidden_in(container).color
-    assert info["subgoal"] == f"pick up the container that hides the {color} cube"
-    grounded = rf"pick up the container at <(\d+), (\d+)> that hides the {color} cube"
+    The container is at (-0.036, -0.085) m, with its center about 4 cm above the table, which the
+    front camera sees in row 90 and column 105.
+    """
+    env = roboirg.make("VideoUnmask", episode=1, cameras=(), grounded=True)
+
+    _, info = env.reset()
+
+    assert info["demonstration_subgoals"] == ["static"] * 66
+    assert info["subgoal"] == "pick up the container that hides the green cube"
+    grounded = r"pick up the container at <(\d+), (\d+)> that hides the green cube"
     row, column = map(int, re.fullmatch(grounded, info["grounded_subgoal"]).groups())
-    # Projected by hand; the center of a container is some 4 cm above the table.
-    x, y, _ = env.episode.scene[container].position
-    z = 0.04
-    distance = -0.44721 * x - 0.89443 * z + 0.49194
-    middle = PICTURE_SIZE / 2
-    expected_row = middle + middle * (0.89443 * x - 0.44721 * z - 0.08944) / distance
-    assert row == pytest.approx(expected_row, abs=6)
-    assert column == pytest.approx(middle + middle * y / distance, abs=6)
+    assert (row, column) == pytest.approx((90, 105), abs=6)
 
 
 def test_the_pixel_of_a_subgoal_stays_the_same_until_its_act_is_done():
@@ -119,43 +133,55 @@ def test_the_pixel_of_a_subgoal_stays_the_same_until_its_act_is_done():
     policy = make_policy("oracle", 0)
     policy.attach(env)
     policy.reset(env.instruction.text, info["demonstration"])
+    grounded = []
 
-    subgoals = {info["subgoal"]: {info["grounded_subgoal"]}}
     while info["status"] == "ongoing":
-        before = info
+        grounded.append(info["grounded_subgoal"])
         *_, info = env.step_chunk(policy.act({}))
-        subgoals.setdefault(info["subgoal"], set()).add(info["grounded_subgoal"])
 
     assert (info["status"], info["subgoal"]) == ("success", "All tasks completed")
-    assert info["grounded_subgoal"] == before["grounded_subgoal"]
-    assert len(subgoals) == len(env.episode.stages) + 1
-    assert all(len(grounded) == 1 for grounded in subgoals.values())
+    assert info["grounded_subgoal"] == grounded[-1]
+    assert len(set(grounded)) == len(env.episode.stages)
 
 
-def test_a_subgoal_changes_one_step_after_its_act_and_has_a_pixel_only_if_it_points():
-    """Acts that point at a thing are to pick it up, for instance; pressing a button need not."""
+@pytest.fixture(scope="module")
+def oracle_with_subgoals():
+    """The environment of an oracle's play, and the changes of its subgoals.
+
+    A change is the step, the subgoal, and the same with pixels.
+    """
     env = roboirg.make("PickXtimes", episode=1, cameras=(), grounded=True)
-    changes = []
+    changes = [(0, None, None)]
 
     def note(env, _demonstration):
         info = env._info()
-        pair = (info["subgoal"], info["grounded_subgoal"])
-        if not changes or changes[-1][1] != pair:
-            changes.append((env.session.world.elapsed, pair))
+        subgoals = (info["subgoal"], info["grounded_subgoal"])
+        if changes[-1][1:] != subgoals:
+            changes.append((env.session.world.elapsed, *subgoals))
 
     env.set_frame_hook(note)
+    assert play(env, make_policy("oracle", 0))["status"] == "success"
+    return env, changes[1:]
 
-    info = play(env, make_policy("oracle", 0))
 
-    assert info["status"] == "success"
-    steps = {}
-    for event in reversed(env.events):
-        steps[event.fact] = event.step  # at last the first
-    happened = [steps[stage.expects] for stage in env.episode.stages]
-    assert [step for step, _ in changes[1:-1]] == [step + 1 for step in happened[:-1]]
-    assert changes[-1][0] == happened[-1]
-    for stage, (_, (simple, grounded)) in zip(env.episode.stages, changes, strict=False):
-        assert re.sub(r"at <\d+, \d+> ?", "", grounded).strip() == simple
+def test_a_subgoal_changes_one_step_after_its_act_and_the_last_one_at_once(oracle_with_subgoals):
+    env, changes = oracle_with_subgoals
+    first_steps = {}
+    for event in env.events:
+        first_steps.setdefault(event.fact, event.step)
+    *acts, last_act = [first_steps[stage.expects] for stage in env.episode.stages]
+
+    _, *steps, last_step = [step for step, _, _ in changes]
+
+    assert steps == [step + 1 for step in acts]
+    assert last_step == last_act
+
+
+def test_a_subgoal_has_a_pixel_only_if_it_points(oracle_with_subgoals):
+    """Acts that point at a thing are to pick it up, for instance; to put it down need not."""
+    env, changes = oracle_with_subgoals
+    for stage, (_, subgoal, grounded) in zip(env.episode.stages, changes, strict=False):
+        assert re.sub(r"at <\d+, \d+> ?", "", grounded).strip() == subgoal
         assert ("<" in grounded) == (stage.points_at is not None)
 
 
@@ -201,12 +227,14 @@ def test_a_policy_is_not_played_in_an_environment_without_the_depth_or_calibrati
         play(roboirg.make("PickXtimes", cameras=()), policy)
 
 
-def test_a_run_makes_the_environment_with_the_action_space_that_the_policy_declares():
+@pytest.mark.parametrize("actions", ACTION_SPACES)
+def test_a_run_makes_the_environment_with_the_action_space_that_the_policy_declares(actions):
     job = job_of(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
-    for space in ACTION_SPACES.values():
-        env = make_env(PreparedJob(job), PolicyNeeds(cameras=(), actions=space.name))
-        assert env.actions == space.name
-        assert np.array_equal(env.action_space.low, space.low)
+
+    env = make_env(PreparedJob(job), PolicyNeeds(cameras=(), actions=actions))
+
+    assert env.actions == actions
+    assert np.array_equal(env.action_space.low, ACTION_SPACES[actions].low)
 
 
 def test_a_task_without_a_video_has_a_demonstration_of_no_frames():
@@ -225,58 +253,65 @@ def test_a_task_without_a_video_has_a_demonstration_of_no_frames():
 
 
 def test_the_frame_hook_is_called_every_eighth_step_and_at_the_end():
-    """The first 66 steps are the video."""
-    env = roboirg.make("VideoUnmask", cameras=())
+    """With the environment, and whether the step is of the video, as the first 66 are."""
+    env = roboirg.make("VideoUnmask", cameras=(), max_steps=14)
     calls = []
-    env.set_frame_hook(
-        lambda env, demonstration: calls.append((env.session.world.elapsed, demonstration)), every=8
-    )
-    info = play(env, make_policy("oracle", 0))
-    last = info["elapsed_steps"]
-    expected = [step for step in range(1, last + 1) if step % 8 == 0 or step == last]
 
-    assert [step for step, _ in calls] == expected
-    assert [demonstration for step, demonstration in calls] == [step <= 66 for step in expected]
+    def note(env, is_demonstration):
+        calls.append((env.session.world.elapsed, is_demonstration))
+
+    env.set_frame_hook(note, every=8)
+    play(env, make_policy("oracle", 0))
+
+    assert [step for step, _ in calls] == [8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 81]
+    assert [step for step, is_demonstration in calls if not is_demonstration] == [72, 80, 81]
 
 
-def test_a_chunk_of_actions_does_what_its_rows_do_one_by_one_and_stops_at_the_end():
-    """It keeps every fourth observation as history. The limit is 25 steps of 27 actions."""
-    rng = np.random.default_rng(0)
-    noise = np.append(rng.normal(0, 0.1, (27, 7)), rng.normal(0, 1, (27, 1)), 1)
-    actions = HOME_ACTION + noise
-    options = {"cameras": ("wrist",), "depth": True, "max_steps": 25}
-    single = roboirg.make("PickXtimes", **options)
-    single.reset()
-    steps = {step: single.step(action) for step, action in enumerate(actions[:25], 1)}
-    env = roboirg.make("PickXtimes", **options, observe_every=4)
-    first, _ = env.reset()
-    assert first["history"] == ()
-
-    for rows, kept in (
-        (actions[:3], []),
-        (actions[3:10], [4, 8]),
-        (actions[10:20], [12, 16, 20]),
-        (actions[20:], [24]),
-    ):
-        observation, *ended, info = env.step_chunk(rows)
-
-        assert observation in env.observation_space
-        _, *ended_alone, info_alone = steps[info["steps"]]
-        assert (ended, info["status"]) == (ended_alone, info_alone["status"])
-        last = dict(observation)
-        history = last.pop("history")
-        assert len(history) == len(kept)
-        for seen, step in zip((*history, last), (*kept, info["steps"]), strict=True):
-            check_same_observation(seen, steps[step][0])
-    assert ended == [0.0, False, True]
-    assert info["status"] == "timeout"
-    assert env.events == single.events
+ACTIONS = HOME_ACTION + np.random.default_rng(0).normal(0, 0.1, (27, 8))
 
 
 def check_same_observation(seen, expected):
     assert list(seen) == list(expected)
     for key, value in expected.items():
         assert np.array_equal(seen[key], value), key
+
+
+@pytest.fixture(scope="module")
+def single_steps():
+    """What an environment returns for each of 25 actions, when time is up, by step from 1 on."""
+    env = roboirg.make("PickXtimes", cameras=("wrist",), depth=True, max_steps=25)
+    env.reset()
+    return {step: env.step(action) for step, action in enumerate(ACTIONS[:25], 1)}
+
+
+def test_a_chunk_of_actions_does_what_its_rows_do_one_by_one_and_stops_at_the_end(single_steps):
+    """The limit is 25 steps, and the last chunk has two actions more."""
+    env = roboirg.make("PickXtimes", cameras=("wrist",), depth=True, max_steps=25)
+    env.reset()
+    for begin, end in ((0, 3), (3, 10), (10, 20), (20, 27)):
+        observation, *ended, info = env.step_chunk(ACTIONS[begin:end])
+
+        expected, *expected_end, expected_info = single_steps[min(end, 25)]
+        check_same_observation(observation, expected)
+        assert ended == expected_end
+        assert (info["steps"], info["status"]) == (min(end, 25), expected_info["status"])
+    assert info["status"] == "timeout"
+
+
+def test_the_history_of_a_chunk_has_every_fourth_observation(single_steps):
+    """The chunk takes the steps 4 to 12."""
+    env = roboirg.make("PickXtimes", cameras=("wrist",), depth=True, observe_every=4)
+    first, _ = env.reset()
+    env.step_chunk(ACTIONS[:3])
+
+    observation, *_ = env.step_chunk(ACTIONS[3:12])
+
+    assert first["history"] == ()
+    assert observation in env.observation_space
+    fourth, eighth, twelfth = observation["history"]
+    check_same_observation(fourth, single_steps[4][0])
+    check_same_observation(eighth, single_steps[8][0])
+    check_same_observation(twelfth, single_steps[12][0])
 
 
 def test_the_history_of_a_chunk_has_the_words_of_each_of_its_moments():
@@ -297,9 +332,12 @@ def test_the_history_of_a_chunk_draws_only_the_cameras_it_was_asked_for(monkeypa
     """Of 20 steps the 8th and 16th from the front, then both cameras at the end."""
     drawn = []
     picture = Cameras.picture
-    monkeypatch.setattr(
-        Cameras, "picture", lambda self, name: drawn.append(name) or picture(self, name)
-    )
+
+    def noted(self, name):
+        drawn.append(name)
+        return picture(self, name)
+
+    monkeypatch.setattr(Cameras, "picture", noted)
     env = roboirg.make("PickXtimes", observe_every=8, history_cameras=("front",))
     env.reset()
     drawn.clear()
@@ -328,64 +366,60 @@ class NeedsHistory:
         return np.tile(HOME_ACTION, (7, 1))
 
 
+def test_a_policy_is_not_played_in_an_environment_without_the_history_it_needs():
+    env = roboirg.make("PickXtimes", cameras=(), demonstration_frames="none")
+
+    with pytest.raises(InvalidValueError, match=r"needs observe_every=5, but .* has None"):
+        play(env, NeedsHistory())
+
+
 def test_a_policy_gets_the_history_and_the_video_that_it_declares():
     """Every 5th step of chunks of 7: none at the reset, then step 5, then step 10."""
     policy = NeedsHistory()
-    wrong = roboirg.make("PickXtimes", cameras=(), demonstration_frames="none")
-    with pytest.raises(InvalidValueError, match=r"needs observe_every=5, but .* has None"):
-        play(wrong, policy)
-
-    name = f"{__name__}:NeedsHistory"
-    job = job_of(policy=name, task="PickXtimes", split="test", episode=2, setting="direct")
-    env = make_env(
-        PreparedJob(job), PolicyNeeds(cameras=(), demonstration_frames="none", observe_every=5)
-    )
+    job = job_of(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
+    needs = PolicyNeeds(cameras=(), demonstration_frames="none", observe_every=5)
+    env = make_env(PreparedJob(job), needs)
     env.max_steps = 20
+
     play(env, policy)
 
     assert policy.seen == [3, 0, 1, 1]
 
 
-def test_a_reset_with_another_setting_changes_the_words_for_that_episode_alone():
-    env = roboirg.make("PickXtimes", cameras=())
-    said = env.instruction
-    env.reset()
-    assert env.instruction is said
-
-    env.reset(options={"setting": "direct"})
-    assert env.instruction.setting == "direct"
-
-    env.reset()
-    assert env.instruction == said
-
-
 def test_the_tools_angles_in_observations_do_not_jump_by_a_full_turn():
     """The wrist swings through half a turn, where an angle would go from 180° to -180°."""
     env = roboirg.make("PickXtimes", cameras=())
-    observation, _ = env.reset()
-    angles = [observation["end_effector"][3:]]
+    env.reset()
+    angles = []
     action = HOME_ACTION.copy()
 
     for step in range(60):
         action[6] = HOME_ACTION[6] + 1.5 * np.sin(step / 10)
         action[4] = 0.05 * np.cos(step / 3)
-        angles.append(env.step(action)[0]["end_effector"][3:])
+        observation, *_ = env.step(action)
+        angles.append(observation["end_effector"][3:])
 
     assert np.abs(np.diff(angles, axis=0)).max() < 0.5
 
 
 def test_closing_an_environment_frees_its_world():
     """Would find a reference that keeps the memory of every episode."""
-    env = roboirg.make("VideoUnmask", cameras=(), max_steps=60)
-    policy = make_policy("oracle", 0)
-    assert play(env, policy)["status"] == "timeout"
+    env = roboirg.make("VideoUnmask", cameras=(), max_steps=10)
+    play(env, make_policy("oracle", 0))
+    world = weakref.ref(env.session.world)
+
+    env.close()
+
+    assert world() is None
+
+
+def test_a_step_after_the_end_of_an_episode_asks_for_a_reset():
+    env = roboirg.make("PickXtimes", cameras=(), max_steps=1)
+    env.reset()
+    env.step(HOME_ACTION)
+
     with pytest.raises(gymnasium.error.ResetNeeded, match="timeout"):
         env.step(HOME_ACTION)
-
-    world = weakref.ref(env.session.world)
-    env.close()
-    del policy
-    assert world() is None
 
 
 @pytest.mark.parametrize(
@@ -396,15 +430,14 @@ def test_closing_an_environment_frees_its_world():
         ({"split": "dev"}, "split"),
         ({"cameras": ("side",)}, "camera"),
         ({"episode": 50}, "episodes 0 to 49"),
-        *(({"max_steps": wrong}, f"max_steps is {wrong!r}") for wrong in (0, 2.5, "3", None)),
+        ({"max_steps": 0}, "max_steps is 0"),
+        ({"max_steps": "3"}, "max_steps is '3'"),
         ({"actions": "pose"}, "no action space 'pose'.*ee_pose"),
         ({"cameras": (), "depth": True}, "depth is True, but cameras is"),
         ({"depth": 1}, "depth is 1; it must be True or False"),
-        *(
-            ({"demonstration_frames": wrong}, f"demonstration_frames is {wrong!r}")
-            for wrong in (0, 1.5, True, "every", None)
-        ),
-        *(({"observe_every": wrong}, f"observe_every is {wrong!r}") for wrong in (0, 1.5, True)),
+        ({"demonstration_frames": "every"}, "demonstration_frames is 'every'"),
+        ({"demonstration_frames": 1.5}, "demonstration_frames is 1.5"),
+        ({"observe_every": True}, "observe_every is True"),
         ({"cameras": "front"}, r"cameras is .*\('front',\)"),
         ({"cameras": ("front",), "history_cameras": ("wrist",)}, "'wrist', but cameras is"),
     ],
@@ -414,38 +447,41 @@ def test_make_refuses_wrong_names_and_numbers_before_anything_is_built(options, 
         roboirg.make(**{"task": "PickXtimes", **options})
 
 
-PROGRAM_WITHOUT_VULKAN = """
-import sys, roboirg
-print(roboirg.make("PickXtimes", cameras=()).reset()[1]["status"])
-try:
-    roboirg.make("PickXtimes").reset()
-finally:
-    print(sorted({"torch", "mani_skill", "mplib"} & set(sys.modules)))
-"""
-PROGRAM_WITHOUT_GYMNASIUM = """
-import sys; sys.modules["gymnasium"] = None
-import roboirg, roboirg.language, roboirg.judging, roboirg.tasks.splits.splits
-roboirg.make("PickXtimes")
-"""
-
-
-@pytest.mark.parametrize(
-    ("code", "printed", "complaint"),
-    [
-        (PROGRAM_WITHOUT_VULKAN, "ongoing\n[]\n", "mesa-vulkan-drivers"),
-        (PROGRAM_WITHOUT_GYMNASIUM, "", "[sim]'"),
-    ],
-)
-def test_without_vulkan_or_gymnasium_the_error_names_what_to_install(code, printed, complaint):
-    """Without Vulkan an episode without cameras still begins ("ongoing")."""
+def run_without_vulkan(program):
+    """Run a program in a process that finds no driver for drawing."""
     missing = {"VK_DRIVER_FILES": "/nonexistent", "VK_ICD_FILENAMES": "/nonexistent"}
-    done = subprocess.run(
-        [sys.executable, "-c", code],
+    return subprocess.run(
+        [sys.executable, "-c", program],
         capture_output=True,
         text=True,
         check=False,
         env={**os.environ, **missing},
     )
 
-    assert (done.returncode, done.stdout) == (1, printed)
-    assert complaint in done.stderr.strip().splitlines()[-1]
+
+def test_without_vulkan_an_episode_with_cameras_ends_with_what_to_install():
+    done = run_without_vulkan("import roboirg; roboirg.make('PickXtimes').reset()")
+
+    assert done.returncode == 1
+    assert "mesa-vulkan-drivers" in done.stderr.splitlines()[-1]
+
+
+def test_without_vulkan_an_episode_without_cameras_begins_and_loads_no_large_library():
+    done = run_without_vulkan(
+        "import sys, roboirg\n"
+        "print(roboirg.make('PickXtimes', cameras=()).reset()[1]['status'])\n"
+        "print({'torch', 'mani_skill', 'mplib'} & set(sys.modules))\n"
+    )
+
+    assert done.stdout == "ongoing\nset()\n", done.stderr
+
+
+def test_without_gymnasium_the_package_loads_and_make_names_what_to_install():
+    done = run_without_vulkan(
+        "import sys; sys.modules['gymnasium'] = None\n"
+        "import roboirg, roboirg.language, roboirg.judging, roboirg.tasks.splits.splits\n"
+        "roboirg.make('PickXtimes')\n"
+    )
+
+    assert done.returncode == 1
+    assert "[sim]'" in done.stderr.splitlines()[-1]

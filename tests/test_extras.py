@@ -15,13 +15,14 @@ from roboirg.core.extras import extra_needed, install_command
 ROOT = Path(__file__).parents[1]
 
 
-def test_from_a_checkout_the_install_command_names_its_folder(monkeypatch, tmp_path):
+@pytest.mark.parametrize(
+    ("folder", "named"), [(ROOT, "."), (ROOT / "docs", ROOT)], ids=["there", "elsewhere"]
+)
+def test_from_a_checkout_the_install_command_names_its_folder(monkeypatch, folder, named):
     """A dot if that is the working directory."""
-    monkeypatch.chdir(tmp_path)
-    assert install_command("sim").endswith(f"install -e '{ROOT}[sim]'")
+    monkeypatch.chdir(folder)
 
-    monkeypatch.chdir(ROOT)
-    assert install_command("sim").endswith("install -e '.[sim]'")
+    assert install_command("sim").endswith(f"install -e '{named}[sim]'")
 
 
 @pytest.mark.parametrize(
@@ -62,17 +63,19 @@ def test_the_install_command_calls_pip_by_its_python_if_the_pip_on_the_path_is_a
     assert install_command("sim").startswith("pip install ")
 
 
-def test_a_library_that_is_installed_but_cannot_be_loaded_is_not_called_missing():
-    """As OpenCV without the system's libGL; then `roboirg doctor` helps, not pip."""
+def test_a_library_that_is_missing_is_said_not_to_be_installed():
     with (
         pytest.raises(MissingDependencyError, match=r"is not installed .*nowhere_at_all"),
         extra_needed("This needs it", "sim"),
     ):
         import nowhere_at_all  # noqa: F401
+
+
+def test_a_library_that_is_installed_but_cannot_be_loaded_is_not_called_missing():
+    """As OpenCV without the system's libGL; then `roboirg doctor` helps, not pip."""
+    reason = r"cannot be loaded .*libGL.*then roboirg doctor"
     with (
-        pytest.raises(
-            MissingDependencyError, match=r"cannot be loaded .*libGL.*then roboirg doctor"
-        ),
+        pytest.raises(MissingDependencyError, match=reason),
         extra_needed("This needs it", "sim"),
     ):
         raise ImportError("libGL.so.1: cannot open shared object file")

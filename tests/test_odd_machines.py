@@ -16,13 +16,6 @@ from roboirg.util.child_process import ChildProcess
 from roboirg.util.proxies import proxy_of
 from roboirg.util.user_folders import temporary_folder, user_folder
 
-PROXIES = {
-    "http_proxy": "http://user:secret@proxy:9",
-    "HTTPS_PROXY": "proxy:8",
-    "ALL_PROXY": "https://[::1]:7",
-    "NO_PROXY": ".lab,10.0.0.1,fd00::1",
-}
-
 
 @pytest.fixture
 def environment_without_proxies(monkeypatch):
@@ -32,40 +25,68 @@ def environment_without_proxies(monkeypatch):
     return monkeypatch
 
 
+@pytest.fixture
+def _environment_with_proxies(environment_without_proxies):
+    environment_without_proxies.setenv("http_proxy", "http://user:secret@proxy:9")
+    environment_without_proxies.setenv("HTTPS_PROXY", "proxy:8")
+    environment_without_proxies.setenv("ALL_PROXY", "https://[::1]:7")
+    environment_without_proxies.setenv("NO_PROXY", ".lab,10.0.0.1,fd00::1")
+
+
+@pytest.mark.usefixtures("_environment_with_proxies")
 @pytest.mark.parametrize(
-    ("url", "named"),
+    ("url", "proxy"),
     [
-        ("http://models.org/v1", " through the proxy http://proxy:9 of http_proxy"),
-        ("https://models.org", " through the proxy http://proxy:8 of HTTPS_PROXY"),
-        ("ftp://models.org", " through the proxy https://[::1]:7 of ALL_PROXY"),
-        ("http://localhost.org", " through the proxy http://proxy:9 of http_proxy"),
-        *((f"http://{it}:1/v1", "") for it in ("localhost", "127.0.0.1", "127.1.2.3", "[::1]")),
-        *((f"http://{it}", "") for it in ("localhost.", "0.0.0.0:1", "[::ffff:127.0.0.1]", "[::]")),
-        *((f"http://{it}", "") for it in ("a.lab:80", "10.0.0.1", "[fd00::1]:80")),
+        ("http://models.org/v1", "http://proxy:9 of http_proxy"),
+        ("https://models.org", "http://proxy:8 of HTTPS_PROXY"),
+        ("ftp://models.org", "https://[::1]:7 of ALL_PROXY"),
+        ("http://localhost.org", "http://proxy:9 of http_proxy"),
     ],
 )
-def test_the_proxy_of_an_address_is_named_without_its_password_and_local_ones_have_none(
-    environment_without_proxies, url, named
-):
-    for name, value in PROXIES.items():
-        environment_without_proxies.setenv(name, value)
-    assert proxy_of(url).words == named
+def test_the_proxy_of_an_address_is_named_with_its_variable_and_without_its_password(url, proxy):
+    """Only what NO_PROXY lists, .lab, 10.0.0.1 and fd00::1, and this machine have none."""
+    assert proxy_of(url).words == f" through the proxy {proxy}"
+
+
+@pytest.mark.usefixtures("_environment_with_proxies")
+@pytest.mark.parametrize(
+    "host",
+    ["localhost", "127.1.2.3", "[::1]", "localhost.", "[::ffff:127.0.0.1]", "[::]"],
+)
+def test_an_address_of_this_machine_has_no_proxy(host):
+    assert proxy_of(f"http://{host}:1/v1").words == ""
+
+
+@pytest.mark.usefixtures("_environment_with_proxies")
+@pytest.mark.parametrize("host", ["a.lab:80", "10.0.0.1", "[fd00::1]:80"])
+def test_an_address_that_no_proxy_lists_has_no_proxy(host):
+    assert proxy_of(f"http://{host}").words == ""
 
 
 @pytest.mark.parametrize(
-    ("proxy", "secret"),
+    ("given", "shown"),
     [
-        *((proxy, "secret") for proxy in ("socks5://h:1", "socks://h:1", "http://h:1x")),
-        *(("http://h:1", f"sec{mark}ret") for mark in "/?#\n "),
+        ("socks5://u:secret@h:1", "socks5://h:1"),
+        ("socks://u:secret@h:1", "socks://h:1"),
+        ("http://u:secret@h:1x", "http://h:1x"),
+        ("http://u:sec/ret@h:1", "http://h:1"),
+        ("http://u:sec\nret@h:1", "http://h:1"),
     ],
 )
 def test_a_proxy_that_cannot_be_used_is_refused_without_printing_its_password(
-    environment_without_proxies, proxy, secret
+    environment_without_proxies, given, shown
 ):
-    environment_without_proxies.setenv("ALL_PROXY", proxy.replace("h:", f"u:{secret}@h:"))
+    environment_without_proxies.setenv("ALL_PROXY", given)
     environment_without_proxies.setitem(sys.modules, "socksio", None)
-    with pytest.raises(MissingDependencyError, match=f"proxy {proxy} of ALL_PROXY cannot be used"):
+
+    with pytest.raises(MissingDependencyError, match=f"proxy {shown} of ALL_PROXY cannot be used"):
         make_model(ModelOptions(model="m", base_url="http://models.org/v1"))
+
+
+def test_a_proxy_that_cannot_be_used_is_no_hindrance_to_a_model_on_this_machine(
+    environment_without_proxies,
+):
+    environment_without_proxies.setenv("ALL_PROXY", "http://h:1x")
 
     make_model(ModelOptions(model="m", base_url="http://127.0.0.1:8/v1"))
 
@@ -123,29 +144,37 @@ def test_a_worker_is_watched_without_shared_memory(monkeypatch, has_memory):
 def test_a_character_that_the_terminal_cannot_show_is_printed_as_a_question_mark(
     monkeypatch, encoding, shown
 ):
-    monkeypatch.setattr(sys, "stdout", out := io.TextIOWrapper(io.BytesIO(), encoding))
-    monkeypatch.setattr(cli, "app", lambda **_: out.write("≠"))
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding)
+    monkeypatch.setattr(sys, "stdout", terminal)
+    monkeypatch.setattr(cli, "app", lambda **_: terminal.write("≠"))
+
     with pytest.raises(SystemExit):
         cli.main()
 
-    out.flush()
-    assert out.buffer.getvalue() == shown
+    terminal.flush()
+    assert terminal.buffer.getvalue() == shown
 
 
-def test_the_doctor_names_a_missing_temporary_folder_a_wrong_cache_path_and_proxies(
-    environment_without_proxies, tmp_path
-):
-    environment_without_proxies.setattr("tempfile.tempdir", str(tmp_path / "gone"))
-    environment_without_proxies.setenv("ROBOIRG_CACHE", "~nobody-here/x")
+def test_the_doctor_names_a_missing_temporary_folder(monkeypatch, tmp_path):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "gone"))
+
+    files = doctor._check_files()[1]
+
+    assert (files.ok, files.found) == (False, "No such file or directory")
+
+
+def test_the_doctor_names_a_wrong_path_of_the_cache(monkeypatch):
+    monkeypatch.setenv("ROBOIRG_CACHE", "~nobody-here/x")
+
+    cache = doctor._check_files()[2]
+
+    reason = "ROBOIRG_CACHE is '~nobody-here/x', but there is no such home"
+    assert (cache.ok, cache.found, cache.remedy) == (False, reason, "write the whole path.")
+
+
+def test_the_doctor_names_proxies(environment_without_proxies):
     environment_without_proxies.setenv("http_proxy", "http://a:b@h:1")
-    _, files, cache, _, proxies = doctor._check_files()
 
-    assert (files.ok, files.found, cache.ok) == (False, "No such file or directory", False)
-    assert (cache.found, cache.remedy) == (
-        "ROBOIRG_CACHE is '~nobody-here/x', but there is no such home",
-        "write the whole path.",
-    )
+    proxies = doctor._check_files()[-1]
+
     assert proxies == Check("proxies", True, "through the proxy http://h:1 of http_proxy")
-
-    environment_without_proxies.setenv("http_proxy", "socks://h:1")
-    assert doctor._check_files()[-1].ok

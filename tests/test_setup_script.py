@@ -23,19 +23,8 @@ Suites: bookworm
 Components: main
 """
 
-SOURCE_WITH_A_KEY_INSIDE = """\
-Types: deb
-URIs: http://mirror.example/ubuntu
-Suites: noble
-Components: main
-Signed-By:
- -----BEGIN PGP PUBLIC KEY BLOCK-----
- .
- abc=
-"""
 
-
-def bash(code: str, apt_dir: Path | None = None) -> subprocess.CompletedProcess[str]:
+def bash(code, apt_dir=None):
     environment = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}
     if apt_dir is not None:
         environment["ROBOIRG_APT_DIR"] = str(apt_dir)
@@ -83,7 +72,14 @@ def test_backports_use_the_mirror_and_key_of_a_deb822_source(apt_dir):
 
 
 def test_a_key_inside_the_source_is_kept_as_it_is(apt_dir):
-    (apt_dir / "sources.list.d" / "ubuntu.sources").write_text(SOURCE_WITH_A_KEY_INSIDE)
+    (apt_dir / "sources.list.d" / "ubuntu.sources").write_text(
+        "Types: deb\n"
+        "URIs: http://mirror.example/ubuntu\n"
+        "Suites: noble\n"
+        "Components: main\n"
+        "Signed-By:\n -----BEGIN PGP PUBLIC KEY BLOCK-----\n .\n abc=\n"
+    )
+
     source = bash("backports_source noble", apt_dir).stdout
 
     assert "Suites: noble-backports\n" in source
@@ -91,20 +87,21 @@ def test_a_key_inside_the_source_is_kept_as_it_is(apt_dir):
 
 
 @pytest.mark.parametrize(
-    ("line", "key"),
+    ("options", "key"),
     [
-        ("deb http://mirror.example/debian bookworm main", ""),
-        ("deb [arch=amd64 signed-by=/k.gpg] http://mirror.example/debian bookworm main", "/k.gpg"),
-        (
-            "deb [ signed-by=/k.gpg arch=amd64 ] http://mirror.example/debian bookworm main",
-            "/k.gpg",
-        ),
+        ("", ""),
+        ("[arch=amd64 signed-by=/k.gpg] ", "/k.gpg"),
+        ("[ signed-by=/k.gpg arch=amd64 ] ", "/k.gpg"),
     ],
 )
-def test_backports_use_the_mirror_and_key_of_a_one_line_source(apt_dir, line, key):
-    security = "deb http://security.example/debian bookworm-security main"
-    source_line = "deb-src http://source.example/debian bookworm main"
-    (apt_dir / "sources.list").write_text(f"# deb no\n{source_line}\n{security}\n{line} # why\n")
+def test_backports_use_the_mirror_and_key_of_a_one_line_source(apt_dir, options, key):
+    """But not those of source packages or of security updates."""
+    (apt_dir / "sources.list").write_text(
+        "# deb no\n"
+        "deb-src http://source.example/debian bookworm main\n"
+        "deb http://security.example/debian bookworm-security main\n"
+        f"deb {options}http://mirror.example/debian bookworm main # why\n"
+    )
 
     source = bash("backports_source bookworm", apt_dir).stdout
 
@@ -121,11 +118,17 @@ def test_source_files_that_apt_ignores_give_no_mirror(apt_dir):
     assert bash("backports_source bookworm", apt_dir).returncode == 1
 
 
+def administrator_commands(apt_dir, mesa, packages):
+    """Return the commands to install packages, where apt would install some version of Mesa."""
+    fakes = f"mesa_candidate() {{ echo {mesa}; }}; distribution_codename() {{ echo bookworm; }}; "
+    code = f"administrator_commands ${{{packages}_PACKAGES[*]}}"
+    return bash(fakes + code, apt_dir).stdout
+
+
 def test_commands_for_the_administrator_add_backports_if_mesa_is_too_old(apt_dir):
     (apt_dir / "sources.list.d" / "debian.sources").write_text(SOURCE_IN_DEB822_FORMAT)
-    fakes = "mesa_candidate() { echo 22.3.6-1; }; distribution_codename() { echo bookworm; }; "
 
-    commands = bash(fakes + "administrator_commands ${VULKAN_PACKAGES[*]}", apt_dir).stdout
+    commands = administrator_commands(apt_dir, "22.3.6-1", "VULKAN")
 
     assert commands.startswith(f"cat > {apt_dir}/sources.list.d/roboirg-backports.sources <<'END'")
     assert commands.endswith(
@@ -138,15 +141,16 @@ def test_commands_for_the_administrator_add_backports_if_mesa_is_too_old(apt_dir
     ("mesa", "packages", "names"),
     [
         ("25.0.7-2", "VULKAN", "mesa-vulkan-drivers libvulkan1 libegl1"),
-        ("22.3.6-1", "OPENCV", "libgl1 libglib2.0-0"),  # which needs no newer Mesa
+        ("22.3.6-1", "OPENCV", "libgl1 libglib2.0-0"),
     ],
 )
 def test_commands_for_the_administrator_add_no_backports_without_need(
     apt_dir, mesa, packages, names
 ):
-    code = f"mesa_candidate() {{ echo {mesa}; }}; "
-    code += f"administrator_commands ${{{packages}_PACKAGES[*]}}"
-    assert bash(code, apt_dir).stdout == f"apt-get update\napt-get install {names}\n"
+    """OpenCV needs no newer Mesa."""
+    commands = administrator_commands(apt_dir, mesa, packages)
+
+    assert commands == f"apt-get update\napt-get install {names}\n"
 
 
 FUNCTIONS_THAT_INSTALL_NOTHING = """
@@ -171,7 +175,7 @@ def checkout(tmp_path):
     return tmp_path
 
 
-def extras_installed_by(checkout: Path, words: str = "") -> list[str]:
+def extras_installed_by(checkout, words=""):
     """Set the checkout up; return which sets of extras were installed."""
     done = subprocess.run(
         ["bash", "-c", f"source scripts/setup; {FUNCTIONS_THAT_INSTALL_NOTHING} main {words}"],
@@ -183,13 +187,22 @@ def extras_installed_by(checkout: Path, words: str = "") -> list[str]:
     return [line.partition("installing ")[2] for line in done.stdout.splitlines() if "[" in line]
 
 
-def test_setup_dev_adds_the_packages_of_developers_once(checkout):
-    """[] is nothing to install: setup was run before with as much or more."""
+def test_setup_installs_the_extras_of_users_once(checkout):
     assert extras_installed_by(checkout) == ["[sim,report]"]
     assert extras_installed_by(checkout) == []
+
+
+def test_setup_dev_adds_the_packages_of_developers_once(checkout):
+    extras_installed_by(checkout)
+
     assert extras_installed_by(checkout, "dev") == ["[sim,report,dev]"]
     assert extras_installed_by(checkout, "dev") == []
-    assert extras_installed_by(checkout) == []  # what developers have is enough
+
+
+def test_setup_installs_nothing_after_setup_dev(checkout):
+    extras_installed_by(checkout, "dev")
+
+    assert extras_installed_by(checkout) == []
     assert extras_installed_by(checkout, "dev") == []
 
 
@@ -207,12 +220,27 @@ def test_an_unknown_argument_of_set_up_is_refused():
     assert "unknown argument 'docs'" in done.stderr
 
 
-def test_make_targets_for_developers_run_setup_dev_and_others_run_setup():
-    targets = ["lint", "test", "test-slow", "test-all", "docs", "card"]
-    for target in [*targets, "demo", "play", "setup"]:
-        dry = subprocess.run(
-            ["make", "--dry-run", target], cwd=SETUP.parents[1], capture_output=True, text=True,
-            check=True,
-        )  # fmt: skip
-        wanted = "scripts/setup dev" if target in targets else "scripts/setup"
-        assert [line for line in dry.stdout.splitlines() if "scripts/setup" in line] == [wanted]
+@pytest.mark.parametrize(
+    ("target", "setup"),
+    [
+        ("demo", "scripts/setup"),
+        ("play", "scripts/setup"),
+        ("setup", "scripts/setup"),
+        ("lint", "scripts/setup dev"),
+        ("test", "scripts/setup dev"),
+        ("test-slow", "scripts/setup dev"),
+        ("test-all", "scripts/setup dev"),
+        ("docs", "scripts/setup dev"),
+        ("card", "scripts/setup dev"),
+    ],
+)
+def test_make_targets_for_developers_run_setup_dev_and_others_run_setup(target, setup):
+    dry = subprocess.run(
+        ["make", "--dry-run", target],
+        cwd=SETUP.parents[1],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+
+    assert [line for line in dry.stdout.splitlines() if "scripts/setup" in line] == [setup]

@@ -59,15 +59,20 @@ def links_of_pages(folder_of_the_site):
 
 
 def test_every_page_of_the_docs_is_on_the_site(folder_of_the_site, links_of_pages):
-    wanted = {page.relative_to(ROOT / "docs").with_suffix(".html") for page in
-              (ROOT / "docs").rglob("*") if page.suffix in (".md", ".ipynb")}  # fmt: skip
-    assert wanted < {page.relative_to(folder_of_the_site) for page in links_of_pages}
-    assert (
-        len(links_of_pages) == len(wanted) + 5
-    )  # README, CONTRIBUTING, CHANGELOG, published results, command line
+    """And five more: README, CONTRIBUTING, CHANGELOG, published results, the command line."""
+    wanted = set()
+    for page in (ROOT / "docs").rglob("*"):
+        if page.suffix in (".md", ".ipynb"):
+            wanted.add(page.relative_to(ROOT / "docs").with_suffix(".html"))
+
+    pages = {page.relative_to(folder_of_the_site) for page in links_of_pages}
+
+    assert wanted < pages
+    assert len(pages) == len(wanted) + 5
 
 
 def test_no_link_is_dead(links_of_pages):
+    """Neither to a file nor to a name inside a page."""
     dead = []
     for page, found in links_of_pages.items():
         for target in (*found.links, *found.loaded):
@@ -75,42 +80,43 @@ def test_no_link_is_dead(links_of_pages):
             if scheme:
                 continue
             other = (page.parent / unquote(path)).resolve() if path else page
-            if not other.is_file() or (
-                name
-                and other in links_of_pages
-                and unquote(name) not in links_of_pages[other].names
-            ):
+            names = {unquote(name)}
+            if other in links_of_pages:
+                names = {"", *links_of_pages[other].names}
+            if not other.is_file() or unquote(name) not in names:
                 dead.append((page.name, target))
-    assert not dead
+
+    assert dead == []
 
 
 def test_nothing_is_loaded_from_elsewhere(links_of_pages):
     for page, found in links_of_pages.items():
-        assert not [link for link in found.loaded if urlsplit(link).scheme not in ("", "data")], (
-            page
-        )
+        schemes = {urlsplit(link).scheme for link in found.loaded}
+
+        assert schemes <= {"", "data"}, page
 
 
-def test_the_search_index_has_words_of_pages_notebooks_and_the_reference(folder_of_the_site):
+@pytest.mark.parametrize("words", ["PickXtimes", "Reading results", "ActionChunks"])
+def test_the_search_index_has_words_of_pages_notebooks_and_the_reference(folder_of_the_site, words):
     index = (folder_of_the_site / "search" / "search_index.json").read_text()
-    for words in ("PickXtimes", "Reading results", "ActionChunks"):
-        assert words in index
+
+    assert words in index
 
 
-def test_the_reference_has_the_public_names(links_of_pages):
-    names = set().union(*(found.names for found in links_of_pages.values()))
-    wanted = {f"roboirg.{name}" for name in roboirg.__all__ if not name.startswith("_")}
-
-    wanted |= {
-        "roboirg.envs.environment.RoboIRGEnv.step",
-        "roboirg.policies.Policy.act",
-        "roboirg.records.record.Record",
-    }
-
-    assert wanted <= names
+@pytest.fixture(scope="module")
+def names(links_of_pages):
+    """All names that links may point to."""
+    return set().union(*(found.names for found in links_of_pages.values()))
 
 
-def test_the_reference_has_every_command(links_of_pages):
-    names = set().union(*(found.names for found in links_of_pages.values()))
-    wanted = {f"roboirg {command.words}".strip() for command in count_commands.commands()[1:]}
-    assert {command.replace(" ", "-") for command in wanted} <= names
+def test_the_reference_has_the_public_names(names):
+    assert {f"roboirg.{name}" for name in roboirg.__all__ if not name.startswith("_")} <= names
+    assert "roboirg.envs.environment.RoboIRGEnv.step" in names
+    assert "roboirg.policies.Policy.act" in names
+    assert "roboirg.records.record.Record" in names
+
+
+def test_the_reference_has_every_command(names):
+    """A command such as *records merge* has the name roboirg-records-merge."""
+    for command in count_commands.commands()[1:]:
+        assert f"roboirg {command.words}".strip().replace(" ", "-") in names

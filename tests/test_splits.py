@@ -23,30 +23,6 @@ from roboirg.tasks.splits.splits import (
 )
 
 TASKS = tuple(every_task())
-EPISODES_THAT_ROBOMME_CANNOT_BUILD = {
-    "VideoPlaceButton": {"VideoPlaceButton/val/15"},
-    "VideoPlaceOrder": {
-        *(f"VideoPlaceOrder/train/{index}" for index in (7, 38, 75)),
-        *(f"VideoPlaceOrder/val/{index}" for index in (34, 43)),
-    },
-}
-"""Episodes that RoboMME cannot build."""
-FINGERPRINTS_OF_RANDOM_EPISODES = {
-    "PickXtimes": "6941ffb1f20b",
-    "StopCube": "f00cf213c7b4",
-    "SwingXtimes": "673140b89afa",
-    "BinFill": "c1ad6e181111",
-    "VideoUnmaskSwap": "970a2412db9b",
-    "VideoUnmask": "ea82cdea53d5",
-    "ButtonUnmaskSwap": "ba0ba0a3628b",
-    "ButtonUnmask": "e4c6684c5748",
-    "VideoRepick": "2229d836d499",
-    "VideoPlaceButton": "1d05e5284f56",
-    "VideoPlaceOrder": "d78517b2ed85",
-    "PutInBox": "90bf26fade86",
-    "PickByCount": "4fc73753291f",
-}
-"""Fingerprints, shortened, of the first random episodes of each task."""
 each_task = pytest.mark.parametrize("task", TASKS)
 
 
@@ -54,8 +30,9 @@ def episodes_of(task):
     return list(split_episodes([task], SPLITS))
 
 
-def place_of(episode):
-    return episode.task, episode.split, episode.index
+def published(episode):
+    """Return what RoboMME has published for an episode, or None."""
+    return published_episode(episode.task, episode.split, episode.index)
 
 
 def test_every_task_has_its_splits_in_the_shipped_file():
@@ -71,60 +48,100 @@ def test_the_episodes_of_each_task_are_still_those_of_the_shipped_fingerprint(ta
     )
 
 
-@each_task
-def test_the_first_40_random_episodes_of_each_task_are_what_they_were(task):
+@pytest.mark.parametrize(
+    ("task", "digest"),
+    [
+        ("PickXtimes", "6941ffb1f20b"),
+        ("StopCube", "f00cf213c7b4"),
+        ("SwingXtimes", "673140b89afa"),
+        ("BinFill", "c1ad6e181111"),
+        ("VideoUnmaskSwap", "970a2412db9b"),
+        ("VideoUnmask", "ea82cdea53d5"),
+        ("ButtonUnmaskSwap", "ba0ba0a3628b"),
+        ("ButtonUnmask", "e4c6684c5748"),
+        ("VideoRepick", "2229d836d499"),
+        ("VideoPlaceButton", "1d05e5284f56"),
+        ("VideoPlaceOrder", "d78517b2ed85"),
+        ("PutInBox", "90bf26fade86"),
+        ("PickByCount", "4fc73753291f"),
+    ],
+    ids=TASKS,
+)
+def test_the_first_40_random_episodes_of_each_task_are_what_they_were(task, digest):
     """They are drawn anew: a changed figure of a sampler, such as a region, shows here."""
     drawn = [get_episode(task, "random", index) for index in range(40)]
-    assert fingerprint(drawn)[:12] == FINGERPRINTS_OF_RANDOM_EPISODES[task], (
-        "new scenes need a new environment version"
-    )
+
+    assert fingerprint(drawn)[:12] == digest, "new scenes need a new environment version"
 
 
 @pytest.mark.parametrize("task", all_tasks())
-def test_episodes_are_those_published_with_robomme_but_for_the_few_it_cannot_build(task):
+def test_episodes_that_robomme_has_published_are_its_own(task):
     """RoboMME is the benchmark of whose tasks this one is made."""
-    sampled = [
-        episode for episode in episodes_of(task) if published_episode(*place_of(episode)) is None
-    ]
-    assert {episode.key for episode in sampled} == EPISODES_THAT_ROBOMME_CANNOT_BUILD.get(
-        task, set()
-    )
     for episode in episodes_of(task):
-        found = published_episode(*place_of(episode))
+        found = published(episode)
         if found is not None:
             assert found == (episode.seed, episode.difficulty, episode.scene, episode.goal)
-            assert episode.recorded == is_recorded(*place_of(episode))
+            assert episode.recorded == is_recorded(task, episode.split, episode.index)
+
+
+def test_all_episodes_of_the_benchmark_are_published_but_for_the_few_robomme_cannot_build():
+    sampled = []
+    for task in all_tasks():
+        sampled += [episode.key for episode in episodes_of(task) if published(episode) is None]
+
+    assert sorted(sampled) == [
+        "VideoPlaceButton/val/15",
+        "VideoPlaceOrder/train/38",
+        "VideoPlaceOrder/train/7",
+        "VideoPlaceOrder/train/75",
+        "VideoPlaceOrder/val/34",
+        "VideoPlaceOrder/val/43",
+    ]
+
+
+def episodes_of_our_own(task):
+    """Return the episodes of the fixed splits that RoboMME has not published."""
+    return [episode for episode in episodes_of(task) if published(episode) is None]
 
 
 @each_task
 def test_episodes_of_our_own_repeat_the_difficulties_and_have_seeds_by_one_rule(task):
-    """The first seed of an episode's range, or the next one for which a scene can be made."""
-    random = [get_episode(task, "random", index) for index in (0, 1, 2, 3, 999_999)]
-    for episode in [*episodes_of(task), *random]:
-        if published_episode(*place_of(episode)):
-            continue
-        assert episode.difficulty == ("easy", "easy", "medium", "hard")[episode.index % 4]
+    """The first seed of an episode's range, or the next one for which a scene can be made.
+
+    *passed_over* counts the seeds of an episode for which none could be made.
+    """
+    for episode in episodes_of_our_own(task):
         first = slot_seed(get_task(task), episode.split, episode.index)
-        if episode.split == "random":
-            assert first <= episode.seed < first + SEED_STRIDE
-        else:
-            key = f"{episode.split}/{episode.index}"
-            assert episode.seed == first + shipped_splits()[task].passed_over.get(key, 0)
+        key = f"{episode.split}/{episode.index}"
+        assert episode.difficulty == ("easy", "easy", "medium", "hard")[episode.index % 4]
+        assert episode.seed == first + shipped_splits()[task].passed_over.get(key, 0)
         assert not episode.recorded
-    assert random[4] == get_episode(task, "random", 999_999)
+
+
+@pytest.mark.parametrize("task", ["PickXtimes", "StopCube"])
+@pytest.mark.parametrize(
+    ("index", "difficulty"),
+    [(0, "easy"), (1, "easy"), (2, "medium"), (3, "hard"), (999_999, "hard")],
+)
+def test_random_episodes_repeat_the_difficulties_and_have_seeds_of_their_own_range(
+    task, index, difficulty
+):
+    episode = get_episode(task, "random", index)
+
+    first = slot_seed(get_task(task), "random", index)
+    assert episode.difficulty == difficulty
+    assert first <= episode.seed < first + SEED_STRIDE
+    assert episode == get_episode(task, "random", index)
 
 
 @each_task
 def test_seeds_passed_over_are_of_our_own_episodes_and_never_reach_the_next_ones_range(task):
-    """*passed_over* counts the seeds of an episode for which no scene could be made."""
-    sampled = {
-        f"{episode.split}/{episode.index}"
-        for episode in episodes_of(task)
-        if published_episode(*place_of(episode)) is None
-    }
-    assert set(shipped_splits()[task].passed_over) <= sampled
-    assert all(0 < count <= MAX_REJECTED for count in shipped_splits()[task].passed_over.values())
-    assert MAX_REJECTED < SEED_STRIDE
+    own = {f"{episode.split}/{episode.index}" for episode in episodes_of_our_own(task)}
+
+    passed_over = shipped_splits()[task].passed_over
+
+    assert passed_over.keys() <= own
+    assert all(0 < count <= MAX_REJECTED < SEED_STRIDE for count in passed_over.values())
 
 
 @each_task

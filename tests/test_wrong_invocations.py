@@ -1,11 +1,10 @@
 """Wrong invocations of every command: one sentence, exit code 2, nothing written.
 
-Commands share their options. Each kind of mistake is made once, and each option's value is wrong
-once; the commands take turns, so that none is left out.
+Commands share their options: each option has a wrong value once, with the first command that has
+it. And each command once gets an option that there is not.
 """
 
 import sys
-from collections import Counter
 
 import pytest
 from all_commands import all_commands, make_run, words_of
@@ -31,25 +30,6 @@ OPTIONS_OF_ANY_TEXT = {
 """Options that take any text; all others take numbers or names."""
 
 
-def wrong_words(command, words):
-    """Yield kinds of mistakes, with variations of right words that have one, for a command."""
-    yield "unknown option", [*words, "--no-such-option"]
-    yield "surplus words", [*words, "surplus", "words", "here"]
-    for parameter in command.params:
-        names = [name for name in parameter.opts if name.startswith("--")]
-        if not names or names[0] in ("--help", "--version"):
-            continue
-        if parameter.is_flag:
-            yield "a flag with a value", [*words, f"{names[0]}=maybe"]
-        elif names[0] not in OPTIONS_OF_ANY_TEXT:
-            bad = WRONG_NAMES.get(names[0], "many")
-            yield f"{names[0]} {bad}", [*words, names[0], bad]
-        if parameter.required:
-            yield f"without {names[0]}", [word for word in words if word != names[0]]
-        if not parameter.is_flag:
-            yield "no value", [*words, names[0]]
-
-
 RIGHT_WORDS_FOR = {
     "fetch-models": ["--wheel", "nowhere"],
     "language check-scenarios": ["nowhere"],
@@ -65,26 +45,32 @@ RIGHT_WORDS_FOR = {
 """Words for commands whose work needs what is not there: files, or a library."""
 
 
-def one_of_each_kind():
-    """Return a case of every kind, and at least one of every command: its name, and the words."""
-    cases = {}
+def options_of(command):
+    """Return the parameters of a command that are options, by the first name of each."""
+    found = {}
+    for parameter in command.params:
+        if parameter.opts[0].startswith("--") and parameter.opts[0] not in ("--help", "--version"):
+            found[parameter.opts[0]] = parameter
+    return found
+
+
+def words_with_wrong_values():
+    """Return commands and words for them, in which the value of one option is wrong, by option."""
+    found = {}
     right_words = words_of("out", "run") | RIGHT_WORDS_FOR
     for name, command in all_commands().items():
-        for kind, words in wrong_words(command, right_words[name]):
-            cases.setdefault(kind, {}).setdefault(name, words)
-    tried = Counter()
-    chosen = []
-    for kind in sorted(cases, key=lambda kind: len(cases[kind])):
-        name = min(cases[kind], key=lambda name: tried[name])
-        tried[name] += 1
-        chosen.append(pytest.param(name, cases[kind][name], id=f"{name}: {kind}"))
-    for name in sorted(set(all_commands()) - set(tried)):
-        words = cases["unknown option"][name]
-        chosen.append(pytest.param(name, words, id=f"{name}: unknown option"))
-    return chosen
+        for option, parameter in options_of(command).items():
+            if parameter.is_flag:
+                wrong = [f"{option}=maybe"]
+            elif option in OPTIONS_OF_ANY_TEXT:
+                wrong = [option]  # without a value
+            else:
+                wrong = [option, WRONG_NAMES.get(option, "many")]
+            found.setdefault(option, (name, [*right_words[name], *wrong]))
+    return found
 
 
-CASES = one_of_each_kind()
+WRONG_VALUES = words_with_wrong_values()
 
 
 @pytest.fixture(scope="module")
@@ -111,17 +97,46 @@ def refused(folder_with_a_run, monkeypatch, capsys):
     return call
 
 
-@pytest.mark.parametrize(("name", "words"), CASES)
-def test_a_wrong_command_line_is_one_sentence_with_exit_code_2_and_writes_nothing(
-    name, words, folder_with_a_run, refused
-):
-    before = sorted(folder_with_a_run.rglob("*"))
+def check_one_sentence(refused, folder, name, words):
+    """Assert that a command prints one sentence, and that a folder stays as it is."""
+    before = sorted(folder.rglob("*"))
+
     printed = refused(name, words)
 
     assert printed.out == ""
     assert printed.err.startswith("roboirg: ")
     assert printed.err.count("\n") == 1
-    assert sorted(folder_with_a_run.rglob("*")) == before
+    assert sorted(folder.rglob("*")) == before
+
+
+@pytest.mark.parametrize("option", WRONG_VALUES)
+def test_a_wrong_value_of_an_option_is_one_sentence_and_nothing_is_written(
+    option, folder_with_a_run, refused
+):
+    check_one_sentence(refused, folder_with_a_run, *WRONG_VALUES[option])
+
+
+@pytest.mark.parametrize("name", all_commands())
+def test_an_unknown_option_is_one_sentence_and_nothing_is_written(name, folder_with_a_run, refused):
+    right_words = words_of("out", "run") | RIGHT_WORDS_FOR
+
+    check_one_sentence(refused, folder_with_a_run, name, [*right_words[name], "--no-such-option"])
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("leaderboard pack", ["run"]),
+        ("check-policy", []),
+        ("language check-scenarios", []),
+        ("compare", ["run:random"]),
+        ("tasks", ["surplus", "words"]),
+    ],
+)
+def test_a_command_with_too_few_or_too_many_words_is_refused_in_one_sentence(
+    name, words, folder_with_a_run, refused
+):
+    check_one_sentence(refused, folder_with_a_run, name, words)
 
 
 NO_FOLDERS = "a" * 260, "run/records.jsonl"

@@ -31,20 +31,20 @@ CHUNKS = np.random.default_rng(0).normal(0, 0.05, (3, 2, 4, 8)) + HOME_ACTION
 """Three chunks of four actions for two environments, whose episodes last two and a half."""
 
 
-def assert_same(ours, theirs):
+def check_same(ours, theirs):
     """Assert that two observations are equal bit for bit."""
     assert set(ours) == set(theirs)
     for key, value in theirs.items():
         if key == "history":
             for own, other in zip(ours[key], value, strict=True):
-                assert_same(own, other)
+                check_same(own, other)
         else:
             assert np.array_equal(ours[key], value), key
 
 
-def assert_second(batch, infos, observation, info):
+def check_second(batch, infos, observation, info):
     """Assert that the second of two environments gave the same, bit for bit, as a single one."""
-    assert_same({key: value[1] for key, value in batch.items()}, observation)
+    check_same({key: value[1] for key, value in batch.items()}, observation)
     for key in info.keys() - {"demonstration"}:
         assert np.all(infos[key][1] == info[key]), key
     for key, frames in info.get("demonstration", {}).items():
@@ -68,19 +68,19 @@ def test_sub_environments_that_take_chunks_equal_single_ones():
     single = roboirg.make("VideoUnmaskSwap", **OPTIONS)
 
     batch, infos = vector.reset(seed=50)
-    assert_second(batch, infos, *single.reset(options={"episode": 1}))
+    check_second(batch, infos, *single.reset(options={"episode": 1}))
     assert [video.length for video in infos["demonstration"]] == [114, 168]
 
     for chunks in CHUNKS:
         batch, rewards, terminated, truncated, infos = vector.step(chunks)
         observation, *given, info = single.step_chunk(chunks[1])
-        assert_second(batch, infos, observation, info)
+        check_second(batch, infos, observation, info)
         assert [rewards[1], terminated[1], truncated[1]] == given
     assert infos["steps"].tolist() == [10, 10]
     assert truncated.all()
 
     batch, *_, infos = vector.step(chunks)  # starts the next episodes
-    assert_second(batch, infos, *single.reset(options={"episode": 2}))
+    check_second(batch, infos, *single.reset(options={"episode": 2}))
 
     vector.close()
 

@@ -23,15 +23,13 @@ from __future__ import annotations
 import json
 import lzma
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple, cast
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboirg.core.conditions import Fact
-from roboirg.core.episode import Episode, Goal, Primitive, Stage
+from roboirg.core.episode import Goal, Primitive, Stage
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.motions import Point
 from roboirg.judging import Event
@@ -83,7 +81,7 @@ class Course(NamedTuple):
     attempts: tuple[Event, ...]
 
     @property
-    def episode(self) -> Episode:
+    def episode(self):
         return get_episode(*self.where)
 
 
@@ -98,22 +96,20 @@ class Cause(NamedTuple):
     time: int
 
 
-CAUSES: list[Cause] = []
+CAUSES = []
 
 
-def cause(
-    kind: str, failure: str | None, *tasks: str, time: int = TIME
-) -> Callable[[Callable[[Hands], None]], Callable[[Hands], None]]:
+def cause(kind, failure, *tasks, time=TIME):
     """Mark a function as a cause of a failure in some tasks, with the steps that it has."""
 
-    def keep(play: Callable[[Hands], None]) -> Callable[[Hands], None]:
+    def keep(play):
         CAUSES.append(Cause(play.__name__, kind, failure, tasks, play, time))
         return play
 
     return keep
 
 
-def need(offered: object) -> None:
+def need(offered):
     """Refuse a scene that does not offer something."""
     if not offered:
         raise NotOfferedError
@@ -129,7 +125,7 @@ class Hands:
         slower: how many times slower than the oracle everything is done.
     """
 
-    def __init__(self, episode: Episode, time: int) -> None:
+    def __init__(self, episode, time):
         import roboirg
 
         self.env = roboirg.make(episode, cameras=(), max_steps=time)
@@ -137,54 +133,54 @@ class Hands:
         self.start = int(info["elapsed_steps"])
         self.episode, self.stages, self.slower = episode, episode.stages, 1
         self.rng = np.random.default_rng(episode.seed)
-        self.declared: Mapping[str, Any] | None = None
+        self.declared = None
         self._expert = _disturbed_expert(self.env.session.world)
 
     # What there is
 
     @property
-    def other_goals(self) -> list[Goal]:
+    def other_goals(self):
         """All other goals of the scene."""
         goals = get_task(self.episode.task).goals(self.episode.scene)
         return [goal for goal in goals if goal != self.episode.goal]
 
-    def stages_of(self, goal: Goal) -> tuple[Stage, ...]:
+    def stages_of(self, goal):
         return get_task(self.episode.task).stages(self.episode.scene, goal)
 
-    def others(self, name: str) -> list[str]:
+    def others(self, name):
         """Names of the other objects of the same kind that are there, the nearest first."""
         same = self.episode.scene.of_kind(self.episode.scene[name].kind)
         absent = self.env.session.world.absent
         names = [thing.name for thing in same if thing.name != name and thing.name not in absent]
         return sorted(names, key=lambda other: math.dist(self.at(other), self.at(name)))
 
-    def at(self, name: str) -> Point:
+    def at(self, name):
         """Where an object is now, m."""
         return self.env.session.world.bodies[name].position
 
-    def picks(self) -> list[int]:
+    def picks(self):
         """Indices of the stages that pick something up."""
         return [i for i, stage in enumerate(self.stages) if stage.primitive.kind.startswith("pick")]
 
     @property
-    def step(self) -> int:
+    def step(self):
         """Steps of the world so far; those of `Primitive.steps` are counted in the same way."""
         return self.env.session.world.elapsed
 
     # What they do
 
-    def play(self, stages: Iterable[Stage]) -> None:
+    def play(self, stages):
         """Do stages as the oracle does, each once."""
         for stage in stages:
             self.do(stage)
 
     def do(
         self,
-        what: Stage | Primitive,
+        what,
         *,
-        beside: float = 0.0,
-        until: float = 1.0,
-    ) -> None:
+        beside=0.0,
+        until=1.0,
+    ):
         """Do a stage or a primitive, disturbed.
 
         Args:
@@ -203,7 +199,7 @@ class Hands:
             self.execute(rows)
         self._expert.shift = (0.0, 0.0)
 
-    def execute(self, rows: NDArray[np.float64]) -> None:
+    def execute(self, rows):
         """Execute joint targets and gripper, (n, 8), perhaps more slowly."""
         if self.slower != 1:
             rows = np.repeat(rows, self.slower, axis=0)
@@ -211,43 +207,43 @@ class Hands:
         if self.env.status != "ongoing":
             raise OverError
 
-    def go(self, point: Point | tuple[float, float, float]) -> None:
+    def go(self, point):
         """Move the tool in a straight line, fingers down, m; the gripper stays as it is."""
         self.execute(self._expert.way(Point(*point)))
 
-    def grip(self, gripper: float) -> None:
+    def grip(self, gripper):
         """Open (+1) or close (-1) the fingers, or in between."""
         self.execute(self._expert.gripping(gripper))
 
-    def wait(self, steps: int) -> None:
+    def wait(self, steps):
         """Rest."""
         self.execute(np.repeat(self._expert.here()[None], steps, axis=0))
 
-    def tremble(self, steps: int) -> None:
+    def tremble(self, steps):
         """Shake all joints about where they are, by up to 0.02 rad."""
         rows = np.repeat(self._expert.here()[None], steps, axis=0)
         rows[:, :-1] += self.rng.uniform(-0.02, 0.02, rows[:, :-1].shape)
         self.execute(rows)
 
-    def snatch(self, name: str, times: int = 1, beside: float = 0.03) -> None:
+    def snatch(self, name, times=1, beside=0.03):
         """Go for a thing with closing fingers that miss it, the hand up again after each time."""
         kind = "pick_container" if self.episode.scene[name].kind == "container" else "pick_cube"
         for _ in range(times):
             self.do(Primitive(kind, name), beside=beside)
 
-    def declare(self, goal: Goal | Mapping[str, Any] | None, *, impossible: bool = False) -> None:
+    def declare(self, goal, *, impossible=False):
         """Say what a listener understood: a goal, or None for no answer."""
         slots = dict(goal.as_mapping()) if isinstance(goal, Goal) else goal
         self.declared = {"understood": slots, "impossible": impossible}
 
-    def _free_way(self, name: str, distance: float) -> tuple[float, float]:
+    def _free_way(self, name, distance):
         """Return the vector of a length that leads farthest from all other objects."""
         if not distance:
             return 0.0, 0.0
         x, y, _ = self.at(name)
         others = self._places_of_others(name)
 
-        def space(way: tuple[float, float]) -> float:
+        def space(way):
             right, ahead = way
             gaps = [math.dist((x + right, y + ahead), place) for place in others]
             # Not out of the arm's reach, or under it.
@@ -260,7 +256,7 @@ class Hands:
             ways.append((distance * math.cos(turn), distance * math.sin(turn)))
         return max(ways, key=space)
 
-    def _places_of_others(self, name: str) -> list[tuple[float, float]]:
+    def _places_of_others(self, name):
         """Return where on the table all other objects stand that have a height."""
         world = self.env.session.world
         return [
@@ -275,7 +271,7 @@ _PIECES = {"pick_cube": 6, "pick_container": 6, "place_on": 4, "put_into": 4, "d
 """Trajectories that a primitive yields; four where it is not said."""
 
 
-def _disturbed_expert(world: Any) -> Any:
+def _disturbed_expert(world):
     from roboirg.simulation.expert.primitives import STRAIGHT_DOWN, MotionPrimitives
     from roboirg.simulation.physics_settings import GRIPPER_STEPS
 
@@ -284,28 +280,28 @@ def _disturbed_expert(world: Any) -> Any:
 
         shift = (0.0, 0.0)
 
-        def execute(self, primitive: Primitive) -> Iterator[NDArray[np.float64]]:
+        def execute(self, primitive):
             if primitive.kind == "pick_cube" and self.shift != (0.0, 0.0):
                 return self._grasp_and_lift(primitive.subject, OPEN)  # once
             return super().execute(primitive)
 
-        def _position(self, name: str) -> Point:
+        def _position(self, name):
             place = super()._position(name)
             return Point(place.x + self.shift[0], place.y + self.shift[1], place.z)
 
-        def way(self, point: Point) -> NDArray[np.float64]:
+        def way(self, point):
             return self._move(point, STRAIGHT_DOWN)
 
-        def gripping(self, gripper: float) -> NDArray[np.float64]:
+        def gripping(self, gripper):
             return np.tile(self._grip(gripper)[:1], (GRIPPER_STEPS, 1))
 
-        def here(self) -> NDArray[np.float64]:
+        def here(self):
             return np.append(world.robot.arm_positions, self._gripper)
 
     return Disturbed(world)
 
 
-def play_cause(cause: Cause, episode: Episode) -> Course | None:
+def play_cause(cause, episode):
     """Play a cause in an episode; None if the scene does not offer it, or the arm cannot do it."""
     hands = Hands(episode, cause.time)
     try:
@@ -332,7 +328,7 @@ def play_cause(cause: Cause, episode: Episode) -> Course | None:
     )
 
 
-def play_causes(causes: Sequence[Cause], indices: Sequence[int], scenes: int) -> Iterator[Course]:
+def play_causes(causes, indices, scenes):
     """Play each cause in the first scenes of each of its tasks that offer it."""
     for cause in causes:
         for task in cause.tasks:
@@ -348,7 +344,7 @@ def play_causes(causes: Sequence[Cause], indices: Sequence[int], scenes: int) ->
                     yield course
 
 
-def write_courses(path: Path, courses: Iterable[Course]) -> None:
+def write_courses(path, courses):
     """Write courses, compressed."""
     lines = []
     for course in courses:
@@ -358,7 +354,7 @@ def write_courses(path: Path, courses: Iterable[Course]) -> None:
     path.write_bytes(lzma.compress("\n".join(lines).encode(), preset=9))
 
 
-def read_courses(path: Path) -> list[Course]:
+def read_courses(path):
     """Read what `write_courses` wrote."""
     found = []
     for line in lzma.decompress(path.read_bytes()).decode().splitlines():
@@ -369,10 +365,10 @@ def read_courses(path: Path) -> list[Course]:
     return found
 
 
-def _short(event: Event) -> list[object]:
+def _short(event):
     return [event.step, *event.fact, int(event.holds)]
 
 
-def _event(short: Sequence[object]) -> Event:
-    step, kind, subject, place, holds = cast("tuple[int, str, str, str | None, int]", short)
+def _event(short):
+    step, kind, subject, place, holds = short
     return Event(step, Fact(kind, subject, place), bool(holds))

@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 import re
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,7 +15,7 @@ import numpy as np
 from cause_making import Course, read_courses
 
 from roboirg.core.failures import FAILURE_KINDS, FAILURES
-from roboirg.judging import DeclaredIntent, FailureAttribution, attribute_failure
+from roboirg.judging import DeclaredIntent, attribute_failure
 from roboirg.stats.intervals import interval_of_values
 from roboirg.tasks import get_task
 
@@ -48,7 +47,7 @@ class Scores(NamedTuple):
     kept_undecided: float
 
 
-def attribute(course: Course) -> FailureAttribution | None:
+def attribute(course):
     said = course.declared
     return attribute_failure(
         course.episode,
@@ -70,11 +69,12 @@ class Pair(NamedTuple):
     failure: str
 
     @property
-    def is_right(self) -> bool:
+    def is_right(self):
         return self.kind == self.course.kind
 
 
-def pairs(courses: Sequence[Course]) -> list[Pair]:
+def pairs(courses):
+    """Return the pair of each course that failed, or had to succeed."""
     found = []
     for course in courses:
         attribution = attribute(course)
@@ -85,38 +85,41 @@ def pairs(courses: Sequence[Course]) -> list[Pair]:
     return found
 
 
-def share_of_decided(found: Iterable[Pair]) -> float:
-    """Return the share whose kind is right, of those that are decided."""
-    decided = [pair.is_right for pair in found if pair.kind != "undecided"]
-    return sum(decided) / max(len(decided), 1)
-
-
-def share_undecided(found: Sequence[Pair]) -> float:
+def share_undecided(found):
     return sum(pair.kind == "undecided" for pair in found) / max(len(found), 1)
 
 
-def scores(courses: Sequence[Course]) -> Scores:
-    shown: dict[str, list[Pair]] = defaultdict(list)  # by cause
-    silent: list[Pair] = []
-    for pair in pairs(courses):
+def scores(found):
+    """Return how often the kind is right of some pairs."""
+    shown = defaultdict(list)  # by cause
+    silent = []
+    for pair in found:
         course = pair.course
         if course.kind in ("grounding", "execution"):
             shown[course.cause].append(pair)
         if course.kind == "undecided" and course.failure != "no_answer":
             silent.append(pair)
 
-    def share(causes: Iterable[str]) -> float:
-        return share_of_decided(itertools.chain.from_iterable(shown[cause] for cause in causes))
+    causes = sorted(shown)
+    rights = []
+    decided = []
+    for cause in causes:
+        kinds = [pair.is_right for pair in shown[cause] if pair.kind != "undecided"]
+        rights.append(sum(kinds))
+        decided.append(len(kinds))
+
+    def share(numbers):
+        return np.take(rights, numbers).sum() / max(np.take(decided, numbers).sum(), 1)
 
     rng = np.random.default_rng(0)
-    causes = sorted(shown)
-    drawn = [share(rng.choice(causes, len(causes))) for _ in range(1000)]
+    count = len(causes)
+    drawn = [share(rng.choice(count, count)) for _ in range(1000)]
     low, high = np.percentile(drawn, [2.5, 97.5])
     if low == high:
-        low, high = interval_of_values([[low] * len(causes)])
+        low, high = interval_of_values([[low] * count])
     by_cause = [np.mean([pair.is_right for pair in shown[cause]]) for cause in causes]
     return Scores(
-        share(causes),
+        float(share(range(count))),
         float(np.mean(by_cause)),
         (float(low), float(high)),
         share_undecided([*itertools.chain.from_iterable(shown.values())]),
@@ -132,39 +135,39 @@ class Tally(NamedTuple):
     names: int
 
 
-def classes(courses: Sequence[Course]) -> dict[str, Tally]:
-    """Return what is right of each name that was made."""
+def classes(found):
+    """Return what is right of each name that was made, of some pairs."""
     by_name = defaultdict(list)
-    for pair in pairs(courses):
+    for pair in found:
         if pair.course.failure is not None and pair.course.kind != UNSCORED:
             by_name[pair.course.failure].append(pair)
-    found = {}
+    tallies = {}
     for name, made in by_name.items():
         kinds = sum(pair.is_right for pair in made)
         names = sum(pair.failure == name for pair in made)
-        found[name] = Tally(len(made), kinds, names)
-    return found
+        tallies[name] = Tally(len(made), kinds, names)
+    return tallies
 
 
-def percent(share: float) -> str:
+def percent(share):
     return f"{100 * share:.0f} %"
 
 
-def table(courses: Sequence[Course]) -> str:
-    """The confusion of kinds, the scores, and the names."""
-    lines = [*kinds_table(pairs(courses)), "", summary(courses), ""]
+def table(found):
+    """Return the confusion of kinds, the scores, and the names, of some pairs."""
+    lines = [*kinds_table(found), "", summary(found), ""]
     lines.append("| made | failures | kind right | name right |")
     lines.append("| --- | ---: | ---: | ---: |")
-    found = classes(courses)
+    tallies = classes(found)
     for name in FAILURES:
-        if name in found:
-            made, kinds, names = found[name]
+        if name in tallies:
+            made, kinds, names = tallies[name]
             shares = f"{percent(kinds / made)} | {percent(names / made)}"
             lines.append(f"| `{name}` | {made} | {shares} |")
     return "\n".join(lines)
 
 
-def kinds_table(found: Sequence[Pair]) -> list[str]:
+def kinds_table(found):
     """Return lines of a table: how often what was made is found as each kind."""
     kinds = [*FAILURE_KINDS, "success"]
     counts = Counter((pair.course.kind, pair.kind) for pair in found)
@@ -177,11 +180,10 @@ def kinds_table(found: Sequence[Pair]) -> list[str]:
     return lines
 
 
-def summary(courses: Sequence[Course]) -> str:
+def summary(found):
     """Return the scores in sentences."""
-    found = pairs(courses)
     causes = len({pair.course.cause for pair in found})
-    share = scores(courses)
+    share = scores(found)
     low, high = share.interval
     return (
         f"{len(found)} episodes of {causes} causes. Kind right: {percent(share.of_decided)} of "
@@ -193,7 +195,7 @@ def summary(courses: Sequence[Course]) -> str:
     )
 
 
-def precisions(found: Iterable[Pair]) -> str:
+def precisions(found):
     """Return the share of what is found grounding that was made so, in each counting task."""
     rights = defaultdict(list)
     for pair in found:
@@ -204,7 +206,7 @@ def precisions(found: Iterable[Pair]) -> str:
     return ", ".join(f"{task} {percent(np.mean(right))}" for task, right in rights.items())
 
 
-def failures_table() -> str:
+def failures_table():
     """The names of failures as the documentation shows them."""
     rows = ["| kind | failure | the policy | for example |", "| --- | --- | --- | --- |"]
     rows += [
@@ -214,7 +216,7 @@ def failures_table() -> str:
     return "\n".join(rows)
 
 
-def put_in(document: str, mark: str, text: str) -> str:
+def put_in(document, mark, text):
     """Return a document with the text between two marks replaced."""
     begin = f"<!-- {mark} -->"
     end = f"<!-- end of {mark} -->"
@@ -222,11 +224,11 @@ def put_in(document: str, mark: str, text: str) -> str:
     return pattern.sub(lambda _: f"{begin}\n\n{text}\n\n{end}", document)
 
 
-def main() -> None:
+def main():
     document = put_in(DOCUMENT.read_text(), "failures", failures_table())
     for half, path in HALVES.items():
         if path.exists():
-            document = put_in(document, half, table(read_courses(path)))
+            document = put_in(document, half, table(pairs(read_courses(path))))
     DOCUMENT.write_text(document)
 
 

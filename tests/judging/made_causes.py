@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from cause_making import (
     CAUSES,
     OPEN,
-    Hands,
     cause,
     need,
     play_causes,
@@ -31,14 +29,14 @@ WITH_WRONG = (*PICKING, *UNMASK, "BinFill", "PickByCount")
 ALL = (*WITH_WRONG, "PutInBox", "StopCube")
 
 
-def first_pick(hands: Hands) -> int:
+def first_pick(hands):
     """Play up to the first pick; its index."""
     index = hands.picks()[0]
     hands.play(hands.stages[:index])
     return index
 
 
-def wrong_thing(hands: Hands, name: str) -> str:
+def wrong_thing(hands, name):
     """An object of the same kind that is not meant, not the nearest one."""
     meant = {stage.primitive.subject for stage in hands.stages}
     colors = set() if hands.episode.task != "BinFill" else set(hands.episode.goal.texts("colors"))
@@ -58,16 +56,16 @@ def wrong_thing(hands: Hands, name: str) -> str:
 
 
 def another_goal(
-    name: str,
-    failure: str,
-    tasks: Sequence[str],
-    *same: str,
-    by: int = 0,
-    fits: Callable[[Goal, Goal], bool] = lambda _goal, _meant: True,
-) -> None:
+    name,
+    failure,
+    tasks,
+    *same,
+    by=0,
+    fits=lambda _goal, _meant: True,
+):
     """Mark as a cause a goal that agrees in some slots, has so many more repeats, and fits."""
 
-    def play(hands: Hands) -> None:
+    def play(hands):
         meant = hands.episode.goal
         found = list(hands.other_goals)
         for slot in same:
@@ -83,7 +81,7 @@ def another_goal(
     cause("grounding", failure, *tasks)(play)
 
 
-def colors(goal: Goal) -> tuple[str, ...]:
+def colors(goal):
     return goal.texts("colors")
 
 
@@ -132,13 +130,13 @@ another_goal(
 
 
 @cause("grounding", "wrong_order", "SwingXtimes")
-def left_first(hands: Hands) -> None:
+def left_first(hands):
     pick, right, left, *rest = hands.stages
     hands.play([pick, left, right, *rest])
 
 
 @cause("grounding", "wrong_order", "ButtonUnmask")
-def container_before_the_button(hands: Hands) -> None:
+def container_before_the_button(hands):
     index = hands.picks()[0]
     container = hands.stages[index].primitive.subject
     hands.wait(60)
@@ -148,14 +146,14 @@ def container_before_the_button(hands: Hands) -> None:
 
 
 @cause("grounding", "wrong_place", "VideoPlaceOrder")
-def back_where_it_lay(hands: Hands) -> None:
+def back_where_it_lay(hands):
     pick = hands.stages[0]
     hands.do(pick)
     hands.do(Primitive("place_on", pick.primitive.subject, "site"))
 
 
 @cause("grounding", "wrong_place", "VideoPlaceOrder", "VideoPlaceButton", "PickXtimes", "BinFill")
-def sets_it_on_another_cube(hands: Hands) -> None:
+def sets_it_on_another_cube(hands):
     hands.do(hands.stages[0])
     x, y, _ = hands.at(wrong_thing(hands, hands.stages[0].primitive.subject))
     hands.go((x, y, 0.15))
@@ -165,7 +163,7 @@ def sets_it_on_another_cube(hands: Hands) -> None:
 
 
 @cause("grounding", "wrong_object", *PICKING, "VideoUnmask", "PickByCount")
-def stays_above_a_wrong_thing(hands: Hands) -> None:
+def stays_above_a_wrong_thing(hands):
     index = first_pick(hands)
     x, y, _ = hands.at(wrong_thing(hands, hands.stages[index].primitive.subject))
     hands.go((x, y, 0.2))
@@ -175,13 +173,13 @@ def stays_above_a_wrong_thing(hands: Hands) -> None:
 
 
 @cause("grounding", "wrong_object", *WITH_WRONG)
-def snatches_at_a_wrong_thing(hands: Hands) -> None:
+def snatches_at_a_wrong_thing(hands):
     index = first_pick(hands)
     hands.snatch(wrong_thing(hands, hands.stages[index].primitive.subject), 6)
 
 
 @cause("grounding", "wrong_object", "PickXtimes", "SwingXtimes", "VideoRepick", "BinFill")
-def snatches_at_a_wrong_thing_and_presses(hands: Hands) -> None:
+def snatches_at_a_wrong_thing_and_presses(hands):
     index = first_pick(hands)
     hands.snatch(wrong_thing(hands, hands.stages[index].primitive.subject), 6)
     hands.do(hands.stages[-1])
@@ -191,25 +189,25 @@ def snatches_at_a_wrong_thing_and_presses(hands: Hands) -> None:
 
 
 @cause("execution", "missed_grasp", *WITH_WRONG, "PutInBox")
-def snatches_at_the_right_thing(hands: Hands) -> None:
+def snatches_at_the_right_thing(hands):
     index = first_pick(hands)
     hands.snatch(hands.stages[index].primitive.subject, 6)
 
 
 def beside(
-    name: str,
-    failure: str,
-    tasks: Sequence[str],
-    distance: float,
-    chosen: Callable[[Hands, list[int]], Sequence[int]],
-) -> None:
+    name,
+    failure,
+    tasks,
+    distance,
+    chosen,
+):
     """Mark as a cause that some stages are done beside, m, and the rest as if nothing was.
 
     `chosen` gets the indices of the stages that pick; where it chooses none, the scene does not
     offer the cause.
     """
 
-    def play(hands: Hands) -> None:
+    def play(hands):
         numbers = chosen(hands, hands.picks())
         need(numbers)
         for number, stage in enumerate(hands.stages):
@@ -296,7 +294,7 @@ beside("the_first_visit_passes_beside", "misplaced", ("SwingXtimes",), 0.055, la
 
 
 @cause("execution", "missed_grasp", "PickXtimes")
-def the_first_slips_at_once(hands: Hands) -> None:
+def the_first_slips_at_once(hands):
     need(len(hands.picks()) >= 2)
     pick, *rest = hands.stages
     hands.do(pick, until=5 / 6)
@@ -308,7 +306,7 @@ def the_first_slips_at_once(hands: Hands) -> None:
 
 
 @cause("execution", "dropped", "PickXtimes", "VideoPlaceOrder", "SwingXtimes")
-def opens_half_way(hands: Hands) -> None:
+def opens_half_way(hands):
     pick, place, *rest = hands.stages
     hands.do(pick)
     about = hands.at(str(place.primitive.place))
@@ -319,13 +317,13 @@ def opens_half_way(hands: Hands) -> None:
 
 
 @cause("execution", "missed_press", "StopCube")
-def presses_beside_in_time(hands: Hands) -> None:
+def presses_beside_in_time(hands):
     *waits, press = hands.stages
     hands.play(waits)
     hands.do(press, beside=0.045)
 
 
-def press_at(hands: Hands, late: int) -> None:
+def press_at(hands, late):
     run = next(motion for motion in hands.episode.scene.motions if isinstance(motion, Shuttle))
     need(abs(late) < run.interval / 2 - 6)
     press = hands.stages[-1].primitive
@@ -336,23 +334,23 @@ def press_at(hands: Hands, late: int) -> None:
 
 
 @cause("execution", "mistimed", "StopCube")
-def presses_early(hands: Hands) -> None:
+def presses_early(hands):
     press_at(hands, -40)
 
 
 @cause("execution", "mistimed", "StopCube")
-def presses_late(hands: Hands) -> None:
+def presses_late(hands):
     press_at(hands, 45)
 
 
 @cause("execution", "out_of_time", "PickXtimes", "BinFill", "VideoPlaceOrder", time=700)
-def five_times_slower(hands: Hands) -> None:
+def five_times_slower(hands):
     hands.slower = 5
     hands.play(hands.stages)
 
 
 @cause("execution", "out_of_time", "VideoUnmask", "PutInBox", time=350)
-def five_times_slower_and_less_time(hands: Hands) -> None:
+def five_times_slower_and_less_time(hands):
     hands.slower = 5
     hands.play(hands.stages)
 
@@ -361,14 +359,14 @@ def five_times_slower_and_less_time(hands: Hands) -> None:
 
 
 @cause("success", None, "PickXtimes")
-def hovers_over_a_wrong_one(hands: Hands) -> None:
+def hovers_over_a_wrong_one(hands):
     x, y, _ = hands.at(wrong_thing(hands, hands.stages[0].primitive.subject))
     hands.go((x, y, 0.1))
     hands.play(hands.stages)
 
 
 @cause("unscored", "missed_grasp", "PickXtimes")
-def takes_the_nearest_of_another_kind(hands: Hands) -> None:
+def takes_the_nearest_of_another_kind(hands):
     pick, *rest = hands.stages
     near = hands.others(pick.primitive.subject)
     need(near)
@@ -377,29 +375,29 @@ def takes_the_nearest_of_another_kind(hands: Hands) -> None:
 
 
 @cause("undecided", "no_attempt", *ALL)
-def does_nothing(hands: Hands) -> None:
+def does_nothing(hands):
     hands.wait(100)
 
 
 @cause("undecided", "no_attempt", "StopCube", "PickXtimes", "VideoUnmask")
-def trembles(hands: Hands) -> None:
+def trembles(hands):
     while True:
         hands.tremble(50)
 
 
 @cause("undecided", "stopped", "StopCube", "PickXtimes")
-def stays_above_the_button(hands: Hands) -> None:
+def stays_above_the_button(hands):
     button = hands.stages[-1].primitive.subject if hands.episode.task != "StopCube" else "button"
     hands.do(Primitive("hover", button))
 
 
 @cause("undecided", "stopped", "PickXtimes", "VideoRepick", "BinFill")
-def never_presses(hands: Hands) -> None:
+def never_presses(hands):
     hands.play(hands.stages[:-1])
 
 
 @cause("undecided", "stopped", "PickXtimes", "VideoPlaceButton")
-def stops_half_way(hands: Hands) -> None:
+def stops_half_way(hands):
     hands.do(hands.stages[0])
 
 
@@ -407,24 +405,24 @@ def stops_half_way(hands: Hands) -> None:
 
 
 @cause("grounding", "misunderstood", "PickXtimes")
-def understands_what_the_scene_cannot_have(hands: Hands) -> None:
+def understands_what_the_scene_cannot_have(hands):
     hands.declare({"color": "purple", "repeats": 2}, impossible=True)
 
 
 @cause("undecided", "no_answer", "PickXtimes", "VideoUnmask")
-def answers_nothing(hands: Hands) -> None:
+def answers_nothing(hands):
     hands.declare(None)
 
 
 @cause("grounding", "misunderstood", "PickXtimes", "VideoUnmask")
-def understands_another_goal(hands: Hands) -> None:
+def understands_another_goal(hands):
     goal = hands.other_goals[-1]
     hands.declare(goal)
     hands.play(hands.stages_of(goal))
 
 
 @cause("grounding", "misunderstood", "VideoUnmask")
-def understands_a_part(hands: Hands) -> None:
+def understands_a_part(hands):
     first, *rest = hands.episode.goal.texts("colors")
     need(rest)
     goal = Goal.of(colors=(first,))
@@ -433,12 +431,12 @@ def understands_a_part(hands: Hands) -> None:
 
 
 @cause("execution", "missed_grasp", "PickXtimes")
-def understands_and_misses(hands: Hands) -> None:
+def understands_and_misses(hands):
     hands.declare(hands.episode.goal)
     hands.snatch(hands.stages[0].primitive.subject, 3)
 
 
-def main() -> None:
+def main():
     courses = []
     for course in play_causes(CAUSES, range(4, 50), 3):
         courses.append(course)

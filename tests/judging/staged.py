@@ -6,15 +6,9 @@ more happens after its verdict.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-
 from roboirg.core.conditions import Fact, facts_of
-from roboirg.core.episode import Episode, Scene, Stage
 from roboirg.core.motions import Shuttle
 from roboirg.judging import (
-    DeclaredIntent,
-    Event,
-    FailureAttribution,
     Judge,
     Status,
     attribute_failure,
@@ -25,7 +19,7 @@ NEAR_SHARE = 0.07
 """Of a pass, before and after its middle, in which the shuttle is near its target."""
 
 
-def judged(stages: Sequence[Stage], scene: Scene | None, *steps: Iterable[Fact]) -> Judge:
+def judged(stages, scene, *steps):
     """The judge after an evaluation of each set of facts, from step 0 on."""
     judge = Judge(stages, scene)
     for step, facts in enumerate(steps):
@@ -33,9 +27,9 @@ def judged(stages: Sequence[Stage], scene: Scene | None, *steps: Iterable[Fact])
     return judge
 
 
-def named_facts(stages: Iterable[Stage]) -> list[Fact]:
+def named_facts(stages):
     """All facts that the conditions of stages name."""
-    found: list[Fact] = []
+    found = []
     for stage in stages:
         for condition in (stage.expects, *stage.forbids):
             found += facts_of(condition)
@@ -45,18 +39,18 @@ def named_facts(stages: Iterable[Stage]) -> list[Fact]:
 class Staged:
     """One episode, its demonstration already shown; the policy's turn begins."""
 
-    def __init__(self, episode: Episode) -> None:
+    def __init__(self, episode):
         self.episode = episode
         self.judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
-        self.events: list[Event] = []
-        self.attempts: list[Event] = []
-        self.tried: set[Fact] = set()
-        self.tried_before: frozenset[Fact] = frozenset()
+        self.events = []
+        self.attempts = []
+        self.tried = set()
+        self.tried_before = frozenset()
         self.step = -1
-        self.now: set[Fact] = set()
-        self.before: frozenset[Fact] = frozenset()
+        self.now = set()
+        self.before = frozenset()
 
-        self.intent: DeclaredIntent | None = None
+        self.intent = None
         kinds = {"cube": "lying", "tape": "lying", "container": "put_down"}
         for item in episode.scene.objects:
             if item.kind in kinds:
@@ -66,7 +60,7 @@ class Staged:
         self.tick()
         self.turn = self.step
 
-    def _show(self) -> None:
+    def _show(self):
         """Whatever the video is about; only its end matters here."""
         for stage in self.episode.demonstration:
             shown = set(self.now) | {stage.expects}
@@ -77,7 +71,7 @@ class Staged:
             self.now = rest
         assert self.judge.index == len(self.episode.demonstration)
 
-    def tick(self, steps: int = 1) -> Staged:
+    def tick(self, steps=1):
         """Let time pass."""
         for _ in range(steps):
             if self.judge.status is not Status.ONGOING:
@@ -93,62 +87,58 @@ class Staged:
             self.judge.update(self.step, facts)
         return self
 
-    def until(self, step: int) -> Staged:
+    def until(self, step):
         """Let time pass until a step since reset."""
         return self.tick(step - self.step)
 
-    def _run_shuttle(self) -> None:
+    def _run_shuttle(self):
         for run in self.episode.scene.motions:
             if not isinstance(run, Shuttle):
                 continue
-            near, stopped = (Fact(kind, run.subject, "target") for kind in ("near", "stopped"))
-            if self._halted:
+            if any(event.fact == Fact("pressed", "button") for event in self.events):
                 continue
+            near = Fact("near", run.subject, "target")
             phase = (self.step / run.interval) % 1.0
             self.now.discard(near)
             if abs(phase - 0.5) <= NEAR_SHARE and self.step < run.passes * run.interval:
                 self.now.add(near)
                 if run.stopped_by in self.now:
-                    self.now.add(stopped)
+                    self.now.add(Fact("stopped", run.subject, "target"))
 
-    @property
-    def _halted(self) -> bool:
-        return any(event.fact == Fact("pressed", "button") for event in self.events)
-
-    def set(self, *facts: Fact, off: tuple[Fact, ...] = ()) -> Staged:
+    def set(self, *facts, off=()):
         """Facts begin and cease to hold, and it is a step later."""
         self.now = (self.now - set(off)) | set(facts)
         return self.tick()
 
-    def attempt(self, *facts: Fact) -> Staged:
+    def attempt(self, *facts):
         """Facts of attempts hold for a step."""
         self.tried |= set(facts)
         self.tick()
         self.tried -= set(facts)
         return self.tick()
 
-    def rest(self, steps: int = 250) -> Staged:
+    def rest(self, steps=250):
         """The hand stays where it is."""
         self.tick(60).tried.add(Fact("lingering", "robot"))
         return self.tick(steps)
 
-    def reach(self, name: str) -> Staged:
+    def reach(self, name):
         return self.set(Fact("reached", name))
 
-    def miss(self, name: str) -> Staged:
+    def miss(self, name):
         """The fingers close on nothing next to it and the hand goes away."""
         return self.attempt(Fact("clutched", name)).tick(5)
 
-    def lift(self, name: str) -> Staged:
+    def lift(self, name):
         gone = tuple(f for f in self.now if f.subject == name and f.kind in RESTING)
         self.reach(name).set(Fact("held", name), off=gone)
         return self.tick(3).set(self._up(name))
 
-    def _up(self, name: str) -> Fact:
+    def _up(self, name):
         kind = self.episode.scene[name].kind
         return Fact("lifted" if kind == "container" else "picked", name)
 
-    def put(self, name: str, place: str | None = None) -> Staged:
+    def put(self, name, place=None):
         """Lower it, let go, and take the hand away."""
         rest = "put_down" if self.episode.scene[name].kind == "container" else "lying"
         self.set(off=(self._up(name),)).tick(3)
@@ -156,25 +146,25 @@ class Staged:
         self.set(Fact(rest, name), *there, off=(Fact("held", name),))
         return self.set(off=(Fact("reached", name),))
 
-    def fill(self, name: str, place: str) -> Staged:
+    def fill(self, name, place):
         """Let it fall in; in a bin it is gone at once."""
         self.set(off=(self._up(name), Fact("held", name), Fact("reached", name))).tick(2)
         return self.set(Fact("binned", name, place))
 
-    def carry(self, name: str, place: str) -> Staged:
+    def carry(self, name, place):
         """Bring it over a place from afar, and away again."""
         over = Fact("over", name, place)
         return self.tick(20).set(over).tick(3).set(off=(over,))
 
-    def press(self, name: str = "button") -> Staged:
+    def press(self, name="button"):
         hover = Fact("hovering", "robot", name)
         down = Fact("pressed", name)
         return self.set(hover).set(down).tick(2).set(off=(down,)).set(off=(hover,))
 
-    def hover(self, name: str = "button") -> Staged:
+    def hover(self, name="button"):
         return self.set(Fact("hovering", "robot", name))
 
-    def do(self, stage: Stage, instead: dict[str, str] | None = None) -> Staged:
+    def do(self, stage, instead=None):
         """A stage of a plan as the oracle does it, with some names taken for others."""
         kind, subject, place, steps, _ = stage.primitive
         swap = instead or {}
@@ -203,14 +193,12 @@ class Staged:
                 self.tick(steps + 2)
         return self.tick()
 
-    def play(self, stages: tuple[Stage, ...]) -> Staged:
+    def play(self, stages):
         for stage in stages:
             self.do(stage)
         return self
 
-    def finding(
-        self, *, timed_out: bool = True, cause: str | None = None
-    ) -> FailureAttribution | None:
+    def finding(self, *, timed_out=True, cause=None):
         """What is said of it if time is up now, unless there is a verdict."""
         ongoing = self.judge.status is Status.ONGOING
         return attribute_failure(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import re
 from types import SimpleNamespace
-from typing import cast, get_args
+from typing import get_args
 
 import confusion
 import pytest
@@ -16,25 +16,24 @@ from made_causes import CAUSES
 from staged import Staged, named_facts
 
 from roboirg.core.conditions import Fact, Rule
-from roboirg.core.episode import Episode
 from roboirg.core.failures import FAILURES, FailureName
 from roboirg.judging import DeclaredIntent, FailureAttribution, Status, attribute_failure
-from roboirg.records.record import Record
 from roboirg.runs.play.episode_record import declared_intent
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.fingerprint import NOT_COUNTED, fingerprint, plain
 from roboirg.tasks.splits.splits import get_episode
 
 TASKS = tuple(sorted(every_task()))
-PLACES_OF_EPISODES = [("test", index) for index in range(12)] + [
-    ("train", index) for index in range(4)
-]
-"""Six easy, four medium and four hard episodes, at least."""
 CAUSED_FAILURES = read_courses(confusion.HALVES["development"])
 NAMES = sorted(
     {str(made.failure) for made in CAUSED_FAILURES if made.kind not in ("success", "unscored")}
 )
-classes = functools.cache(lambda: confusion.classes(CAUSED_FAILURES))
+
+
+@functools.cache
+def pairs_of(half):
+    """Return what was made and what is found of each course of a half, such as *development*."""
+    return confusion.pairs(read_courses(confusion.HALVES[half]))
 
 
 # Failures whose cause is known
@@ -45,7 +44,8 @@ def test_failures_with_a_known_cause_are_attributed_to_the_right_kind():
 
     Bounds are higher than for causes that the rules had not been written for.
     """
-    found = confusion.scores(CAUSED_FAILURES)
+    found = confusion.scores(pairs_of("development"))
+
     # Right among the decided ones, and by cause; undecided though acts show the cause, and
     # undecided where they show none.
     assert found.of_decided >= 0.95
@@ -57,18 +57,26 @@ def test_failures_with_a_known_cause_are_attributed_to_the_right_kind():
 @pytest.mark.parametrize("name", NAMES)
 def test_failures_with_a_known_cause_get_its_name_in_most_cases(name):
     """A name is finer than its kind: *wrong_object* is one of the kind *grounding*."""
-    many, kinds, names = classes()[name]
-    assert kinds >= 0.8 * many
-    assert names >= 0.6 * many
+    made, right_kinds, right_names = confusion.classes(pairs_of("development"))[name]
+
+    assert right_kinds >= 0.8 * made
+    assert right_names >= 0.6 * made
 
 
 @pytest.mark.parametrize("half", [half for half, path in confusion.HALVES.items() if path.exists()])
 def test_the_documentation_has_the_current_tables_of_attribution(half):
-    text = confusion.DOCUMENT.read_text()
-    assert confusion.put_in(text, "failures", confusion.failures_table()) == text
+    """From stored facts of failures that were made, in halves such as *development*."""
+    page = confusion.DOCUMENT.read_text()
 
-    courses = read_courses(confusion.HALVES[half])
-    assert confusion.put_in(text, half, confusion.table(courses)) == text
+    table = confusion.table(pairs_of(half))
+
+    assert confusion.put_in(page, half, table) == page
+
+
+def test_the_documentation_has_the_current_table_of_failures():
+    page = confusion.DOCUMENT.read_text()
+
+    assert confusion.put_in(page, "failures", confusion.failures_table()) == page
 
 
 @pytest.mark.sim
@@ -81,16 +89,17 @@ def test_playing_a_planted_mistake_again_gives_the_stored_facts_and_finding(name
     family of processors the motion, and so the step, may be another."""
     stored = next(made for made in CAUSED_FAILURES if made.cause == name)
     cause = next(cause for cause in CAUSES if cause.name == name)
+
     played = play_cause(cause, stored.episode)
-    assert played is not None
 
     found = confusion.attribute(played)
-    expected = confusion.attribute(stored)
-    assert found._replace(step=0) == expected._replace(step=0)
-    assert {attempt.fact for attempt in played.attempts} == {
-        attempt.fact for attempt in stored.attempts
-    }
-    assert {event.fact for event in played.events} == {event.fact for event in stored.events}
+    assert found._replace(step=0) == confusion.attribute(stored)._replace(step=0)
+    assert facts_in(played.attempts) == facts_in(stored.attempts)
+    assert facts_in(played.events) == facts_in(stored.events)
+
+
+def facts_in(events):
+    return {event.fact for event in events}
 
 
 def test_every_name_of_a_failure_has_an_entry_in_the_table_of_failures():
@@ -100,32 +109,56 @@ def test_every_name_of_a_failure_has_an_entry_in_the_table_of_failures():
 # The smallest inputs
 
 
-def played_without_simulator(task: str, index: int) -> Staged:
+def played_without_simulator(task, index):
+    """Return an episode of the split *test* at the beginning of the policy's turn."""
     return Staged(get_episode(task, "test", index))
 
 
-def check_failure(play: Staged, failure: str) -> None:
+def failure_of(play):
+    """Return the name of the failure that is found if time is up now."""
     found = play.finding()
-    assert found is not None
     check_finding(play, found)
-    assert found.failure == failure
+    return found.failure
+
+
+def check_finding(play, found):
+    """Assert what holds of every finding."""
+    assert found.kind == FAILURES[found.failure].kind
+    assert 0 <= found.step <= play.step - play.turn
+    assert re.fullmatch(r"[A-Z].*[^.]\.", found.sentence)
+    assert found.subject in {None, *(item.name for item in play.episode.scene.objects)}
 
 
 def test_a_failed_grasp_that_was_repeated_does_not_excuse_a_wrong_count():
     """The goal is the blue cube, twice; it is missed
     once, then placed once, then the button pressed."""
-    play = played_without_simulator("PickXtimes", 18)  # the blue cube, twice
-    play.miss("cube_blue").play(play.episode.stages[:2]).press()
-    check_failure(play, "wrong_count")
+    play = played_without_simulator("PickXtimes", 18)
+    pick, place, *_ = play.episode.stages
+
+    play.miss("cube_blue").play((pick, place)).press()
+
+    assert failure_of(play) == "wrong_count"
+
+
+def test_one_missed_grasp_does_not_excuse_three_missing_rounds():
+    """The goal is the green cube, three times; it is missed once, then the button pressed."""
+    play = played_without_simulator("PickXtimes", 0)
+
+    play.miss("cube_green").tick(150).press()
+
+    assert failure_of(play) == "wrong_count"
 
 
 def test_a_wrong_container_lifted_before_the_press_is_not_blamed_for_a_timeout():
     """Until the button is pressed, lifting containers is allowed; then nothing happens any more."""
     play = played_without_simulator("ButtonUnmask", 0)  # container_0 is meant
-    check_failure(play.lift("container_1").put("container_1").rest(), "stopped")
+
+    play.lift("container_1").put("container_1").rest()
+
+    assert failure_of(play) == "stopped"
 
 
-def drop(play: Staged, name: str) -> Staged:
+def drop(play, name):
     """The fingers open while it is up, and it falls."""
     in_hand = (Fact("picked", name), Fact("held", name), Fact("reached", name))
     return play.set(off=in_hand).tick(2).set(Fact("lying", name))
@@ -133,85 +166,126 @@ def drop(play: Staged, name: str) -> Staged:
 
 def test_a_cube_that_fell_on_the_wrong_disc_was_dropped():
     play = played_without_simulator("VideoPlaceOrder", 2)  # the red cube onto target_1
-    drop(play.lift("cube_red"), "cube_red").set(Fact("placed", "cube_red", "target_0"))
-    check_failure(play, "dropped")
+
+    play.lift("cube_red")
+    drop(play, "cube_red").set(Fact("placed", "cube_red", "target_0"))
+
+    assert failure_of(play) == "dropped"
 
 
 def test_a_cube_that_is_put_on_the_wrong_disc_is_at_the_wrong_place_though_it_fell_long_ago():
     play = played_without_simulator("VideoPlaceOrder", 2)  # the red cube onto target_1
-    drop(play.lift("cube_red"), "cube_red").tick(100)
-    check_failure(play.lift("cube_red").put("cube_red", "target_0"), "wrong_place")
+
+    play.lift("cube_red")
+    drop(play, "cube_red").tick(100)
+    play.lift("cube_red").put("cube_red", "target_0")
+
+    assert failure_of(play) == "wrong_place"
 
 
 def test_a_failed_grasp_next_to_two_cubes_is_an_ambiguous_act():
     """The fact "clutched" says that the fingers closed on nothing next to a thing."""
-    both = (Fact("clutched", "cube_blue"), Fact("clutched", "cube_red"))
-    check_failure(played_without_simulator("PickXtimes", 2).attempt(*both).rest(), "ambiguous_act")
+    play = played_without_simulator("PickXtimes", 2)  # the blue cube is meant
+
+    play.attempt(Fact("clutched", "cube_blue"), Fact("clutched", "cube_red")).rest()
+
+    assert failure_of(play) == "ambiguous_act"
 
 
 def test_reaching_for_a_wrong_cube_without_grasping_is_no_attempt():
     """The fact "reached" says that the hand is at a thing."""
     play = played_without_simulator("PickXtimes", 2)  # the blue cube is meant
-    check_failure(
-        play.reach("cube_red").set(off=(Fact("reached", "cube_red"),)).rest(), "no_attempt"
-    )
+
+    play.reach("cube_red").set(off=(Fact("reached", "cube_red"),)).rest()
+
+    assert failure_of(play) == "no_attempt"
 
 
 def test_a_round_whose_grasp_failed_unseen_in_the_middle_is_not_a_wrong_count():
     """Three rounds are meant and done, the second with an empty hand, then the button pressed."""
     play = played_without_simulator("PickXtimes", 0)  # the green cube, three times
-    first = play.play(play.episode.stages[:2]).miss("cube_green").tick(150)
-    check_failure(first.play(play.episode.stages[2:4]).press(), "missed_grasp")
+    pick, place, pick_again, place_again, *_ = play.episode.stages
+
+    play.play((pick, place)).miss("cube_green").tick(150)
+    play.play((pick_again, place_again)).press()
+
+    assert failure_of(play) == "missed_grasp"
 
 
 def test_a_swing_that_wobbles_over_a_disc_is_not_a_wrong_count():
-    play = played_without_simulator("SwingXtimes", 14)  # the red cube, once
-    play.play(play.episode.stages[:2])
-    check_failure(play.set(Fact("over", "cube_red", "target_right")).rest(), "misplaced")
+    """The red cube is meant to swing once; over the right disc it is twice."""
+    play = played_without_simulator("SwingXtimes", 14)
+    pick, right, *_ = play.episode.stages
+
+    play.play((pick, right)).set(Fact("over", "cube_red", "target_right")).rest()
+
+    assert failure_of(play) == "misplaced"
 
 
 def test_a_first_visit_beside_the_disc_is_not_a_wrong_order():
     """The right disc is due; the cube passes next to it, and then over the left one."""
-    play = played_without_simulator("SwingXtimes", 14).lift("cube_red")
-    play.attempt(Fact("beside", "cube_red", "target_right"))
-    check_failure(play.carry("cube_red", "target_left").rest(), "misplaced")
+    play = played_without_simulator("SwingXtimes", 14)
+
+    play.lift("cube_red").attempt(Fact("beside", "cube_red", "target_right"))
+    play.carry("cube_red", "target_left").rest()
+
+    assert failure_of(play) == "misplaced"
 
 
 def test_a_cube_let_go_by_a_hand_at_rest_over_a_wrong_disc_has_not_been_dropped():
-    play = played_without_simulator("VideoPlaceOrder", 14).lift("cube_red")
-    play.set(Fact("over", "cube_red", "target_0"), Fact("still", "robot")).tick(5)
-    gone = (Fact("held", "cube_red"), Fact("picked", "cube_red"))
-    play.set(off=gone).set(Fact("lying", "cube_red"), Fact("placed", "cube_red", "target_0"))
-    check_failure(play, "wrong_place")
+    play = played_without_simulator("VideoPlaceOrder", 14)
+
+    play.lift("cube_red").set(Fact("over", "cube_red", "target_0"), Fact("still", "robot")).tick(5)
+    play.set(off=(Fact("held", "cube_red"), Fact("picked", "cube_red")))
+    play.set(Fact("lying", "cube_red"), Fact("placed", "cube_red", "target_0"))
+
+    assert failure_of(play) == "wrong_place"
 
 
 def test_a_cube_set_on_another_cube_has_not_been_misplaced():
     """It lies nowhere afterwards."""
-    play = played_without_simulator("VideoPlaceOrder", 14).lift("cube_red")
-    play.set(off=(Fact("picked", "cube_red"),))
-    gone = (Fact("held", "cube_red"), Fact("reached", "cube_red"))
-    check_failure(play.set(off=gone).rest(), "wrong_place")
+    play = played_without_simulator("VideoPlaceOrder", 14)
+
+    play.lift("cube_red").set(off=(Fact("picked", "cube_red"),))
+    play.set(off=(Fact("held", "cube_red"), Fact("reached", "cube_red"))).rest()
+
+    assert failure_of(play) == "wrong_place"
 
 
 def test_a_hand_that_stays_above_a_wrong_cube_has_made_its_choice():
     play = played_without_simulator("PickXtimes", 2)  # the blue cube is meant
     play.tried.add(Fact("above", "robot", "cube_red"))
-    check_failure(play.tick(100), "wrong_object")
+
+    play.tick(100)
+
+    assert failure_of(play) == "wrong_object"
 
 
 def test_a_hand_on_its_way_down_when_the_visit_is_over_has_not_stopped():
     """Hands above the button linger there; this one is no longer still."""
     play = played_without_simulator("StopCube", 0).hover()
     play.tried.add(Fact("lingering", "robot"))
-    check_failure(play.tick(1000), "out_of_time")
+
+    play.tick(1000)
+
+    assert failure_of(play) == "out_of_time"
 
 
-@pytest.mark.parametrize(
-    "held", [(), (Fact("held", "cube_blue"), Fact("hovering", "robot", "button"))]
-)
-def test_a_button_touched_by_the_arm_or_by_what_is_in_the_hand_is_no_wrong_count(held):
+def test_a_button_touched_by_the_arm_is_no_wrong_count():
     play = played_without_simulator("PickXtimes", 2)
-    check_failure(play.set(*held).set(Fact("pressed", "button")), "touched_button")
+
+    play.set(Fact("pressed", "button"))
+
+    assert failure_of(play) == "touched_button"
+
+
+def test_a_button_touched_by_what_is_in_the_hand_is_no_wrong_count():
+    play = played_without_simulator("PickXtimes", 2)
+
+    play.set(Fact("held", "cube_blue"), Fact("hovering", "robot", "button"))
+    play.set(Fact("pressed", "button"))
+
+    assert failure_of(play) == "touched_button"
 
 
 @pytest.mark.parametrize(
@@ -220,9 +294,12 @@ def test_a_button_touched_by_the_arm_or_by_what_is_in_the_hand_is_no_wrong_count
 def test_failures_of_stopping_the_moving_cube_too_early_or_too_late(late, failure):
     """`late` is how late the button is pressed, in passes of the cube (negative: early)."""
     play = played_without_simulator("StopCube", 0)
-    interval = play.episode.scene.motions[0].interval  # type: ignore[union-attr]
-    moment = play.episode.stages[-1].primitive.steps + round(late * interval)
-    check_failure(play.hover().until(moment - 2).press(), failure)
+    (shuttle,) = play.episode.scene.motions
+    moment = play.episode.stages[-1].primitive.steps + round(late * shuttle.interval)
+
+    play.hover().until(moment - 2).press()
+
+    assert failure_of(play) == failure
 
 
 @pytest.mark.parametrize(
@@ -236,44 +313,45 @@ def test_failures_of_stopping_the_moving_cube_too_early_or_too_late(late, failur
 )
 def test_what_a_policy_says_it_understood_decides_before_what_it_did(intent, failure):
     """A policy may declare its goal, or subgoals that are judged. Here it then does nothing."""
-    play = played_without_simulator("PickXtimes", 2).rest()
+    play = played_without_simulator("PickXtimes", 2)
     play.intent = intent
-    check_failure(play, failure)
+
+    play.rest()
+
+    assert failure_of(play) == failure
 
 
 @pytest.mark.parametrize("understood", ["the red one", {"confidence": 0.9}, ["red"], 3])
 def test_metadata_called_understood_that_is_no_goal_is_ignored(understood):
     """Only a mapping from slots of the goal to values counts, such as {"color": "red"}."""
-    record = SimpleNamespace(
-        policy_metadata={"understood": understood}, goal={"color": "red"}, subgoals=()
-    )
-    assert declared_intent(cast("Record", record)) is None
+    metadata = {"understood": understood}
+    record = SimpleNamespace(policy_metadata=metadata, goal={"color": "red"}, subgoals=())
 
-
-def check_finding(play: Staged, found: FailureAttribution) -> None:
-    """What holds of every finding."""
-    assert found.kind == FAILURES[found.failure].kind
-    assert 0 <= found.step <= play.step - play.turn
-    assert re.fullmatch(r"[A-Z].*[^.]\.", found.sentence)
-    if found.subject is not None:
-        assert found.subject in {item.name for item in play.episode.scene.objects}
+    assert declared_intent(record) is None
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_an_unreachable_pose_is_an_execution_failure_at_the_step_of_the_report(task):
     play = played_without_simulator(task, 3).tick(5)
+
     found = play.finding(timed_out=False, cause="no way to (9, 9, 9)")
 
     assert found == FailureAttribution(
         "execution", "unreachable", None, 5, "Could not reach a pose: no way to (9, 9, 9)."
     )
+
+
+def test_an_episode_that_is_not_over_has_no_attribution():
+    play = played_without_simulator("PickXtimes", 3).tick(5)
+
     assert play.finding(timed_out=False) is None
 
 
-def test_an_episode_that_ends_during_its_video_counts_as_no_attempt() -> None:
+def test_an_episode_that_ends_during_its_video_counts_as_no_attempt():
     episode = get_episode("VideoPlaceOrder", "test", 1)
+
     found = attribute_failure(episode, [], timed_out=True, policy_start_step=0, elapsed_steps=50)
-    assert found is not None
+
     assert found.failure == "no_attempt"
 
 
@@ -281,14 +359,15 @@ def test_an_episode_that_ends_during_its_video_counts_as_no_attempt() -> None:
 
 
 @pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("where", PLACES_OF_EPISODES, ids=lambda where: f"{where[0]}-{where[1]}")
-def test_a_success_has_no_attribution(task, where):
-    episode = get_episode(task, *where)
+@pytest.mark.parametrize(("split", "index"), [("test", 0), ("test", 2), ("test", 3), ("train", 1)])
+def test_a_success_has_no_attribution(task, split, index):
+    """Episodes 0 and 1 of a task are easy, 2 is medium, and 3 is hard."""
+    episode = get_episode(task, split, index)
+
     play = Staged(episode).play(episode.stages)
 
     assert play.judge.status is Status.SUCCESS
     assert play.finding() is None
-    assert play.finding(timed_out=False) is None
 
 
 episodes = st.builds(get_episode, st.sampled_from(TASKS), st.just("test"), st.integers(0, 49))
@@ -306,7 +385,6 @@ def test_stopping_a_correct_run_at_any_time_is_never_a_grounding_failure(episode
         episode, events, timed_out=True, policy_start_step=play.turn, elapsed_steps=end
     )
 
-    assert found is not None
     assert found.kind != "grounding"
     assert found.step <= end - play.turn
 
@@ -334,7 +412,7 @@ def test_exchanging_two_objects_all_along_is_a_grounding_failure_or_no_failure(e
         assert right != wrong
 
 
-def stages_with_a_thing(episode: Episode) -> list[int]:
+def stages_with_a_thing(episode):
     """Return the places of the stages that take a thing or go to one."""
     found = []
     for index, stage in enumerate(episode.stages):
@@ -347,7 +425,7 @@ def stages_with_a_thing(episode: Episode) -> list[int]:
 # Anything at all
 
 
-def any_course_of_facts(episode: Episode) -> st.SearchStrategy[list[frozenset[Fact]]]:
+def any_course_of_facts(episode):
     """Courses of facts of which most make no sense, though they are about what is there."""
     asked = sorted(set(named_facts(episode.stages)), key=str)
     objects = {thing.name for thing in episode.scene.objects}
@@ -367,11 +445,12 @@ def test_any_course_of_facts_has_a_finding_exactly_if_the_episode_failed(episode
         lasting = {fact for fact in play.now if fact.kind == "binned"}
         play.now = lasting | facts
         play.tick(data.draw(st.integers(1, 40)))
+
     found = play.finding(timed_out=timed_out)
 
     failed = play.judge.status is Status.FAILURE
-
-    assert (found is not None) == (failed or (timed_out and play.judge.status is Status.ONGOING))
+    ran_out = timed_out and play.judge.status is Status.ONGOING
+    assert (found is not None) == (failed or ran_out)
     if found is not None:
         check_finding(play, found)
         assert found == play.finding(timed_out=timed_out)
@@ -384,14 +463,12 @@ def test_a_mistake_that_is_judged_later_is_dated_when_it_happened():
     """A blue cube falls into the bin first; the verdict comes at the end, when green ones lack."""
     play = played_without_simulator("BinFill", 2)  # green cubes are meant, three or more
     play.lift("cube_blue_0").fill("cube_blue_0", "bin")
-    done = play.step
+    mistake = play.step
 
     found = play.play(play.episode.stages[2:]).finding()
 
-    assert play.judge.status is Status.FAILURE
-    assert found is not None
     assert (found.failure, found.subject) == ("wrong_object", "cube_blue_0")
-    assert play.turn + found.step == done < play.step
+    assert play.turn + found.step == mistake < play.step
 
 
 def test_the_fingerprint_of_an_episode_ignores_how_its_failures_are_named():

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import pytest
 from selection import slow_but
 
 import roboirg
 from roboirg.core.episode import Goal
-from roboirg.envs.environment import RoboIRGEnv
-from roboirg.judging import FailureAttribution, attribute_failure
+from roboirg.judging import attribute_failure
 from roboirg.language import instruct, mirrored_objects
 from roboirg.policies import play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
@@ -22,9 +18,7 @@ from roboirg.tasks.splits.splits import get_episode
 pytestmark = pytest.mark.sim
 
 
-def attribution_of(
-    env: RoboIRGEnv, info: dict[str, Any], mirrored: Mapping[str, frozenset[str]] | None = None
-) -> FailureAttribution | None:
+def attribution_of(env, info, mirrored=None):
     return attribute_failure(
         env.episode,
         env.events,
@@ -37,18 +31,14 @@ def attribution_of(
     )
 
 
-OTHER_KINDS = {"StopCube": "undecided", "VideoUnmaskSwap": "execution"}
-"""Nobody sees that a later visit was meant, or that a container in the air was meant alone."""
-
-
 class OracleWithAnotherGoal(ScriptedPolicy):
     """The oracle's hands with another goal in mind."""
 
-    def __init__(self, goal: Goal) -> None:
+    def __init__(self, goal):
         super().__init__()
         self.goal = goal
 
-    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
+    def decide(self, env, instruction):
         return self.goal
 
 
@@ -56,35 +46,55 @@ class OracleWithAnotherGoal(ScriptedPolicy):
     "task", slow_but(["PickXtimes", "VideoUnmask", "VideoRepick", "PutInBox"], every_task())
 )
 def test_an_oracle_that_pursues_a_wrong_goal_fails_by_grounding(task):
-    """Grounding: it acts well, on what the words do not mean."""
+    """Grounding: it acts well, on what the words do not mean.
+
+    But nobody sees that a later visit of StopCube's cube was meant, or that a container in the air
+    was meant alone. A goal that includes more than the right one succeeds on the way.
+    """
+    other_kinds = {"StopCube": "undecided", "VideoUnmaskSwap": "execution"}
     episode = get_episode(task, "test", 3)
     others = [goal for goal in get_task(task).goals(episode.scene) if goal != episode.goal]
     for goal in {others[0], others[-1]}:
         env = roboirg.make(episode, cameras=(), max_steps=1000)
+
         info = play(env, OracleWithAnotherGoal(goal))
+
         found = attribution_of(env, info)
-        # A goal that includes more than the right one succeeds on the way.
         succeeds = begins_with(with_goal(episode, goal).stages, episode.stages)
-        assert (info["status"] == "success") == (info["cause"] is None) == succeeds, goal
-        assert info["is_success"] == (found is None) == succeeds
-        assert found is None or found.kind in ("grounding", OTHER_KINDS.get(task)), (goal, found)
+        assert info["is_success"] == succeeds, goal
+        assert (found is None) == succeeds, goal
+        if not succeeds:
+            assert info["cause"] is not None, goal
+            assert found.kind in ("grounding", other_kinds.get(task)), goal
 
 
-def test_picking_the_cube_on_the_opposite_side_is_called_a_mirrored_pick():
-    """The goal is the green cube, all the way on the
-    right; the red one is all the way on the left."""
-    episode = get_episode("PickXtimes", "train", 39)  # the green cube, all the way on the right
-    mirrored = mirrored_objects(episode, instruct(episode, "spatial"))
+GREEN_ON_THE_RIGHT = get_episode("PickXtimes", "train", 39)
+"""The goal is the green cube, all the way on the right; the red one is all the way on the left."""
+
+
+@pytest.fixture(scope="module")
+def pick_of_the_red_cube():
+    """Play the episode with the red cube in mind; return the environment and its last info."""
+    env = roboirg.make(GREEN_ON_THE_RIGHT, setting="spatial", cameras=())
+    return env, play(env, OracleWithAnotherGoal(Goal.of(color="red", repeats=5)))
+
+
+def test_the_mirrored_object_of_words_is_meant_with_left_and_right_exchanged():
+    mirrored = mirrored_objects(GREEN_ON_THE_RIGHT, instruct(GREEN_ON_THE_RIGHT, "spatial"))
+
     assert mirrored == {"cube_green": {"cube_red"}}
 
-    env = roboirg.make(episode, setting="spatial", cameras=())
-    info = play(env, OracleWithAnotherGoal(Goal.of(color="red", repeats=5)))
-    found = attribution_of(env, info, mirrored)
-    assert found is not None
+
+def test_picking_the_cube_on_the_opposite_side_is_called_a_mirrored_pick(pick_of_the_red_cube):
+    mirrored = {"cube_green": frozenset({"cube_red"})}
+
+    found = attribution_of(*pick_of_the_red_cube, mirrored)
+
     assert (found.kind, found.failure, found.subject) == ("grounding", "mirrored_pick", "cube_red")
     assert found.sentence.endswith("; the words mean it only with left and right exchanged.")
 
-    # Without knowing which object the words mean mirrored, it is just a wrong one.
-    untold = attribution_of(env, info)
-    assert untold is not None
-    assert untold.failure == "wrong_object"
+
+def test_a_pick_on_the_opposite_side_is_just_a_wrong_object_if_no_mirrored_one_is_known(
+    pick_of_the_red_cube,
+):
+    assert attribution_of(*pick_of_the_red_cube).failure == "wrong_object"

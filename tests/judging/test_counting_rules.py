@@ -45,6 +45,10 @@ def facts_of_filling(*cubes):
 
 
 def judged_after_filling(*cubes, then=()):
+    """Return the judge after cubes were dropped into the bin, and then the facts of more steps.
+
+    The goal is two red cubes and a blue one, then to press the button.
+    """
     inside = [Fact("binned", cube, "bin") for cube in cubes]
     return judged(
         TWO_RED_ONE_BLUE,
@@ -65,18 +69,26 @@ def judged_after_filling(*cubes, then=()):
 )
 def test_bin_fill_accepts_any_order_and_any_cubes_of_the_colors(cubes):
     """The goal is two red cubes and a blue one, then to press the button."""
-    assert judged_after_filling(*cubes, then=[[]]).status is Status.ONGOING
-    assert judged_after_filling(*cubes, then=[[], [PRESSED]]).status is Status.SUCCESS
-    assert judged_after_filling(*cubes, then=[[PRESSED]]).status is Status.SUCCESS
+    filled = judged_after_filling(*cubes, then=[[]])
+    pressed = judged_after_filling(*cubes, then=[[], [PRESSED]])
+
+    assert filled.status is Status.ONGOING
+    assert pressed.status is Status.SUCCESS
 
 
-def test_bin_fill_punishes_a_press_before_the_last_drop():
+def test_bin_fill_accepts_a_press_in_the_step_after_the_last_drop():
+    judge = judged_after_filling("cube_red_0", "cube_red_1", "cube_blue_0", then=[[PRESSED]])
+
+    assert judge.status is Status.SUCCESS
+
+
+@pytest.mark.parametrize("cubes", [(), ("cube_red_0",), ("cube_red_0", "cube_red_1")])
+def test_bin_fill_punishes_a_press_before_the_last_drop(cubes):
     """The goal is two red cubes and a blue one, then to press the button."""
-    assert judged_after_filling(then=[[PRESSED]]).status is Status.FAILURE
-    for cubes in (("cube_red_0",), ("cube_red_0", "cube_red_1")):
-        judge = judged_after_filling(*cubes, then=[[PRESSED]])
-        assert judge.status is Status.FAILURE
-        assert judge.cause.startswith("pressed the button; expected: pick up the")
+    judge = judged_after_filling(*cubes, then=[[PRESSED]])
+
+    assert judge.status is Status.FAILURE
+    assert judge.cause.startswith("pressed the button; expected: pick up the")
 
 
 @pytest.mark.parametrize(
@@ -90,11 +102,12 @@ def test_bin_fill_punishes_a_press_before_the_last_drop():
 )
 def test_bin_fill_punishes_a_wrong_mix_one_step_after_the_last_drop(cubes, cause):
     """The goal is two red cubes and a blue one; three cubes are in, but not these."""
-    assert judged_after_filling(*cubes).status is Status.ONGOING
+    at_the_drop = judged_after_filling(*cubes)
+    a_step_later = judged_after_filling(*cubes, then=[[]])
 
-    judge = judged_after_filling(*cubes, then=[[]])
-    assert judge.status is Status.FAILURE
-    assert judge.cause == f"{cause}; expected: press the button"
+    assert at_the_drop.status is Status.ONGOING
+    assert a_step_later.status is Status.FAILURE
+    assert a_step_later.cause == f"{cause}; expected: press the button"
 
 
 @pytest.mark.parametrize(
@@ -108,25 +121,24 @@ def test_bin_fill_punishes_a_wrong_mix_one_step_after_the_last_drop(cubes, cause
 def test_bin_fill_punishes_one_cube_too_many_as_it_lands_but_not_its_picking(extra, cause):
     """The goal is two red cubes and a blue one, and a fourth cube follows."""
     right = ("cube_red_0", "cube_red_1", "cube_blue_0")
-    held = judged_after_filling(*right, then=[[], [picked(extra)], []])
-    assert held.status is Status.ONGOING
+    binned = Fact("binned", extra, "bin")
 
-    landed = judged_after_filling(
-        *right, then=[[], [picked(extra)], [Fact("binned", extra, "bin")]]
-    )
+    held = judged_after_filling(*right, then=[[], [picked(extra)], []])
+    landed = judged_after_filling(*right, then=[[], [picked(extra)], [binned]])
+
+    assert held.status is Status.ONGOING
     assert landed.status is Status.FAILURE
     assert landed.cause.startswith(cause)
 
 
 def test_bin_fill_does_not_punish_dropping_beside_and_picking_again():
     """A green and a red cube fall next to the bin; then the two red and the blue one go in."""
-    steps = [[picked("cube_green_0")], [], [picked("cube_red_0")], [], [picked("cube_red_0")], []]
-    assert judged(TWO_RED_ONE_BLUE, FILL_SCENE, *steps).status is Status.ONGOING
+    drops = [[picked("cube_green_0")], [], [picked("cube_red_0")], [], [picked("cube_red_0")], []]
+    filling = facts_of_filling("cube_red_0", "cube_red_1", "cube_blue_0")
 
-    rest = facts_of_filling("cube_red_0", "cube_red_1", "cube_blue_0")
-    inside = [Fact("binned", c, "bin") for c in ("cube_red_0", "cube_red_1", "cube_blue_0")]
-    judge = judged(TWO_RED_ONE_BLUE, FILL_SCENE, *steps, *rest, inside, [*inside, PRESSED])
-    assert judge.status is Status.SUCCESS
+    judge = judged(TWO_RED_ONE_BLUE, FILL_SCENE, *drops, *filling)
+
+    assert judge.status is Status.ONGOING
 
 
 # SwingXtimes: the red cube, twice.
@@ -141,6 +153,7 @@ RIGHT_THEN_LEFT = [[RED_HELD, RIGHT], [RED_HELD, RIGHT], [RED_HELD], [RED_HELD, 
 
 
 def judged_swings(*steps):
+    """Return the judge after steps with these facts; the goal is to swing the red cube twice."""
     return judged(RED_TWICE, SWING_SCENE, *steps)
 
 
@@ -166,63 +179,56 @@ def test_swing_succeeds_if_the_cube_is_put_down_over_the_left_target():
 
 def test_swing_punishes_another_cube_in_every_stage():
     """The goal is the red cube, twice: a pick, two swings each way, and a put-down."""
-    whole = [
-        [RED_HELD],
-        [RED_HELD, RIGHT],
-        [RED_HELD, LEFT],
-        [RED_HELD, RIGHT],
-        [RED_HELD, LEFT],
-        [RED_LYING],
-    ]
-    for done in range(len(whole) + 1):
-        for wrong in ("cube_green", "cube_blue"):
-            judge = judged_swings(*whole[:done], [picked(wrong)])
-            assert judge.status is Status.FAILURE
-            assert judge.cause.startswith(f"picked up the {wrong[5:]} cube")
+    right = [RED_HELD, RIGHT]
+    left = [RED_HELD, LEFT]
+    whole = [[RED_HELD], right, left, right, left, [RED_LYING]]
+    for done in range(7):
+        judge = judged_swings(*whole[:done], [picked("cube_green")])
+
+        assert judge.status is Status.FAILURE, done
+        assert judge.cause.startswith("picked up the green cube"), done
 
 
 @pytest.mark.parametrize("side", [RIGHT, LEFT])
-def test_swing_punishes_a_visit_too_many_before_and_after_the_put_down(side):
+@pytest.mark.parametrize("put_down", [[], [[RED_LYING], [RED_HELD]]], ids=["before", "after"])
+def test_swing_punishes_a_visit_too_many_before_and_after_the_put_down(side, put_down):
     """`side` is the fact that the red cube is over one of the targets a fifth time."""
-    swings = [*PICK_RED, *RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT]
-    for steps in (
-        [*swings, [RED_HELD, side]],
-        [*swings, [RED_LYING], [RED_HELD], [RED_HELD, side]],
-    ):
-        assert judged_swings(*steps[:-1]).status is Status.ONGOING
-        judge = judged_swings(*steps)
-        assert judge.status is Status.FAILURE
-        assert judge.cause.startswith("moved the cube over a target too often")
+    swings = [*PICK_RED, *RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT, *put_down]
+
+    judge = judged_swings(*swings, [RED_HELD, side])
+
+    assert judged_swings(*swings).status is Status.ONGOING
+    assert judge.status is Status.FAILURE
+    assert judge.cause.startswith("moved the cube over a target too often")
 
 
 def test_swing_visits_of_other_cubes_do_not_count():
-    """A blue cube is over the right target six times, without having been picked up."""
-    other = [[RED_HELD, Fact("over", "cube_blue", "target_right")], [RED_HELD]] * 6
-    steps = [
-        *PICK_RED,
-        *other,
-        *RIGHT_THEN_LEFT,
-        *RIGHT_THEN_LEFT,
-        [RED_LYING],
-        [RED_LYING, PRESSED],
-    ]
-    assert judged_swings(*steps).status is Status.SUCCESS
+    """The red cube is to swing twice from right to left. While it is held, a blue cube is over the
+    right target six times, without having been picked up."""
+    visits = [[RED_HELD, Fact("over", "cube_blue", "target_right")], [RED_HELD]] * 6
+    swings = [*RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT]
+
+    judge = judged_swings(*PICK_RED, *visits, *swings, [RED_LYING], [RED_LYING, PRESSED])
+
+    assert judge.status is Status.SUCCESS
 
 
-def test_swing_does_not_punish_dropping_on_the_way_nor_picking_after_the_put_down():
-    """The red cube falls between the two swings, and is lifted once more at the end."""
+def test_swing_does_not_punish_dropping_between_the_swings():
     dropped = [[RED_LYING], [RED_LYING], [RED_HELD]]
-    steps = [
-        *PICK_RED,
-        *RIGHT_THEN_LEFT,
-        *dropped,
-        *RIGHT_THEN_LEFT,
-        [RED_LYING],
-        [RED_HELD],
-        [RED_LYING],
-        [RED_LYING, PRESSED],
-    ]
-    assert judged_swings(*steps).status is Status.SUCCESS
+    swings = [*RIGHT_THEN_LEFT, *dropped, *RIGHT_THEN_LEFT]
+
+    judge = judged_swings(*PICK_RED, *swings, [RED_LYING], [RED_LYING, PRESSED])
+
+    assert judge.status is Status.SUCCESS
+
+
+def test_swing_does_not_punish_picking_the_cube_up_again_after_the_put_down():
+    swings = [*RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT]
+    again = [[RED_LYING], [RED_HELD], [RED_LYING]]
+
+    judge = judged_swings(*PICK_RED, *swings, *again, [RED_LYING, PRESSED])
+
+    assert judge.status is Status.SUCCESS
 
 
 # StopCube: 120 steps a pass, the third visit, whose middle is at step 300.
@@ -261,57 +267,77 @@ def facts_of_a_run(pressed_at=None, hover_at=40, until=500):
         yield facts
 
 
-def verdict_and_step(**how):
-    """The judge, and the step at which it gave its verdict."""
+def verdict_and_step(**hands):
+    """Return the judge, and the step at which it gave its verdict.
+
+    Args:
+        hands: step at which the button is pressed (`pressed_at`; never by default), and from which
+            on the hand is above it (`hover_at`; 40 by default).
+    """
     judge = Judge(THIRD_VISIT, STOP_SCENE)
-    for step, facts in enumerate(facts_of_a_run(**how)):
+    for step, facts in enumerate(facts_of_a_run(**hands)):
         if judge.update(step, frozenset(facts)) is not Status.ONGOING:
             return judge, step
     return judge, None
-
-
-NOT_ON_TARGET = "pressed the button while the cube was off the target"
-EARLIER_VISIT = "stopped the cube on an earlier"
-VISIT_PASSED = "let the cube's third visit pass"
-AFTER_THIRD_VISIT = 3 * INTERVAL + 1
 
 
 @pytest.mark.parametrize("pressed_at", [292, 300, 308])
 def test_stop_cube_is_done_when_stopped_on_the_wanted_visit(pressed_at):
     """The cube passes its target every 120 steps; the middle of the third visit is step 300."""
     judge, step = verdict_and_step(pressed_at=pressed_at)
+
     assert (judge.status, step) == (Status.SUCCESS, pressed_at)
 
 
 @pytest.mark.parametrize(
-    ("how", "at", "cause"),
+    ("step", "due"),
     [
-        # Off the target at once, on an earlier visit when it is time to press.
-        *(({"pressed_at": step}, step, NOT_ON_TARGET) for step in (0, 20, 120, 200, 280, 291, 309)),
-        *(({"pressed_at": step}, 270 + 1, EARLIER_VISIT) for step in (60, 180, 188)),
-        ({"pressed_at": 180, "hover_at": None}, AFTER_THIRD_VISIT, VISIT_PASSED),
-        *(
-            (late, AFTER_THIRD_VISIT, VISIT_PASSED)
-            for late in ({}, {"pressed_at": 420}, {"hover_at": None})
-        ),
+        (0, "move to the top of the button"),
+        (120, "wait"),
+        (200, "wait"),
+        (291, "press"),
+        (309, "press"),
     ],
 )
-def test_stop_cube_fails_if_the_button_is_pressed_off_the_target_or_on_another_visit(
-    how, at, cause
+def test_stop_cube_fails_at_once_if_the_button_is_pressed_while_the_cube_is_off_the_target(
+    step, due
 ):
-    """The third visit is meant, steps 292 to 308; `at` is the step of the verdict.
+    """The third visit is meant; the cube is on the target at steps 292 to 308, and 120 before."""
+    judge, verdict_step = verdict_and_step(pressed_at=step)
 
-    An earlier visit is punished only when it is time to press, at step 271.
-    """
-    judge, step = verdict_and_step(**how)
-    assert (judge.status, step) == (Status.FAILURE, at)
-    assert judge.cause.startswith(cause)
-    assert judge.cause.endswith("; expected: wait") == (at in (120, 200))
+    cause = "pressed the button while the cube was off the target"
+    assert (judge.status, verdict_step) == (Status.FAILURE, step)
+    assert judge.cause.startswith(f"{cause}; expected: {due}")
 
 
-def test_stop_cube_succeeds_though_the_hand_comes_to_the_button_late():
+@pytest.mark.parametrize("pressed_at", [60, 180, 188])
+def test_stop_cube_fails_when_it_is_time_to_press_if_the_cube_was_stopped_on_an_earlier_visit(
+    pressed_at,
+):
+    """The third visit is meant, for which it is time to press after step 270."""
+    judge, step = verdict_and_step(pressed_at=pressed_at)
+
+    assert (judge.status, step) == (Status.FAILURE, 271)
+    assert judge.cause.startswith("stopped the cube on an earlier")
+
+
+@pytest.mark.parametrize(
+    "hands",
+    [{}, {"pressed_at": 420}, {"hover_at": None}, {"pressed_at": 180, "hover_at": None}],
+    ids=["never pressed", "pressed too late", "never there", "pressed but never there"],
+)
+def test_stop_cube_fails_when_the_wanted_visit_has_passed(hands):
+    """The third visit ends with the third pass of 120 steps."""
+    judge, step = verdict_and_step(**hands)
+
+    assert (judge.status, step) == (Status.FAILURE, 361)
+    assert judge.cause.startswith("let the cube's third visit pass")
+
+
+@pytest.mark.parametrize(("hover_at", "latest"), [(299, 307), (340, 499)])
+def test_stop_cube_succeeds_though_the_hand_comes_to_the_button_late(hover_at, latest):
     """The stages before the press are to hover over the button and to wait, one evaluation each."""
-    judge, step = verdict_and_step(pressed_at=300, hover_at=299)
+    judge, step = verdict_and_step(pressed_at=300, hover_at=hover_at)
+
     assert judge.status is Status.SUCCESS
-    assert step <= 300 + 7
-    assert verdict_and_step(pressed_at=300, hover_at=340)[0].status is Status.SUCCESS
+    assert step <= latest

@@ -1,7 +1,6 @@
 """Conditions say what they mean, for any course of events."""
 
-import itertools
-
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -11,9 +10,10 @@ from roboirg.judging.fact_history import FactHistory
 PICKED_A = Fact("picked", "a")
 PICKED_B = Fact("picked", "b")
 PRESSED = Fact("pressed", "button")
-lists_of_simultaneous_facts = st.lists(
+courses_of_facts = st.lists(
     st.frozensets(st.sampled_from([PICKED_A, PICKED_B, PRESSED])), min_size=1, max_size=15
 )
+"""The facts that hold at each step, from step 0 on."""
 bounds = st.integers(0, 4)
 
 
@@ -25,51 +25,80 @@ def history_of(course):
 
 
 @settings(max_examples=60)
-@given(lists_of_simultaneous_facts, bounds, st.none() | bounds)
+@given(courses_of_facts, bounds, st.none() | bounds)
 def test_fact_count_counts_which_facts_hold_at_the_last_step(course, least, most):
     """`least` and `most` are bounds of the count; None is no bound."""
-    now = sum(fact in course[-1] for fact in (PICKED_A, PICKED_B))
-    wanted = now >= least and (most is None or now <= most)
-    assert history_of(course).holds(FactCount((PICKED_A, PICKED_B), least, most)) == wanted
+    condition = FactCount((PICKED_A, PICKED_B), least, most)
+
+    holds = history_of(course).holds(condition)
+
+    count = len(course[-1] & {PICKED_A, PICKED_B})
+    assert holds == (count >= least and (most is None or count <= most))
 
 
 @settings(max_examples=60)
-@given(lists_of_simultaneous_facts, st.integers(1, 4), st.none() | st.integers(0, 15))
+@given(courses_of_facts, st.integers(1, 4), st.none() | st.integers(0, 15))
 def test_occurrence_count_counts_how_often_facts_have_begun_to_hold(course, least, until):
     """Up to the step `until`, if there is one."""
-    considered = course if until is None else course[: until + 1]
-    begun = 0
-    for before, now in itertools.pairwise([frozenset(), *considered]):
-        begun += sum(fact in now - before for fact in (PICKED_A, PRESSED))
+    condition = OccurrenceCount((PICKED_A, PRESSED), least, until)
 
-    assert history_of(course).holds(OccurrenceCount((PICKED_A, PRESSED), least, until)) == (
-        begun >= least
-    )
+    holds = history_of(course).holds(condition)
+
+    begun = 0
+    before = frozenset()
+    for step, now in enumerate(course):
+        if until is None or step <= until:
+            begun += len((now - before) & {PICKED_A, PRESSED})
+        before = now
+    assert holds == (begun >= least)
 
 
 @settings(max_examples=60)
-@given(lists_of_simultaneous_facts)
+@given(courses_of_facts)
 def test_a_fact_and_its_absence_exclude_each_other(course):
-    """`absent(fact)` is the condition that a fact does not hold, `All` that several do."""
     history = history_of(course)
+
     assert history.holds(PICKED_A) != history.holds(absent(PICKED_A))
-    assert history.holds(All((PICKED_A, PICKED_B))) == (
-        history.holds(PICKED_A) and history.holds(PICKED_B)
-    )
     assert not history.holds(All((PICKED_A, absent(PICKED_A))))
 
 
-def test_elapsed_time_counts_from_the_reset_or_from_the_first_start_of_a_timer():
-    """Ten steps, 0 to 9; the timer is started at step 3 and again, without effect, at step 5."""
-    history = FactHistory()
-    assert not history.holds(Elapsed(0, timer="pick"))
+@settings(max_examples=60)
+@given(courses_of_facts)
+def test_all_holds_if_each_of_its_conditions_holds(course):
+    both = All((PICKED_A, PICKED_B))
 
+    assert history_of(course).holds(both) == ({PICKED_A, PICKED_B} <= course[-1])
+
+
+def history_of_ten_steps():
+    """Steps 0 to 9; a timer is started at step 3 and again, without effect, at step 5."""
+    history = FactHistory()
     for step in range(10):
         history.update(step, frozenset())
         if step in {3, 5}:
             history.start_timer("pick")
-    assert history.holds(Elapsed(9))
-    assert not history.holds(Elapsed(10))
-    assert history.holds(Elapsed(6, 6, timer="pick"))
-    assert not history.holds(Elapsed(0, 5, timer="pick"))
-    assert history.next_change(Elapsed(0, 5)) > history.step
+    return history
+
+
+@pytest.mark.parametrize(
+    ("condition", "holds"),
+    [
+        (Elapsed(9), True),
+        (Elapsed(10), False),
+        (Elapsed(6, 6, timer="pick"), True),
+        (Elapsed(0, 5, timer="pick"), False),
+    ],
+)
+def test_elapsed_time_counts_from_the_reset_or_from_the_first_start_of_a_timer(condition, holds):
+    """The two numbers are the least and the most steps, both included."""
+    assert history_of_ten_steps().holds(condition) == holds
+
+
+def test_no_time_has_elapsed_of_a_timer_that_was_not_started():
+    assert not FactHistory().holds(Elapsed(0, timer="pick"))
+
+
+def test_an_elapsed_time_that_is_over_changes_after_the_last_step():
+    history = history_of_ten_steps()
+
+    assert history.next_change(Elapsed(0, 5)) > 9

@@ -1,9 +1,12 @@
 """The rules of the four Unmask tasks, driven by synthetic facts."""
 
+from typing import NamedTuple
+
 import pytest
 from staged import judged
 
 from roboirg.core.conditions import Fact
+from roboirg.core.episode import Episode
 from roboirg.judging import Status
 from roboirg.tasks.splits.splits import make_episode
 
@@ -11,16 +14,11 @@ BUTTON, LEFT, RIGHT = (Fact("pressed", name) for name in ("button", "button_left
 PRESSES_OF = {
     "VideoUnmask": [],
     "VideoUnmaskSwap": [],
-    "ButtonUnmask": [[BUTTON], []],
-    "ButtonUnmaskSwap": [[LEFT], [], [RIGHT], []],
+    "ButtonUnmask": [BUTTON],
+    "ButtonUnmaskSwap": [LEFT, RIGHT],
 }
 each_task = pytest.mark.parametrize("task", PRESSES_OF)
 each_button_task = pytest.mark.parametrize("task", ["ButtonUnmask", "ButtonUnmaskSwap"])
-
-
-@pytest.fixture(params=[3, 11, 25])
-def seed(request):
-    return request.param
 
 
 def lifted(name):
@@ -31,157 +29,157 @@ def put_down(name):
     return Fact("put_down", name)
 
 
-def presses_alone(task):
-    """Return the presses of a task without the moments between them."""
-    return [press for press in PRESSES_OF[task] if press]
+def begin(task):
+    """Return the facts of the steps with which a task begins: a press, and a step without facts."""
+    steps = []
+    for press in PRESSES_OF[task]:
+        steps += [[press], []]
+    return steps
 
 
-def judged_after(episode, *steps):
-    return judged(episode.stages, episode.scene, *steps)
+class UnmaskEpisode(NamedTuple):
+    """An episode with the names of its containers: to lift first and second, and all others."""
+
+    episode: Episode
+    first: str
+    second: str | None
+    others: list[str]
+
+    def judged_after(self, *steps):
+        """Return the judge after steps in which these facts hold."""
+        return judged(self.episode.stages, self.episode.scene, *steps)
 
 
-def containers_to_lift_and_others(episode):
-    """The containers over the named cubes, in order, and all other containers."""
-    wanted = [str(episode.scene[f"cube_{color}"].inside) for color in episode.goal.texts("colors")]
+def episode_with_picks(task, count):
+    """Return an episode whose goal is one container, or two to be lifted one after the other."""
+    episode = make_episode(task, 3, {1: "medium", 2: "hard"}[count])
+    wanted = [episode.scene[f"cube_{color}"].inside for color in episode.goal.texts("colors")]
     names = [item.name for item in episode.scene.of_kind("container")]
-    return wanted, [name for name in names if name not in wanted]
-
-
-def episode_with_two_picks(task, seed):
-    """An episode with two picks, its two targets and the other containers."""
-    episode = make_episode(task, seed, "hard")
-    (first, second), others = containers_to_lift_and_others(episode)
-    return episode, first, second, others
+    others = [name for name in names if name not in wanted]
+    return UnmaskEpisode(episode, *[*wanted, None][:2], others)
 
 
 @each_task
-def test_one_pick_succeeds_when_the_container_over_the_cube_is_lifted(task, seed):
-    """Each list holds the facts of one step; `PRESSES_OF`
-    has the buttons that a task begins with."""
-    episode = make_episode(task, seed, "medium")
-    (target,), _ = containers_to_lift_and_others(episode)
+def test_one_pick_succeeds_when_the_container_over_the_cube_is_lifted(task):
+    made = episode_with_picks(task, 1)
 
-    judge = judged_after(episode, *PRESSES_OF[task], [], [lifted(target)])
+    judge = made.judged_after(*begin(task), [], [lifted(made.first)])
 
     assert judge.status is Status.SUCCESS
     assert judge.cause is None
 
 
 @each_task
-def test_two_picks_succeed_in_order_with_the_first_put_down_between(task, seed):
-    """Each list holds the facts of one step; `PRESSES_OF`
-    has the buttons that a task begins with."""
-    episode, first, second, _ = episode_with_two_picks(task, seed)
-    begin = [*PRESSES_OF[task], [lifted(first)], [], [put_down(first)], []]
+def test_two_picks_succeed_in_order_with_the_first_put_down_between(task):
+    made = episode_with_picks(task, 2)
+    down = [*begin(task), [lifted(made.first)], [], [put_down(made.first)], []]
 
-    assert judged_after(episode, *begin).status is Status.ONGOING
-    assert judged_after(episode, *begin, [lifted(second)]).status is Status.SUCCESS
+    assert made.judged_after(*down).status is Status.ONGOING
+    assert made.judged_after(*down, [lifted(made.second)]).status is Status.SUCCESS
 
 
 @each_task
-def test_lifting_another_container_before_the_first_is_put_down_fails(task, seed):
-    """The goal has two containers, `first` and `second`;
-    after lifting one it has to be put down."""
-    episode, first, second, others = episode_with_two_picks(task, seed)
+def test_lifting_another_container_before_the_first_is_put_down_fails(task):
+    """Be it the second one, or one that is never meant."""
+    made = episode_with_picks(task, 2)
+    for wrong in (made.second, *made.others):
+        up = [lifted(made.first)]
+        together = [put_down(made.first), lifted(wrong)]
 
-    for wrong in (second, *others):
-        steps = [[lifted(first)], [put_down(first), lifted(wrong)]]
-        judge = judged_after(episode, *PRESSES_OF[task], *steps)
-        assert judge.status is Status.FAILURE
-        assert str(judge.cause).endswith("; expected: put down the container")
+        judge = made.judged_after(*begin(task), up, together)
+
+        assert judge.status is Status.FAILURE, wrong
+        assert judge.cause.endswith("; expected: put down the container"), wrong
 
 
 @each_task
-def test_lifting_a_wrong_container_as_the_second_one_fails(task, seed):
+def test_lifting_a_wrong_container_as_the_second_one_fails(task):
     """The first one again is wrong, too."""
-    episode, first, _, others = episode_with_two_picks(task, seed)
+    made = episode_with_picks(task, 2)
+    for wrong in (made.first, *made.others):
+        judge = made.judged_after(
+            *begin(task), [lifted(made.first)], [put_down(made.first)], [lifted(wrong)]
+        )
 
-    for wrong in (first, *others):
-        steps = [[lifted(first)], [put_down(first)], [lifted(wrong)]]
-        assert judged_after(episode, *PRESSES_OF[task], *steps).status is Status.FAILURE
-
-
-@each_task
-def test_holding_the_first_container_long_or_lifting_it_again_is_allowed(task, seed):
-    """The goal has two containers, and the first one is put down late."""
-    episode, first, second, _ = episode_with_two_picks(task, seed)
-    held = [[lifted(first)]] * 5
-    steps = [*PRESSES_OF[task], *held, [], [lifted(first)], []]
-    assert judged_after(episode, *steps).status is Status.ONGOING
-
-    steps += [[put_down(first)], [lifted(second)]]
-    assert judged_after(episode, *steps).status is Status.SUCCESS
+        assert judge.status is Status.FAILURE, wrong
 
 
 @each_task
-def test_putting_down_other_containers_does_not_complete_putting_down_the_first(task, seed):
-    """The stage before the last one stays due."""
-    episode, first, second, others = episode_with_two_picks(task, seed)
-    down = [put_down(name) for name in (second, *others)]
+def test_holding_the_first_container_long_or_lifting_it_again_is_allowed(task):
+    made = episode_with_picks(task, 2)
+    up = [lifted(made.first)]
+    held = [*begin(task), up, up, up, up, [], up, []]
+    down = [put_down(made.first)]
 
-    judge = judged_after(episode, *PRESSES_OF[task], [lifted(first)], down)
+    assert made.judged_after(*held).status is Status.ONGOING
+    assert made.judged_after(*held, down, [lifted(made.second)]).status is Status.SUCCESS
 
-    assert (judge.status, judge.index) == (Status.ONGOING, len(episode.stages) - 2)
+
+@each_task
+def test_putting_down_other_containers_does_not_complete_putting_down_the_first(task):
+    """Two are to be lifted, one after the other. The stage before the last one stays due."""
+    made = episode_with_picks(task, 2)
+    down = [put_down(name) for name in (made.second, *made.others)]
+
+    judge = made.judged_after(*begin(task), [lifted(made.first)], down)
+
+    assert (judge.status, judge.index) == (Status.ONGOING, len(made.episode.stages) - 2)
 
 
 @each_button_task
-def test_before_the_button_is_pressed_any_container_may_be_lifted(task, seed):
-    """Buttons come first in these tasks; what is done before them is ignored."""
-    episode, first, second, others = episode_with_two_picks(task, seed)
-    everything = [lifted(name) for name in (first, second, *others)]
-    steps = [[fact] for fact in everything]
-    for press in presses_alone(task):
-        steps += [everything, press]
+def test_before_the_button_is_pressed_any_container_may_be_lifted(task):
+    made = episode_with_picks(task, 2)
+    up = [lifted(name) for name in (made.first, made.second, *made.others)]
+    early = []
+    for press in PRESSES_OF[task]:
+        early += [up, [press]]
+    picks = [[lifted(made.first)], [put_down(made.first)], [lifted(made.second)]]
 
-    judge = judged_after(episode, *steps, [lifted(first)], [put_down(first)])
-    assert judge.status is Status.ONGOING
+    judge = made.judged_after(*early, *picks)
 
-    judge.update(100, frozenset([lifted(second)]))
     assert judge.status is Status.SUCCESS
 
 
 @each_button_task
-def test_a_container_that_is_up_during_the_last_press_counts_one_step_later(task, seed):
-    """The goal has one container: if it is up it succeeds, if another one is up it fails."""
-    episode = make_episode(task, seed, "medium")
-    (target,), others = containers_to_lift_and_others(episode)
-    *before, last = presses_alone(task)
-    for up, outcome in ((target, Status.SUCCESS), (others[0], Status.FAILURE)):
-        judge = judged_after(episode, *before, [*last, lifted(up)])
-        assert judge.status is Status.ONGOING
+@pytest.mark.parametrize("is_meant", [True, False], ids=["the meant one", "another one"])
+def test_a_container_that_is_up_during_the_last_press_counts_one_step_later(task, is_meant):
+    made = episode_with_picks(task, 1)
+    up = lifted(made.first if is_meant else made.others[0])
+    *before, last = PRESSES_OF[task]
+    pressed = [*([press] for press in before), [last, up]]
 
-        judge.update(100, frozenset([lifted(up)]))
-        assert judge.status is outcome
+    judge = made.judged_after(*pressed, [up])
+
+    assert made.judged_after(*pressed).status is Status.ONGOING
+    assert judge.status is (Status.SUCCESS if is_meant else Status.FAILURE)
 
 
 @each_button_task
-def test_pressing_again_later_has_no_effect(task, seed):
-    """The goal has two containers; the buttons are pressed again at each moment."""
-    episode, first, second, _ = episode_with_two_picks(task, seed)
-    again = presses_alone(task)
-    steps = [*PRESSES_OF[task], *again, [lifted(first)], *again, [put_down(first)], *again]
+def test_pressing_again_later_has_no_effect(task):
+    made = episode_with_picks(task, 2)
+    again = [[press] for press in PRESSES_OF[task]]
+    down = [*begin(task), *again, [lifted(made.first)], *again, [put_down(made.first)], *again]
 
-    assert judged_after(episode, *steps).status is Status.ONGOING
-    assert judged_after(episode, *steps, [lifted(second)]).status is Status.SUCCESS
+    assert made.judged_after(*down).status is Status.ONGOING
+    assert made.judged_after(*down, [lifted(made.second)]).status is Status.SUCCESS
 
 
-@pytest.mark.parametrize("order", [(LEFT, RIGHT), (RIGHT, LEFT)])
-@pytest.mark.parametrize("between", [[], [[]]])
-def test_both_buttons_may_be_pressed_in_any_order(order, between):
-    """Index 1 or 2 is how many stages are complete; `between` is a step without facts, or none."""
-    episode = make_episode("ButtonUnmaskSwap", 3, "medium")
-    first, other = order
+def stages_complete_after(*steps):
+    """Return how many stages are complete of a task that begins with a press of two buttons."""
+    return episode_with_picks("ButtonUnmaskSwap", 1).judged_after(*steps).index
 
-    assert judged_after(episode, [first]).index == 1
-    assert judged_after(episode, [first], *between, [other]).index == 2
-    # Already the other one while the first is still down.
-    assert judged_after(episode, [first], [first, other]).index == 2
+
+@pytest.mark.parametrize(("first", "other"), [(LEFT, RIGHT), (RIGHT, LEFT)])
+def test_both_buttons_may_be_pressed_in_any_order(first, other):
+    """With a step between, at once, or already the other one while the first is still down."""
+    assert stages_complete_after([first]) == 1
+    assert stages_complete_after([first], [], [other]) == 2
+    assert stages_complete_after([first], [other]) == 2
+    assert stages_complete_after([first], [first, other]) == 2
 
 
 @pytest.mark.parametrize("button", [LEFT, RIGHT])
 def test_pressing_the_same_button_twice_completes_only_one_of_two_presses(button):
-    """The task begins with a press of each of two
-    buttons; index 1 means that one stage is complete."""
-    episode = make_episode("ButtonUnmaskSwap", 3, "medium")
-    assert judged_after(episode, [button], [], [button], [], [button]).index == 1
-    assert judged_after(episode, *[[button]] * 10).index == 1
+    """Also if it is held for ten steps. Each list has the facts of a step."""
+    assert stages_complete_after([button], [], [button], [], [button]) == 1
+    assert stages_complete_after(*[[button]] * 10) == 1

@@ -14,18 +14,11 @@ from roboirg.tasks.video_repick import TASK as VIDEO_REPICK
 PRESSED = Fact("pressed", "button")
 STILL = Fact("still", "robot")
 HOME = Fact("home", "robot")
-TOO_EARLY = "pressed the button too early; expected: "
 
 
-def scene_and_goal(task, difficulty):
-    """Scene and goal of the first seed that gives one."""
-    return next(drawn_scenes(task.name, difficulty))
-
-
-def episode_of(task, difficulty="medium", goal=None):
-    """An episode for the goal of its scene, or another."""
-    scene, own = scene_and_goal(task, difficulty)
-    goal = goal or own
+def episode_of(task, difficulty, goal):
+    """Return an episode of a goal in the first scene that is drawn."""
+    scene, _ = next(drawn_scenes(task.name, difficulty))
     stages = task.stages(scene, goal)
     shown = task.demonstration(scene)
     return Episode(task.name, "test", 0, 0, difficulty, scene, goal, stages, shown)
@@ -43,6 +36,7 @@ def status_after(episode, *steps):
 
 
 def repick_episode_and_facts(repeats, difficulty="medium"):
+    """Return an episode, and the facts that its cube is picked up, and that it lies."""
     episode = episode_of(VIDEO_REPICK, difficulty, Goal.of(repeats=repeats))
     target = episode.scene.past[0].subject
     return episode, Fact("picked", target), Fact("lying", target)
@@ -53,10 +47,10 @@ def test_repick_succeeds_after_the_wanted_number_of_picks_and_a_press(repeats):
     """Each list holds the facts of one step: the cube
     lies, is picked up, is in the air, lies again."""
     episode, picked, lying = repick_episode_and_facts(repeats)
-    cycle = [[lying], [picked], [], [lying]]
+    picks = [[lying], [picked], [], [lying]] * repeats
 
-    assert status_after(episode, *cycle * repeats, [lying, PRESSED]) is Status.SUCCESS
-    assert status_after(episode, *cycle * repeats) is Status.ONGOING
+    assert status_after(episode, *picks) is Status.ONGOING
+    assert status_after(episode, *picks, [lying, PRESSED]) is Status.SUCCESS
 
 
 @pytest.mark.parametrize("done", [0, 1, 2, 3, 4])
@@ -64,72 +58,79 @@ def test_repick_of_any_other_cube_fails_at_any_time(done):
     """`done` is how many of the four stages (pick and put down, twice) are complete before."""
     episode, picked, lying = repick_episode_and_facts(2, "hard")
     start = [[picked], [lying], [picked], [lying]][:done]
-    others = {cube.name for cube in episode.scene.of_kind("cube")} - {picked.subject}
+    for cube in episode.scene.of_kind("cube"):
+        if cube.name != picked.subject:
+            judge = judged_after(episode, *start, [Fact("picked", cube.name)])
 
-    for other in others:
-        judge = judged_after(episode, *start, [Fact("picked", other)])
-        assert (judge.index, judge.status) == (done, Status.FAILURE)
-        assert status_after(episode, *start, [Fact("lying", other)]) is Status.ONGOING
+            assert (judge.index, judge.status) == (done, Status.FAILURE), cube.name
 
 
-def test_repick_counts_a_cube_that_was_let_go_as_put_down():
-    """Each list holds the facts of one step. In the
-    air, neither picked nor lying, nothing happens."""
+def test_a_repick_goes_on_while_other_cubes_lie():
+    episode, picked, _ = repick_episode_and_facts(2, "hard")
+    other = next(cube.name for cube in episode.scene.of_kind("cube") if cube.name != picked.subject)
+
+    assert status_after(episode, [picked], [Fact("lying", other)]) is Status.ONGOING
+
+
+def test_a_repick_goes_on_while_the_cube_is_in_the_air():
+    """There it is neither picked nor lying, as when it is held low."""
     episode, picked, lying = repick_episode_and_facts(1)
-    # Held low or in the air, neither picked nor lying: nothing happens.
+
     assert status_after(episode, [picked], [], [], [picked], [lying], [PRESSED]) is Status.SUCCESS
 
+
+def test_repick_counts_a_cube_that_was_let_go_as_put_down_wherever_it_lies():
+    """The next lift is the second one."""
     episode, picked, lying = repick_episode_and_facts(2)
-    # Let go is put down, wherever that is: the next lift is the second one.
-    steps = [[picked], [lying], [picked], [lying], [PRESSED]]
-    assert status_after(episode, *steps) is Status.SUCCESS
+    picks = [[picked], [lying], [picked], [lying]]
+
+    assert status_after(episode, *picks, [PRESSED]) is Status.SUCCESS
 
 
-PRESS_TIMES = [
-    (0, False),
-    (49, False),
-    (50, True),
-    (51, True),
-    (500, True),
-    (501, False),
-    (900, False),
-]
-PICK = "pick up the correct cube for the first time"
-DOWN = "put it down"
-AGAIN = "pick up the correct cube for the second time"
-
-
-@pytest.mark.parametrize(("elapsed", "fails"), PRESS_TIMES)
 @pytest.mark.parametrize(
-    ("steps", "index", "start", "due"),
+    ("elapsed", "fails"), [(0, False), (49, False), (50, True), (500, True), (501, False)]
+)
+@pytest.mark.parametrize(
+    ("facts", "index", "start", "due"),
     [
-        ([""], 0, 0, PICK),
+        ([""], 0, 0, "pick up the correct cube for the first time"),
         # The timer of putting down starts at the evaluation after the one that completes the pick.
-        ([*[""] * 40, "picked", ""], 1, 41, DOWN),
+        ([*[""] * 40, "picked", ""], 1, 41, "put it down"),
         # Timers run on over the repetitions; that of putting down started one step later.
-        (["picked", "lying"], 2, 0, AGAIN),
-        (["picked", "lying", "picked"], 3, 1, DOWN),
+        (["picked", "lying"], 2, 0, "pick up the correct cube for the second time"),
+        (["picked", "lying", "picked"], 3, 1, "put it down"),
     ],
+    ids=["first pick", "first put down", "second pick", "second put down"],
 )
 def test_pressing_the_button_during_a_repick_stage_fails_from_50_to_500_steps(
-    steps, index, start, due, elapsed, fails
+    facts, index, start, due, elapsed, fails
 ):
-    """A press is punished 50 to 500 steps after the timer of the current stage has started;
-    `start` is the step of that, `index` the stage, and `due` what the cause names as expected."""
+    """After the timer of the current stage has started.
+
+    Args:
+        facts: of each step before; an empty text is a step without any.
+        index: of the current stage.
+        start: step at which its timer has started.
+        due: what the cause names as expected.
+    """
     episode, picked, lying = repick_episode_and_facts(2)
-    facts = {"": [], "picked": [picked], "lying": [lying]}
-    judge = judged_after(episode, *(facts[step] for step in steps))
+    facts_of = {"": [], "picked": [picked], "lying": [lying]}
+    judge = judged_after(episode, *(facts_of[fact] for fact in facts))
 
     judge.update(start + elapsed, frozenset([PRESSED]))
 
     assert judge.index == index
     if fails:
-        assert (judge.status, judge.cause) == (Status.FAILURE, f"{TOO_EARLY}{due}")
+        cause = f"pressed the button too early; expected: {due}"
+        assert (judge.status, judge.cause) == (Status.FAILURE, cause)
     else:
         assert (judge.status, judge.cause) == (Status.ONGOING, None)
 
 
-def test_the_time_in_which_a_press_is_ignored_starts_after_the_video():
+@pytest.mark.parametrize(
+    ("elapsed", "status"), [(1, Status.ONGOING), (49, Status.ONGOING), (50, Status.FAILURE)]
+)
+def test_the_time_in_which_a_press_is_ignored_starts_after_the_video(elapsed, status):
     """A press is ignored for the first 50 steps of the policy's turn; the video is longer."""
     episode, picked, lying = repick_episode_and_facts(1)
     judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
@@ -137,20 +138,19 @@ def test_the_time_in_which_a_press_is_ignored_starts_after_the_video():
     while judge.index < len(episode.demonstration):
         judge.update(step, frozenset([lying if step else picked, STILL, HOME]))
         step += 1
+    assert step > 100
+    judge.update(step, frozenset())
 
-    assert step > 100  # the video alone is longer than the 50 steps
-    for elapsed in (0, 49):
-        judge.update(step + elapsed, frozenset([PRESSED]))
-        assert judge.status is Status.ONGOING
+    judge.update(step + elapsed, frozenset([PRESSED]))
 
-    judge.update(step + 50, frozenset([PRESSED]))
-    assert judge.status is Status.FAILURE
+    assert judge.status is status
 
 
 def test_a_press_before_the_repick_does_not_replace_the_one_after_it():
     """The task is to pick a cube up once more and to
     press the button; early presses are ignored."""
     episode, picked, lying = repick_episode_and_facts(1)
+
     assert status_after(episode, [PRESSED], [picked], [lying]) is Status.ONGOING
     assert status_after(episode, [PRESSED], [picked], [lying], [PRESSED]) is Status.SUCCESS
 
@@ -158,75 +158,96 @@ def test_a_press_before_the_repick_does_not_replace_the_one_after_it():
 # VideoPlaceButton and VideoPlaceOrder
 
 
-PLACE_EPISODES = [
-    episode_of(task, "hard", goal)
-    for task in (VIDEO_PLACE_BUTTON, VIDEO_PLACE_ORDER)
-    for goal in task.goals(scene_and_goal(task, "hard")[0])
-]
-"""Every goal of a scene with three cubes and four discs, in either task."""
+def place_episode(task, **goal):
+    """Return an episode with three cubes and four discs, and a goal for the green cube."""
+    return episode_of(task, "hard", Goal.of(color="green", **goal))
+
 
 every_place_goal = pytest.mark.parametrize(
-    "episode",
-    PLACE_EPISODES,
-    ids=lambda episode: "-".join([episode.task, *(str(value) for _, value in episode.goal.slots)]),
+    ("episode", "number"),
+    [
+        (place_episode(VIDEO_PLACE_BUTTON, relation="before"), 0),
+        (place_episode(VIDEO_PLACE_BUTTON, relation="after"), 1),
+        (place_episode(VIDEO_PLACE_ORDER, placement=1), 0),
+        (place_episode(VIDEO_PLACE_ORDER, placement=2), 1),
+    ],
+    ids=["before the press", "after the press", "first", "second"],
 )
+"""`number` counts the placements of the video from 0: its disc is the right one."""
+
+GREEN_PICKED = Fact("picked", "cube_green")
+GREEN_LYING = Fact("lying", "cube_green")
 
 
-def right_pick_and_right_place(episode):
-    cube = f"cube_{episode.goal.text('color')}"
-    visits = [fact.place for fact in episode.scene.past if fact.kind == "placed"]
-    if episode.task == "VideoPlaceButton":
-        answer = {"before": visits[0], "after": visits[1]}[episode.goal.text("relation")]
-    else:
-        answer = visits[episode.goal.number("placement") - 1]
-    return Fact("picked", cube), Fact("placed", cube, answer)
+def right_placement(episode, number):
+    """Return the fact that the green cube is on the disc of a placement of the video."""
+    shown = [fact.place for fact in episode.scene.past if fact.kind == "placed"]
+    return Fact("placed", "cube_green", shown[number])
+
+
+def wrong_placements(episode, number):
+    """Return the facts that the green cube is on another disc."""
+    right = right_placement(episode, number)
+    found = []
+    for disc in episode.scene.of_kind("target"):
+        if disc.name != right.place:
+            found.append(Fact("placed", "cube_green", disc.name))
+    return found
 
 
 @every_place_goal
-def test_a_place_task_needs_the_right_cube_picked_and_then_placed_on_the_right_disc(episode):
+def test_a_place_task_needs_the_right_cube_picked_and_then_placed_on_the_right_disc(
+    episode, number
+):
     """Each list holds the facts of one step; discs are targets on the table."""
-    picked, placed = right_pick_and_right_place(episode)
-    lying = Fact("lying", picked.subject)
+    placed = right_placement(episode, number)
 
-    assert status_after(episode, [lying], [picked], [], [placed, lying]) is Status.SUCCESS
+    assert status_after(episode, [GREEN_PICKED], [], [placed, GREEN_LYING]) is Status.SUCCESS
     assert status_after(episode, [placed]) is Status.ONGOING
-    assert status_after(episode, [picked]) is Status.ONGOING
+    assert status_after(episode, [GREEN_PICKED]) is Status.ONGOING
 
 
 @every_place_goal
-def test_placing_the_right_cube_on_a_wrong_disc_fails(episode):
-    """Discs are targets on the table. Before it is picked up, the cube may be on any."""
-    picked, placed = right_pick_and_right_place(episode)
-    others = {disc.name for disc in episode.scene.of_kind("target")} - {placed.place}
-    for other in others:
-        wrong = Fact("placed", picked.subject, other)
-        assert status_after(episode, [picked], [], [wrong]) is Status.FAILURE
-        assert status_after(episode, [picked], [placed, wrong]) is Status.FAILURE
-        # Before it is picked, the cube may be anywhere.
-        assert status_after(episode, [wrong], [picked], [placed]) is Status.SUCCESS
+def test_placing_the_right_cube_on_a_wrong_disc_fails(episode, number):
+    """Also if it is on the right one at the same time."""
+    placed = right_placement(episode, number)
+    for wrong in wrong_placements(episode, number):
+        assert status_after(episode, [GREEN_PICKED], [], [wrong]) is Status.FAILURE, wrong
+        assert status_after(episode, [GREEN_PICKED], [placed, wrong]) is Status.FAILURE, wrong
 
 
 @every_place_goal
-def test_picking_another_cube_fails_unless_the_right_one_was_picked_before(episode):
-    """Each list holds the facts of one step."""
-    picked, placed = right_pick_and_right_place(episode)
-    others = {cube.name for cube in episode.scene.of_kind("cube")} - {picked.subject}
-    for other in others:
-        wrong = Fact("picked", other)
-        assert status_after(episode, [wrong]) is Status.FAILURE
-        assert status_after(episode, [wrong, picked]) is Status.FAILURE
-        assert status_after(episode, [picked], [wrong], [placed]) is Status.SUCCESS
-        elsewhere = Fact("placed", other, "target_3")
-        assert status_after(episode, [elsewhere], [picked], [elsewhere, placed]) is Status.SUCCESS
+def test_before_it_is_picked_up_the_right_cube_may_be_on_any_disc(episode, number):
+    placed = right_placement(episode, number)
+    for wrong in wrong_placements(episode, number):
+        assert status_after(episode, [wrong], [GREEN_PICKED], [placed]) is Status.SUCCESS, wrong
 
 
 @every_place_goal
-def test_in_a_place_task_presses_drops_and_the_marked_site_are_ignored(episode):
+@pytest.mark.parametrize("other", ["cube_red", "cube_blue"])
+def test_picking_another_cube_fails_unless_the_right_one_was_picked_before(episode, number, other):
+    placed = right_placement(episode, number)
+    wrong = Fact("picked", other)
+
+    assert status_after(episode, [wrong]) is Status.FAILURE
+    assert status_after(episode, [wrong, GREEN_PICKED]) is Status.FAILURE
+    assert status_after(episode, [GREEN_PICKED], [wrong], [placed]) is Status.SUCCESS
+
+
+@every_place_goal
+def test_other_cubes_may_be_placed_anywhere(episode, number):
+    placed = right_placement(episode, number)
+    other = Fact("placed", "cube_red", "target_3")
+
+    assert status_after(episode, [other], [GREEN_PICKED], [other, placed]) is Status.SUCCESS
+
+
+@every_place_goal
+def test_in_a_place_task_presses_drops_and_the_marked_site_are_ignored(episode, number):
     """The site is a mark on the table that is no target."""
-    picked, placed = right_pick_and_right_place(episode)
-    lying = Fact("lying", picked.subject)
-    site = Fact("placed", picked.subject, "site")
-    steps = [[PRESSED, site, lying], [picked], [PRESSED], [lying], [lying, site], [picked]]
+    placed = right_placement(episode, number)
+    site = Fact("placed", "cube_green", "site")
+    steps = [[PRESSED, site], [GREEN_PICKED], [PRESSED], [GREEN_LYING, site], [GREEN_PICKED]]
 
     assert status_after(episode, *steps) is Status.ONGOING
     assert status_after(episode, *steps, [placed, PRESSED]) is Status.SUCCESS

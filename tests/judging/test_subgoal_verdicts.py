@@ -5,18 +5,10 @@ from __future__ import annotations
 import pytest
 
 from roboirg.core.conditions import Fact
-from roboirg.core.episode import Episode, Stage
 from roboirg.core.subgoal_text import split_point
 from roboirg.judging import judge_subgoal, plain_subgoal
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
-
-
-def verdict_on(
-    said: str, due: Stage | None, episode: Episode, pointed_at: set[str | None] | None = None
-) -> str:
-    points = None if pointed_at is None else {str(point) for point in pointed_at}
-    return judge_subgoal(said, due, points, episode)
 
 
 def test_a_point_in_a_subgoal_is_separated_from_its_words():
@@ -31,70 +23,114 @@ def test_the_subgoal_that_is_due_is_right_and_nonsense_is_called_lost(task):
     episode = get_episode(task, "test", 3)
     for stage in episode.stages:
         words = plain_subgoal(stage)
-        assert verdict_on(words, stage, episode) == "right"
-        assert verdict_on(f"{words.upper()}.", stage, episode) == "right"
-        assert verdict_on("dance", stage, episode) == verdict_on(words, None, episode) == "lost"
+
+        assert judge_subgoal(words, stage, None, episode) == "right"
+        assert judge_subgoal(f"{words.upper()}.", stage, None, episode) == "right"
+        assert judge_subgoal("dance", stage, None, episode) == "lost"
+
+
+def test_any_subgoal_is_lost_when_no_stage_is_due():
+    episode = get_episode("PickXtimes", "test", 0)
+
+    assert judge_subgoal("pick up the green cube", None, None, episode) == "lost"
+
+
+@pytest.mark.parametrize("task", ["SwingXtimes", "BinFill", "ButtonUnmaskSwap"])
+def test_the_subgoal_of_a_stage_with_another_act_is_not_right(task):
+    episode = get_episode(task, "test", 3)
+    for stage in episode.stages:
         for other in episode.stages:
             if other.primitive.kind != stage.primitive.kind:
-                assert verdict_on(plain_subgoal(other), stage, episode) != "right"
+                assert judge_subgoal(plain_subgoal(other), stage, None, episode) != "right"
 
 
 @pytest.mark.parametrize(
-    ("task", "number", "said", "expected"),
+    ("task", "index", "number", "said", "expected"),
     [
-        ("PickXtimes", 0, "pick up the green cube for the first time", "right"),
-        ("PickXtimes", 0, "pick up the green cube", "right"),
-        ("PickXtimes", 0, "pick the green cube up", "right"),
-        ("PickXtimes", 0, "pick up the green cube for the second time", "wrong_count"),
-        ("PickXtimes", 0, "pick up the green cube for the 12th time", "wrong_count"),
-        ("PickXtimes", 0, "pick up the blue cube for the first time", "wrong_thing"),
-        ("PickXtimes", 0, "press the button to stop", "lost"),
-        ("PickXtimes", 1, "place the green cube onto the target", "right"),
-        ("PickXtimes", 1, "put the green cube on the target", "right"),
-        ("PickXtimes", 1, "put the blue cube on the target", "wrong_thing"),
-        ("PickXtimes", 1, "place the green cube onto the table", "wrong_place"),
-        ("PickXtimes", 1, "", "lost"),
-        ("BinFill", 0, "pick up the third red cube", "wrong_count"),
-        ("BinFill", 0, "pick up the red cube", "right"),
-        ("ButtonUnmaskSwap", 0, "press the second button", "right"),
-        ("ButtonUnmaskSwap", 0, "press the button", "right"),
-        ("SwingXtimes", 1, "move to the top of the left-side target", "wrong_place"),
-        ("SwingXtimes", 7, "put the green cube on the table", "right"),
+        ("PickXtimes", 0, 0, "pick up the green cube for the first time", "right"),
+        ("PickXtimes", 0, 0, "pick up the green cube", "right"),
+        ("PickXtimes", 0, 0, "pick the green cube up", "right"),
+        ("PickXtimes", 0, 0, "pick up the green cube for the second time", "wrong_count"),
+        ("PickXtimes", 0, 0, "pick up the green cube for the 12th time", "wrong_count"),
+        ("PickXtimes", 0, 0, "pick up the blue cube for the first time", "wrong_thing"),
+        ("PickXtimes", 0, 0, "press the button to stop", "lost"),
+        ("PickXtimes", 0, 1, "put the green cube on the target", "right"),
+        ("PickXtimes", 0, 1, "put the blue cube on the target", "wrong_thing"),
+        ("PickXtimes", 0, 1, "place the green cube onto the table", "wrong_place"),
+        ("PickXtimes", 0, 1, "", "lost"),
+        ("BinFill", 0, 0, "pick up the third red cube", "wrong_count"),
+        ("BinFill", 0, 0, "pick up the red cube", "right"),
+        ("ButtonUnmaskSwap", 0, 0, "press the second button", "right"),
+        ("ButtonUnmaskSwap", 0, 0, "press the button", "right"),
+        ("SwingXtimes", 3, 1, "move to the top of the left-side target", "wrong_place"),
+        ("SwingXtimes", 3, 7, "put the green cube on the table", "right"),
         # It points at nothing, so no cube is meant but the one in the hand.
-        ("SwingXtimes", 7, "put the red cube on the table", "wrong_thing"),
-        ("PutInBox", 1, "put it into the green box", "wrong_place"),
-        ("StopCube", 1, "remain static for 30 steps", "right"),
+        ("SwingXtimes", 3, 7, "put the red cube on the table", "wrong_thing"),
+        ("PutInBox", 30, 1, "put it into the green box", "wrong_place"),
+        ("StopCube", 0, 1, "remain static for 30 steps", "right"),
     ],
 )
-def test_a_subgoal_is_judged_by_what_is_wrong_with_it(task, number, said, expected):
-    """`number` is the stage that is due, and *lost* the verdict if its act is another one."""
-    index = {"PutInBox": 30, "SwingXtimes": 3}.get(task, 0)
+def test_a_subgoal_is_judged_by_what_is_wrong_with_it(task, index, number, said, expected):
+    """`number` is the stage that is due, and *lost* the verdict if its act is another one.
+
+    In `PickXtimes` the green cube is to be picked up and placed on the target.
+    """
     episode = get_episode(task, "test", index)
-    assert verdict_on(said, episode.stages[number], episode) == expected
+
+    verdict = judge_subgoal(said, episode.stages[number], None, episode)
+
+    assert verdict == expected
 
 
-def test_a_point_at_a_wrong_object_makes_a_subgoal_with_right_words_wrong():
-    """The last argument holds the objects that the planner's point is on."""
+@pytest.mark.parametrize(
+    ("number", "said", "points_at", "expected"),
+    [
+        (0, "pick up the cube", {"cube_red"}, "right"),
+        (0, "pick up the cube", {"target_0"}, "wrong_thing"),
+        (0, "pick the cube up", {"target_0"}, "wrong_thing"),
+        (1, "place the cube onto the correct target", {"target_2", "cube"}, "right"),
+        (1, "place the cube onto the correct target", set(), "wrong_place"),
+    ],
+)
+def test_a_point_at_a_wrong_object_makes_a_subgoal_with_right_words_wrong(
+    number, said, points_at, expected
+):
+    """`points_at` holds the objects at the pixel that the planner names.
+
+    The red cube is to be picked up, and then placed on target_2.
+    """
     episode = get_episode("VideoPlaceOrder", "test", 0)
-    pick, place = episode.stages[:2]
-    assert verdict_on(plain_subgoal(pick), pick, episode, {pick.points_at}) == "right"
-    assert verdict_on(plain_subgoal(pick), pick, episode, {"target_0"}) == "wrong_thing"
-    assert verdict_on("pick the cube up", pick, episode, {"target_0"}) == "wrong_thing"
-    assert verdict_on(plain_subgoal(place), place, episode, {place.points_at, "cube"}) == "right"
-    assert verdict_on(plain_subgoal(place), place, episode, set()) == "wrong_place"
 
-    waits = get_episode("StopCube", "test", 0)
-    assert verdict_on("remain static", waits.stages[1], waits, {"button"}) == "right"
+    assert judge_subgoal(said, episode.stages[number], points_at, episode) == expected
 
 
-def test_a_subgoal_may_name_any_cube_of_a_goal_color_until_these_are_in_the_bin():
-    """The scene has one blue cube and four green ones; then the blue one is in the bin."""
-    episode = get_episode("BinFill", "test", 7)  # one blue cube and four green ones
-    first = episode.stages[0]
-    for color, last in (("blue", "cube_blue_3"), ("green", "cube_green_5")):
-        assert verdict_on(f"pick up the {color} cube", first, episode) == "right"
-        assert verdict_on("pick up the cube", first, episode, {last}) == "right"
+def test_a_point_of_a_subgoal_that_needs_none_is_ignored():
+    episode = get_episode("StopCube", "test", 0)
 
+    assert judge_subgoal("remain static", episode.stages[1], {"button"}, episode) == "right"
+
+
+@pytest.mark.parametrize(
+    ("said", "points_at"),
+    [
+        ("pick up the blue cube", None),
+        ("pick up the green cube", None),
+        ("pick up the cube", {"cube_blue_3"}),
+        ("pick up the cube", {"cube_green_5"}),
+    ],
+)
+def test_a_subgoal_may_name_any_cube_of_a_goal_color(said, points_at):
+    """One blue cube and four green ones are to go into the bin, in any order."""
+    episode = get_episode("BinFill", "test", 7)
+
+    assert judge_subgoal(said, episode.stages[0], points_at, episode) == "right"
+
+
+def test_a_color_whose_cubes_are_all_in_the_bin_is_a_wrong_thing():
+    """One blue cube and four green ones are to go into the bin, and the blue one is there."""
+    episode = get_episode("BinFill", "test", 7)
     done = frozenset({Fact("binned", "cube_blue_3", "bin")})
-    said = "pick up the blue cube"
-    assert judge_subgoal(said, episode.stages[2], None, episode, done) == "wrong_thing"
+
+    verdict = judge_subgoal("pick up the blue cube", episode.stages[2], None, episode, done)
+
+    assert verdict == "wrong_thing"

@@ -1,23 +1,27 @@
-"""Pictures are of their moment; depth, segmentation and calibration fit the scene."""
+"""Pictures, depth, segmentation and calibration of the cameras fit the scene."""
 
 import numpy as np
 import pytest
 
-from roboirg.core.observations import CAMERAS, PICTURE_SIZE
+from roboirg.core.observations import CAMERAS
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.simulation.world import World
 from roboirg.tasks.splits.splits import get_episode
 
-MIDDLE = PICTURE_SIZE // 2
-
 pytestmark = pytest.mark.sim
+
+
+def world_after_one_step(task, index):
+    """Return the world of a test episode, with cameras, after one control step."""
+    world = World(get_episode(task, "test", index).scene)
+    world.step(HOME_ACTION)
+    return world
 
 
 @pytest.fixture(scope="module")
 def world():
-    world = World(get_episode("PickXtimes", "test", 2).scene)
-    world.step(HOME_ACTION)
-    return world
+    """Cubes, a target and a button on a table."""
+    return world_after_one_step("PickXtimes", 2)
 
 
 @pytest.fixture(scope="module")
@@ -25,76 +29,111 @@ def cameras(world):
     return world.cameras
 
 
-def test_the_cameras_have_robomme_s_positions_and_focal_length(cameras):
-    """The matrix takes the world to the front camera: columns x, y, z and the offset in meters."""
-    expected = [[0, 1, 0, 0], [0.89443, 0, -0.44721, -0.08944], [-0.44721, 0, -0.89443, 0.49194]]
-    assert cameras.extrinsic("front") == pytest.approx(np.array(expected), abs=1e-5)
-    for camera in CAMERAS:
-        matrix = [[MIDDLE, 0, MIDDLE], [0, MIDDLE, MIDDLE], [0, 0, 1]]
-        assert cameras.intrinsic(camera) == pytest.approx(np.array(matrix), abs=1e-4)
+def test_the_front_camera_stands_where_robomme_s_does(cameras):
+    """The matrix takes world coordinates (x, y, z, 1) to the camera's: right, down, ahead, in m."""
+    extrinsic = cameras.extrinsic("front")
 
-
-def test_depth_of_the_bare_table_agrees_with_geometry(cameras):
-    # A pixel's ray meets z = 0 at a depth of height / slope. Camera axes in the world: down is
-    # (0.894, 0, -0.447), forward (-0.447, 0, -0.894), and the eye is 0.4 above the table.
-    depth = cameras.depth("front")
-    assert (depth.shape, depth.dtype) == ((PICTURE_SIZE, PICTURE_SIZE, 1), np.int16)
-    for row in (104, 150, 200):
-        slope = 0.894427 + 0.447214 * (row + 0.5 - MIDDLE) / MIDDLE
-        assert depth[row, MIDDLE, 0] == pytest.approx(400 / slope, abs=1)
+    robomme = [[0, 1, 0, 0], [0.89443, 0, -0.44721, -0.08944], [-0.44721, 0, -0.89443, 0.49194]]
+    assert extrinsic == pytest.approx(np.array(robomme), abs=1e-5)
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_the_pixels_of_each_object_lie_where_its_position_projects(world, cameras, camera):
-    """Within two pixels; depth is in millimeters."""
-    pixels = cameras.segmentation(camera)
-    assert (pixels.shape, pixels.dtype) == (cameras.picture(camera).shape[:2], np.int16)
-    for body in world.bodies.values():
+def test_each_camera_sees_90_degrees_in_256_pixels(cameras, camera):
+    """So the focal length is 128 pixels, and the optical center is in the middle."""
+    intrinsic = cameras.intrinsic(camera)
+
+    expected = [[128, 0, 128], [0, 128, 128], [0, 0, 1]]
+    assert intrinsic == pytest.approx(np.array(expected), abs=1e-4)
+
+
+@pytest.mark.parametrize(("row", "millimeters"), [(104, 492.4), (150, 411.1), (200, 348.5)])
+def test_depth_of_the_bare_table_agrees_with_geometry(cameras, row, millimeters):
+    """The eye is 400 mm above the table and looks down at it in the middle column.
+
+    A pixel's ray falls by 0.8944 + 0.4472 * (row + 0.5 - 128) / 128 for each unit of depth, so it
+    meets the table at a depth of 400 mm through that number.
+    """
+    depth = cameras.depth("front")
+
+    assert depth[row, 128, 0] == pytest.approx(millimeters, abs=1)
+
+
+def pixels_of(cameras, camera, entity):
+    """Return rows and columns of the pixels that an object has in the segmentation."""
+    return np.nonzero(cameras.segmentation(camera) == entity.per_scene_id)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_the_pixels_of_an_object_surround_its_projected_position(world, cameras, camera):
+    for name, body in world.bodies.items():
         entity = body.entity if body.button is None else body.button.links[1].entity
-        rows, columns = np.nonzero(pixels == entity.per_scene_id)
-        assert len(rows) > 50
-        place = cameras.extrinsic(camera) @ np.append(entity.pose.p, 1.0)
-        x, y, distance = cameras.intrinsic(camera) @ place
-        assert (columns.mean(), rows.mean()) == pytest.approx((x / distance, y / distance), abs=2)
-        depth = cameras.depth(camera)[rows, columns, 0]
-        assert depth.mean() / 1000 == pytest.approx(distance, abs=0.03)
+        rows, columns = pixels_of(cameras, camera, entity)
+        ahead = cameras.extrinsic(camera) @ [*entity.pose.p, 1.0]
+        x, y, distance = cameras.intrinsic(camera) @ ahead
+
+        center = columns.mean(), rows.mean()
+
+        assert center == pytest.approx((x / distance, y / distance), abs=2), name
 
 
-def test_picture_depth_and_segmentation_of_a_moment_take_one_drawing(world, cameras, takes):
-    """`takes` counts drawings. The cube moves by 3 cm, so all three have to be drawn anew once."""
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_the_depth_of_a_cube_is_its_distance_in_millimeters(world, cameras, camera):
+    """Along the camera's axis; a cube is 40 mm wide."""
+    cube = world.bodies["cube_red"].entity
+    _, _, distance_m = cameras.extrinsic(camera) @ [*cube.pose.p, 1.0]
+
+    depth = cameras.depth(camera)[pixels_of(cameras, camera, cube)]
+
+    assert depth.mean() == pytest.approx(1000 * distance_m, abs=30)
+
+
+def test_segmentation_has_a_16_bit_number_for_each_pixel(cameras):
+    segmentation = cameras.segmentation("front")
+
+    assert (segmentation.shape, segmentation.dtype) == ((256, 256), np.int16)
+
+
+def test_picture_depth_and_segmentation_of_a_moment_take_one_drawing(takes):
+    """`takes` has an entry for each drawing."""
+    cameras = world_after_one_step("PickXtimes", 2).cameras
+
+    cameras.segmentation("front")
+    cameras.depth("front")
+    cameras.picture("front")
+
+    assert [camera for camera, _ in takes] == ["front"]
+
+
+def test_picture_and_segmentation_show_the_same_moment():
+    """The red cube moves by 3 cm between two pictures; then the pixels that are its own are red."""
+    world = world_after_one_step("PickXtimes", 2)
+    world.picture("front")
     cube = world.bodies["cube_red"]
-    for offset in (0.0, 0.03):
-        place = cube.item.position
-        cube.put(place._replace(x=place.x + offset))
-        before = len(takes)
-        cameras.segmentation("front")
-        cameras.depth("front")
-        picture = cameras.picture("front")
-        assert len(takes) <= before + 1
-        seen = cameras.segmentation("front") == cube.entity.per_scene_id
-        # What is the cube's is red, so both are of the same moment.
-        assert (picture[seen][:, 0] > 60).all()
-        assert (picture[seen][:, 1:] < 60).all()
-        picture[:] = 0  # callers may do with a picture what they like
-        assert cameras.picture("front")[seen].any()
-    assert len(takes) >= 1
+    cube.put(cube.position._replace(x=cube.position.x + 0.03))
 
-    cube.put(cube.item.position)
+    segmentation = world.cameras.segmentation("front")
+    colors = world.picture("front")[segmentation == cube.entity.per_scene_id]
+
+    assert (colors[:, 0] > 60).all()
+    assert (colors[:, 1:] < 60).all()
+
+
+def test_a_caller_that_paints_over_a_picture_does_not_change_the_next_one(cameras):
+    before = cameras.picture("front")
+    kept = before.copy()
+    before[:] = 0
+
+    assert np.array_equal(cameras.picture("front"), kept)
 
 
 def test_pictures_of_a_world_do_not_change_when_another_world_is_drawn():
-    episode = get_episode("PickXtimes", "test", 3)
-    first = World(episode.scene)
-    first.step(HOME_ACTION)
-    alone = [first.picture(camera) for camera in CAMERAS]
-    other_episode = get_episode("VideoUnmask", "test", 0)
-    other = World(other_episode.scene)
-    other.step(HOME_ACTION)
-    other.picture("front")
-    again = World(episode.scene)
+    world = world_after_one_step("PickXtimes", 3)
+    pictures = [world.picture(camera) for camera in CAMERAS]
 
-    again.step(HOME_ACTION)
+    world_after_one_step("VideoUnmask", 0).picture("front")
 
-    for camera, picture in zip(CAMERAS, alone, strict=True):
-        assert np.array_equal(first.picture(camera), picture)
-        assert np.array_equal(again.picture(camera), picture)
+    again = [world.picture(camera) for camera in CAMERAS]
+    of_equal_world = world_after_one_step("PickXtimes", 3)
+    drawn_anew = [of_equal_world.picture(camera) for camera in CAMERAS]
+    assert np.array_equal(again, pictures)
+    assert np.array_equal(drawn_anew, pictures)

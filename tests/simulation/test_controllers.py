@@ -5,105 +5,103 @@ import pytest
 
 import roboirg
 from roboirg.core.conditions import Fact
-from roboirg.simulation.physics_settings import HOME_ACTION
 
 pytestmark = pytest.mark.sim
 
 DOWN = (np.pi, 0.0, 0.0)
-OUT_OF_REACH = (1.5, 0.0, 0.3, *DOWN, 1.0)
+"""Roll, pitch and yaw of fingers that point down, radians."""
 
 
 def environment_with_actions(actions, **options):
+    """Return an environment without cameras that was reset; by default it has pick and place."""
     env = roboirg.make("PickXtimes", episode=2, cameras=(), actions=actions, **options)
     env.reset()
     return env
 
 
-def test_a_pose_action_is_one_control_step_toward_the_pose():
-    """A pose is x, y, z in meters, roll, pitch, yaw in radians, and the gripper (-1 closes)."""
+def test_repeated_pose_actions_take_the_tool_to_the_pose():
+    """A pose is x, y, z in meters, and roll, pitch and yaw in radians."""
     env = environment_with_actions("ee_pose")
-    assert env.action_space.shape == (7,)
+    pose = np.array([-0.1, 0.1, 0.25, np.pi - 0.2, 0.1, 0.4])
+    closed = -1.0
 
-    goal = np.array([-0.1, 0.1, 0.25, np.pi - 0.2, 0.1, 0.4])
-    info = {}
-    for step in range(1, 31):
-        observation, *_, info = env.step(np.append(goal, -1.0))
-        assert info["steps"] == step
+    for _ in range(30):
+        observation, *_ = env.step([*pose, closed])
 
-    reached = observation["end_effector"] - goal
-    reached[3:] = (reached[3:] + np.pi) % (2 * np.pi) - np.pi
-    assert np.abs(reached).max() < 2e-3
+    error = observation["end_effector"] - pose
+    error[3:] = (error[3:] + np.pi) % (2 * np.pi) - np.pi  # pi and -pi are the same angle
+    assert np.abs(error).max() < 2e-3
     assert observation["gripper"].max() < 0.002
 
 
-def test_pose_actions_reach_the_place_that_joint_angles_reached():
-    joints = environment_with_actions("joint_angle")
-    poses = environment_with_actions("ee_pose")
-    target = HOME_ACTION + np.array([0.1, 0.1, -0.1, -0.1, 0.1, 0.1, 0.1, 0.0])
-    for _ in range(30):
-        wanted, *_ = joints.step(target)
+def test_a_pose_action_takes_one_control_step():
+    env = environment_with_actions("ee_pose")
 
-    for _ in range(40):
-        got, *_ = poses.step(np.append(wanted["end_effector"], 1.0))
+    *_, info = env.step([-0.1, 0.1, 0.25, *DOWN, 1.0])
 
-    assert got["end_effector"] == pytest.approx(wanted["end_effector"], abs=2e-3)
+    assert info["steps"] == 1
 
 
 def test_a_pick_and_place_task_is_solved_with_waypoint_actions():
-    """A waypoint is a pose to which the arm moves straight, in as many steps as it takes."""
+    """A waypoint is a pose to which the arm moves straight, in as many steps as it takes.
+
+    The last number of an action is the gripper: -1 closes it, 1 opens it, and in between it stays
+    as it is. The goal is to put the blue cube onto the target and to press the button.
+    """
     env = environment_with_actions("waypoint")
+    assert env.episode.goal.as_mapping() == {"color": "blue", "repeats": 1}
     bodies = env.session.world.bodies
-    slots = env.episode.goal.as_mapping()
-    name = f"cube_{slots['color']}"
-    yaw = env.episode.scene[name].yaw
-    yaw = (yaw + np.pi / 4) % (np.pi / 2) - np.pi / 4
+    yaw = env.episode.scene["cube_blue"].yaw % (np.pi / 2)  # a cube looks the same every 90°
 
-    def go(place, height, gripper, turn=yaw):
-        return env.step([place.x, place.y, height, np.pi, 0.0, turn, gripper])
+    def go(name, height, gripper, turn=0.0):
+        x, y, _ = bodies[name].position
+        return env.step([x, y, height, np.pi, 0.0, turn, gripper])
 
-    for _ in range(slots["repeats"]):
-        cube = bodies[name].position
-        for height, gripper in ((0.15, 1), (0.02, -1), (0.15, 0)):
-            go(cube, height, gripper)
-        assert Fact("picked", name) in env.session.world.facts
-        # Neither -1 nor +1: the gripper stays as it was, closed.
-        for height, gripper in ((0.15, 0.3), (0.02, 1), (0.15, 0.999)):
-            go(bodies["target"].position, height, gripper)
-    go(bodies["button"].position, 0.15, -1, turn=0.0)
-    *_, terminated, truncated, info = go(bodies["button"].position, 0.0075, -1, turn=0.0)
+    go("cube_blue", 0.15, 1, yaw)
+    go("cube_blue", 0.02, -1, yaw)
+    go("cube_blue", 0.15, 0, yaw)
+    assert Fact("picked", "cube_blue") in env.session.world.facts
+    go("target", 0.15, 0.3, yaw)
+    go("target", 0.02, 1, yaw)
+    go("target", 0.15, 0.999, yaw)
+    go("button", 0.15, -1)
+    *_, info = go("button", 0.0075, -1)
 
-    assert (info["status"], terminated, truncated) == ("success", True, False)
+    assert info["status"] == "success"
 
 
-def test_the_gripper_moves_only_for_exactly_minus_or_plus_one():
-    """Closing takes about six control steps."""
+@pytest.mark.parametrize(("gripper", "steps", "width_m"), [(0.5, 1, 0.04), (-1.0, 7, 0.0)])
+def test_a_waypoint_at_the_tool_s_place_moves_the_gripper_only_for_exactly_minus_one(
+    gripper, steps, width_m
+):
+    """At 0.5 the fingers stay open, 0.04 m from the middle each; closing takes about 7 steps."""
     env = environment_with_actions("waypoint")
     here = env.session.world.robot.tool_pose.p
-    observation, *_, info = env.step([*here, *DOWN, 0.5])
-    moved = info["steps"]
 
-    assert moved < 5
-    assert observation["gripper"].min() > 0.039
+    observation, *_, info = env.step([*here, *DOWN, gripper])
 
-    observation, *_, info = env.step([*here, *DOWN, -1.0])
-    assert info["steps"] - 2 * moved in range(4, 9)  # the move to where it is, twice
-    assert observation["gripper"].max() < 0.005
+    assert info["steps"] == pytest.approx(steps, abs=2)
+    assert observation["gripper"] == pytest.approx([width_m, width_m], abs=0.005)
 
 
-@pytest.mark.parametrize("actions", ["ee_pose", "waypoint"])
-def test_an_unreachable_pose_fails_the_episode_with_the_pose_in_its_cause(actions):
+@pytest.mark.parametrize(
+    ("actions", "reason"),
+    [("ee_pose", "no joint positions reach"), ("waypoint", "no straight move reaches")],
+)
+def test_an_unreachable_pose_fails_the_episode_with_the_pose_in_its_cause(actions, reason):
     env = environment_with_actions(actions)
-    _, reward, terminated, truncated, info = env.step(OUT_OF_REACH)
+
+    _, reward, terminated, truncated, info = env.step([1.5, 0.0, 0.3, *DOWN, 1.0])
+
+    pose = "(1.500, 0.000, 0.300) with roll 3.142, pitch 0.000, yaw 0.000"
     assert (reward, terminated, truncated) == (0.0, True, False)
     assert (info["status"], info["steps"]) == ("failure", 0)
-
-    reached = "no joint positions reach" if actions == "ee_pose" else "no straight move reaches"
-    words = f"{reached} (1.500, 0.000, 0.300) with roll 3.142, pitch 0.000, yaw 0.000"
-    assert info["cause"] == words
+    assert info["cause"] == f"{reason} {pose}"
 
 
 def test_an_episode_times_out_in_the_middle_of_a_waypoint_move():
     env = environment_with_actions("waypoint", max_steps=10)
+
     *_, terminated, truncated, info = env.step([-0.1, 0.1, 0.1, *DOWN, -1.0])
 
     assert (terminated, truncated) == (False, True)

@@ -3,9 +3,8 @@
 import dataclasses
 import pickle
 import sys
-import tempfile
 import weakref
-from pathlib import Path
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -14,7 +13,6 @@ from flat_jobs import job_of
 from selection import slow_but
 
 import roboirg
-from roboirg.core.observations import PICTURE_SIZE
 from roboirg.runs.play.rollout import EpisodeRunner
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.episode_session import EpisodeSession
@@ -29,12 +27,29 @@ from roboirg.util.cache import open_cache
 
 pytestmark = [pytest.mark.sim, pytest.mark.usefixtures("without_cache")]
 
-VIDEO_TASKS = tuple(task for task in all_tasks() if get_episode(task, "test", 0).demonstration)
-SHORT_VIDEO_TASK = "VideoUnmask"
+VIDEO_TASKS = [task for task in all_tasks() if get_episode(task, "test", 0).demonstration]
+SHORT = "VideoUnmask"
+"""A task whose video has 66 moments, after which the robot goes home for a step."""
+
+
+class Reset(NamedTuple):
+    """An environment that was reset, and what it gave."""
+
+    env: Any
+    observation: Any
+    info: Any
+    video: Any
+
+
+def reset(task=SHORT, **options):
+    """Make an environment of test episode 1, without cameras unless some are wanted; reset it."""
+    env = roboirg.make(task, **{"episode": 1, "cameras": (), **options})
+    observation, info = env.reset()
+    return Reset(env, observation, info, info.pop("demonstration"))
 
 
 @pytest.fixture(scope="module", autouse=True)
-def meshes_read_once():
+def _meshes_read_once():
     """Reads the meshes once, from the cache of the session."""
     for kind in ("faithful", "light"):
         reset(cameras=("front",), meshes=kind)
@@ -70,166 +85,173 @@ def cameras_drawn(monkeypatch):
     return names
 
 
-def reset(task=SHORT_VIDEO_TASK, **options):
-    env = roboirg.make(task, **{"episode": 1, "cameras": (), **options})
-    observation, info = env.reset()
-    return env, observation, info
+@pytest.fixture
+def replays(monkeypatch):
+    """The sessions that have played a demonstration, in order."""
+    sessions = []
+    play = EpisodeSession.play_demonstration
+
+    def counted(self, *arguments):
+        sessions.append(self)
+        return play(self, *arguments)
+
+    monkeypatch.setattr(EpisodeSession, "play_demonstration", counted)
+    return sessions
 
 
-def check_same_arrays(first, second):
+def check_same(first, second):
+    """Assert that two mappings have the same keys in order, and equal values to the bit."""
     assert list(first) == list(second)
     for key, value in first.items():
-        assert value.dtype == second[key].dtype
+        assert np.asarray(value).dtype == np.asarray(second[key]).dtype, key
         assert np.array_equal(value, second[key]), key
 
 
-@pytest.mark.parametrize("task", slow_but((SHORT_VIDEO_TASK, "VideoRepick"), VIDEO_TASKS))
+@pytest.mark.parametrize("task", slow_but((SHORT, "VideoRepick"), VIDEO_TASKS))
 def test_replaying_a_recorded_demonstration_gives_bit_identical_states(task):
     """One session plans the robot's motions, the other repeats the recorded actions."""
-    planned, replayed = (
-        EpisodeSession(get_episode(task, "test", 3), visible=shown) for shown in (False, True)
+    planned = EpisodeSession(get_episode(task, "test", 3), visible=False)
+    replayed = EpisodeSession(get_episode(task, "test", 3), visible=True)
+    states = []
+    states_again = []
+    recording = planned.play_demonstration(lambda _: states.append(planned.state_hash()))
+
+    restored = Recording.from_bytes(recording.to_bytes())
+    again = replayed.play_demonstration(
+        lambda _: states_again.append(replayed.state_hash()), restored
     )
-    first = []
-    second = []
-    made = planned.play_demonstration(lambda _: first.append(planned.state_hash()))
-    restored = Recording.from_bytes(made.to_bytes())
-    again = replayed.play_demonstration(lambda _: second.append(replayed.state_hash()), restored)
 
-    assert first == second
-    assert len(first) == restored.video_length(planned.episode) > 0
-    assert again.end == made.end == restored.end
-    assert planned.events == replayed.events
+    assert states_again == states
+    assert len(states) == restored.video_length(planned.episode)
+    assert again.end == recording.end == restored.end
+    assert replayed.events == planned.events
 
-    # What cannot be read, such as the solver's memory of contacts, shows in what comes next.
-    rng = np.random.default_rng(5)
-    for _ in range(100):
-        action = HOME_ACTION + rng.normal(0.0, 0.2, 8)
-        planned.step(action)
-        replayed.step(action)
-    assert planned.state_hash() == replayed.state_hash()
+
+@pytest.mark.parametrize("task", slow_but((SHORT, "VideoRepick"), VIDEO_TASKS))
+def test_after_a_replay_random_actions_lead_to_the_same_state_as_after_planning(task):
+    """What cannot be read, such as the solver's memory of contacts, shows in what comes next."""
+    planned = EpisodeSession(get_episode(task, "test", 3), visible=False)
+    replayed = EpisodeSession(get_episode(task, "test", 3), visible=False)
+    recording = planned.play_demonstration()
+    replayed.play_demonstration(recording=recording)
+
+    for noise in np.random.default_rng(5).normal(0.0, 0.2, (100, 8)):
+        planned.step(HOME_ACTION + noise)
+        replayed.step(HOME_ACTION + noise)
+
+    assert replayed.state_hash() == planned.state_hash()
 
 
 @pytest.mark.parametrize(
-    "task", slow_but((SHORT_VIDEO_TASK,), (SHORT_VIDEO_TASK, "VideoPlaceOrder"))
+    ("task", "every"), slow_but([(SHORT, 3)], [(SHORT, 3), ("VideoPlaceOrder", 60)])
 )
-def test_video_pictures_read_after_the_policy_acted_show_the_demonstration(task):
-    """Pictures are drawn only when they are read, by replaying the demonstration."""
-    seen = {"front_rgb": [], "wrist_rgb": []}
-    every = 3 if task == SHORT_VIDEO_TASK else 60
-    steps = []
+def test_video_pictures_read_after_the_policy_acted_show_the_demonstration(task, every):
+    """Pictures are drawn only when they are read, by replaying the demonstration.
 
-    def look(env, is_demonstration):
+    Of the video every third, or sixtieth, moment has a picture, from the first one on.
+    """
+    steps = []
+    front = []
+    wrist = []
+
+    def take_pictures(env, is_demonstration):
         if is_demonstration:
-            steps.append(None)
-            if len(steps) % every == 1:
-                for field, frames in seen.items():
-                    frames.append(env.picture(field.removesuffix("_rgb")))
+            if len(steps) % every == 0:
+                front.append(env.picture("front"))
+                wrist.append(env.picture("wrist"))
+            steps.append(env.session.world.elapsed)
 
     env = roboirg.make(task, episode=1, demonstration_frames=every)
-    env.set_frame_hook(look)
+    env.set_frame_hook(take_pictures)
     _, info = env.reset()
     env.step_chunk(np.tile(HOME_ACTION + 0.1, (20, 1)))
     env.close()
 
     video = info["demonstration"]
 
+    assert np.array_equal(video["front_rgb"], front)
+    assert np.array_equal(video["wrist_rgb"], wrist)
     assert video.length == len(steps) == len(video["gripper"])
-    for field, frames in seen.items():
-        assert np.array_equal(video[field], np.stack(frames)), field
-        assert video[field] is video[field]
 
 
 def test_depth_and_calibration_of_the_video_are_those_of_its_moments():
-    options = {"cameras": ("wrist",), "depth": True, "calibration": True}
-    seen = []
-    env = roboirg.make(SHORT_VIDEO_TASK, episode=1, **options)
-    env.set_frame_hook(
-        lambda env, shown: seen.append(env._current.observation_builder.read()) if shown else 0
-    )
+    moments = []
+
+    def read(env, is_demonstration):
+        if is_demonstration:
+            moments.append(env._current.observation_builder.read())
+
+    env = roboirg.make(SHORT, episode=1, cameras=("wrist",), depth=True, calibration=True)
+    env.set_frame_hook(read)
     video = env.reset()[1]["demonstration"]
 
-    assert list(video) == list(seen[0])
-
-    check_same_arrays(
-        {key: np.stack([moment[key] for moment in seen]) for key in video}, dict(video)
-    )
+    stacked = {key: np.stack([moment[key] for moment in moments]) for key in moments[0]}
+    check_same(video, stacked)
 
 
-def test_pictures_of_a_video_are_drawn_only_when_they_are_read(cameras_drawn):
-    """The video has 66 moments; the first observation draws one picture of each camera."""
-    env, _, info = reset(cameras=("front", "wrist"))
-    world = weakref.ref(env.session.world)
-    assert cameras_drawn == ["front", "wrist"]  # the first observation
+def test_a_reset_draws_no_picture_of_its_video(cameras_drawn):
+    """But one of each camera for the first observation."""
+    video = reset(cameras=("front", "wrist")).video
 
-    video = info["demonstration"]
-    assert (video.length, len(video["joint_positions"]), "front_rgb" in video) == (66, 66, True)
+    assert cameras_drawn == ["front", "wrist"]
+    assert video.length == len(video["joint_positions"]) == 66
+    assert "front_rgb" in video
     assert "front_rgb (not drawn)" in repr(video)
     assert cameras_drawn == ["front", "wrist"]
 
+
+def test_pictures_of_a_video_can_be_read_after_its_environment_is_closed(cameras_drawn):
+    env, _, _, video = reset(cameras=("front", "wrist"))
+    world = weakref.ref(env.session.world)
     env.close()
+    cameras_drawn.clear()
     assert world() is None
-    assert video["wrist_rgb"].shape == (66, PICTURE_SIZE, PICTURE_SIZE, 3)
-    assert cameras_drawn == ["front", "wrist"] + ["wrist"] * 66
+
+    assert video["wrist_rgb"].shape == (66, 256, 256, 3)
+    assert cameras_drawn == ["wrist"] * 66
+
+
+def test_a_pickled_video_has_all_its_arrays_and_needs_no_simulator():
+    video = reset(cameras=("front",)).video
 
     other = pickle.loads(pickle.dumps(video))  # noqa: S301 - our own
-    check_same_arrays(dict(other), dict(video))
-    assert list(other) == list(video)
-    assert other.length == video.length
-    assert not isinstance(other, dict)
+
+    check_same(dict(other), dict(video))
+    assert other.length == 66
     assert len(other.actions) == 0
 
 
-def test_all_pictures_of_a_camera_are_drawn_in_one_replay(cameras_drawn, monkeypatch):
-    """66 moments, every fifth: 14 pictures. A second replay draws the other camera."""
-    replays = []
-    play = EpisodeSession.play_demonstration
-    options = {"cameras": ("front", "wrist"), "depth": True, "demonstration_frames": 5}
-    _, _, info = reset(**options)
-    alone = dict(reset(**options)[2]["demonstration"])
+def test_reading_a_camera_draws_all_its_pictures_in_one_replay(cameras_drawn, replays):
+    """66 moments, every fifth: 14 pictures. They are kept."""
+    video = reset(cameras=("front", "wrist"), depth=True, demonstration_frames=5).video
     cameras_drawn.clear()
-    monkeypatch.setattr(
-        EpisodeSession,
-        "play_demonstration",
-        lambda self, *args: (replays.append(self), play(self, *args))[1],
-    )
-    video = info["demonstration"]
+    replays.clear()
+
     wrist = video["wrist_rgb"]
 
     assert (len(replays), cameras_drawn) == (1, ["wrist"] * 14)
-
-    video.draw()
-    assert (len(replays), cameras_drawn) == (2, ["wrist"] * 14 + ["front"] * 14)
-    assert "not drawn" not in repr(video)
     assert video["wrist_rgb"] is wrist
 
-    check_same_arrays(alone, dict(video))
-    pickle.dumps(video)
+
+def test_drawing_a_video_draws_what_was_not_read_and_nothing_twice(cameras_drawn, replays):
+    options = {"cameras": ("front", "wrist"), "depth": True, "demonstration_frames": 5}
+    read_at_once = dict(reset(**options).video)
+    video = reset(**options).video
+    wrist = video["wrist_rgb"]
+    cameras_drawn.clear()
+    replays.clear()
+
     video.draw()
-    assert len(replays) == 2
+    video.draw()
 
-
-def everything_returned(task=SHORT_VIDEO_TASK):
-    """Everything that an environment and a run return."""
-    options = {"cameras": ("front", "wrist"), "demonstration_frames": Viewer.demonstration_frames}
-    _, observation, info = reset(task, depth=True, grounded=True, **options)
-    job = job_of(
-        policy=f"{__name__}:Viewer",
-        task=task,
-        split="test",
-        episode=1,
-        setting="direct",
-        max_steps=80,
-    )
-    with tempfile.TemporaryDirectory() as folder:
-        record = msgspec.structs.asdict(EpisodeRunner(Path(folder))(job))
-    for name in ("started_at", "duration_s", "timings", "details"):
-        del record[name]
-    video = dict(info.pop("demonstration"))
-    return {**observation, **video, "first": observation["front_rgb"]}, info, record
+    assert (len(replays), cameras_drawn) == (1, ["front"] * 14)
+    assert "not drawn" not in repr(video)
+    assert video["wrist_rgb"] is wrist
+    check_same(dict(video), read_at_once)
 
 
 class Viewer:
-    """Acts on the pictures of the video."""
+    """Acts on the pictures of the video, of which it gets every sixth."""
 
     demonstration_frames = 6
 
@@ -242,51 +264,75 @@ class Viewer:
         return actions
 
 
-def test_results_are_equal_with_an_empty_a_filled_and_no_cache(
-    cache, monkeypatch, cameras_drawn, forbid_planning
-):
-    """With the filled cache nothing is planned and no picture of the video is drawn."""
-    monkeypatch.setitem(sys.modules, __name__, sys.modules[__name__])
-    cold = everything_returned()
-    at_first = len(cameras_drawn)
-    assert len(list(cache.glob("actions/*"))) == 1
-    assert len(list(cache.glob("frames/*"))) == 4
+def record_of_viewer(folder):
+    """Return the fields of the record of a run, but for those that tell the time."""
+    job = job_of(
+        policy=f"{__name__}:Viewer", task=SHORT, split="test", episode=1, setting="direct",
+        max_steps=80,
+    )  # fmt: skip
+    record = msgspec.structs.asdict(EpisodeRunner(folder)(job))
+    for name in ("started_at", "duration_s", "timings", "details"):
+        del record[name]
+    return record
 
-    with monkeypatch.context() as patch:
-        patch.setenv("ROBOIRG_CACHE", "off")
-        off = everything_returned()
+
+def test_a_run_records_the_same_with_an_empty_a_filled_and_no_cache(cache, tmp_path, monkeypatch):
+    """The policy acts on the pictures of the video."""
+    monkeypatch.setitem(sys.modules, __name__, sys.modules[__name__])
+    with_empty_cache = record_of_viewer(tmp_path)
+    with_filled_cache = record_of_viewer(tmp_path)
+    monkeypatch.setenv("ROBOIRG_CACHE", "off")
+    without_cache = record_of_viewer(tmp_path)
+
+    assert with_empty_cache["demonstration_steps"] == 66
+    assert with_filled_cache == with_empty_cache
+    assert without_cache == with_empty_cache
+
+
+def test_a_reset_fills_the_cache_with_a_recording_and_the_pictures_of_each_camera(cache):
+    dict(reset(cameras=("front", "wrist"), demonstration_frames=6).video)
+
+    assert len(list(cache.glob("actions/*"))) == 1
+    assert len(list(cache.glob("frames/*"))) == 2
+
+
+def test_with_a_filled_cache_no_picture_of_the_video_is_drawn(
+    cache, cameras_drawn, forbid_planning
+):
+    options = {"cameras": ("front", "wrist"), "depth": True, "demonstration_frames": 6}
+    first = dict(reset(**options).video)
     cameras_drawn.clear()
     forbid_planning()
-    warm = everything_returned()
 
-    # The video has 11 pictures of each of two cameras.
-    assert len(cameras_drawn) == at_first - 2 * 11
-    for arrays, info, record in (warm, off):
-        assert record == cold[2]
-        assert record["demonstration_steps"] == 66
-        assert info == cold[1]
-        assert arrays["instruction"] == cold[0]["instruction"]
-        for key in set(arrays) - {"instruction"}:
-            assert np.array_equal(arrays[key], cold[0][key]), key
+    again = dict(reset(**options).video)
+
+    assert cameras_drawn == ["front", "wrist"]  # the first observation
+    check_same(again, first)
 
 
-@pytest.mark.parametrize("task", [SHORT_VIDEO_TASK, "VideoRepick"])
+@pytest.mark.parametrize(
+    ("task", "source", "recordings"),
+    [(SHORT, "planned", 1), ("VideoRepick", "recorded", 0)],
+)
 def test_a_reset_from_the_cache_equals_one_that_plans_the_demonstration(
-    task, cache, forbid_planning
+    task, source, recordings, cache, forbid_planning
 ):
-    """After the first reset, planning is forbidden: the second one has to read the cache."""
-    _, observation, info = reset(task)
-    small = [entry.stat().st_size < 200_000 for entry in cache.glob("actions/*")]
-    # A shipped recording needs no cache.
-    assert small == ([] if info["demonstration_source"] == "recorded" else [True])
+    """After the first reset, planning is forbidden: the second one has to read the cache.
 
+    A recording that comes with the benchmark needs no cache.
+    """
+    first = reset(task, grounded=True)
+    entries = list(cache.glob("actions/*"))
     forbid_planning()
-    env, again, warm = reset(task)
-    check_same_arrays(dict(info.pop("demonstration")), dict(warm.pop("demonstration")))
-    assert (info, observation.pop("instruction")) == (warm, again.pop("instruction"))
 
-    check_same_arrays(observation, again)
-    assert env.session.judge.index == len(env.episode.demonstration)
+    second = reset(task, grounded=True)
+
+    assert (first.info["demonstration_source"], len(entries)) == (source, recordings)
+    assert all(entry.stat().st_size < 200_000 for entry in entries)
+    assert second.info == first.info
+    check_same(second.observation, first.observation)
+    check_same(dict(second.video), dict(first.video))
+    assert second.env.session.judge.index == len(second.env.episode.demonstration)
 
 
 def stored_recording(cache):
@@ -296,41 +342,46 @@ def stored_recording(cache):
     return store, entry.name, Recording.from_bytes(store.read(entry.name))
 
 
-@pytest.mark.parametrize("fault", ["end", "actions", "stages"])
-def test_a_cached_recording_that_replays_differently_is_rebuilt_with_a_warning(
-    cache, caplog, fault
-):
-    """The cached recording gets another final state, other actions, or no actions at all."""
-    _, observation, info = reset()
-    store, name, right = stored_recording(cache)
-    wrong = {
-        "end": {"end": "0" * 64},
-        "actions": {"actions": right.actions[::-1] + 0.3},
-        "stages": {"stages": right.stages[:0], "actions": right.actions[:0]},
-    }
-    store.write(name, dataclasses.replace(right, **wrong[fault]).to_bytes())
+def with_another_end(recording):
+    return dataclasses.replace(recording, end="0" * 64)
 
-    _, after, rebuilt = reset()
+
+def with_other_actions(recording):
+    return dataclasses.replace(recording, actions=recording.actions[::-1] + 0.3)
+
+
+def without_actions(recording):
+    return dataclasses.replace(
+        recording, stages=recording.stages[:0], actions=recording.actions[:0]
+    )
+
+
+@pytest.mark.parametrize("spoil", [with_another_end, with_other_actions, without_actions])
+def test_a_cached_recording_that_replays_differently_is_rebuilt_with_a_warning(
+    cache, caplog, spoil
+):
+    first = reset()
+    store, name, right = stored_recording(cache)
+    store.write(name, spoil(right).to_bytes())
+
+    second = reset()
 
     assert [record.levelname for record in caplog.records] == ["WARNING"]
     assert name in caplog.text
-    assert f"{SHORT_VIDEO_TASK}/test/1" in caplog.text
-    assert np.array_equal(after["end_effector"], observation["end_effector"])
-    check_same_arrays(dict(info["demonstration"]), dict(rebuilt["demonstration"]))
+    assert "VideoUnmask/test/1" in caplog.text
+    check_same(second.observation, first.observation)
+    check_same(dict(second.video), dict(first.video))
     assert Recording.from_bytes(store.read(name)).end == right.end
-
-    reset()
-    assert len(caplog.records) == 1
 
 
 def test_a_frame_hook_does_not_see_the_replay_of_a_wrong_recording(cache):
-    """The video has 67 steps; the hook must see each of them once, though
-    the cached recording was wrong and the demonstration is played again."""
-    _, _, _ = reset()
+    """The hook must see each of the 67 steps of the demonstration once, though the cached recording
+    was wrong and the demonstration is played again."""
+    reset()
     store, name, right = stored_recording(cache)
-    store.write(name, dataclasses.replace(right, actions=right.actions + 0.2).to_bytes())
+    store.write(name, with_other_actions(right).to_bytes())
     seen = []
-    env = roboirg.make(SHORT_VIDEO_TASK, episode=1, cameras=())
+    env = roboirg.make(SHORT, episode=1, cameras=())
     env.set_frame_hook(lambda env, shown: seen.append(env.session.world.elapsed))
 
     env.reset()
@@ -338,46 +389,70 @@ def test_a_frame_hook_does_not_see_the_replay_of_a_wrong_recording(cache):
     assert seen == list(range(1, 68))
 
 
-def test_the_cache_key_of_a_demonstration_changes_with_code_and_processor(monkeypatch):
-    """The key also names the versions of the libraries that compute motions."""
-    episode = get_episode(SHORT_VIDEO_TASK, "test", 1)
+def test_each_episode_has_a_cache_key_of_its_own_that_stays_the_same():
+    first = demonstration_cache.recording_key(get_episode(SHORT, "test", 1))
+    again = demonstration_cache.recording_key(get_episode(SHORT, "test", 1))
+    other = demonstration_cache.recording_key(get_episode(SHORT, "test", 2))
+
+    assert again == first
+    assert other != first
+
+
+@pytest.fixture
+def _fingerprint_made_anew():
+    """What keys contain of the platform is computed once; here it is before and after."""
+    demonstration_cache._platform_fingerprint.cache_clear()
+    yield
+    demonstration_cache._platform_fingerprint.cache_clear()
+
+
+@pytest.mark.usefixtures("_fingerprint_made_anew")
+@pytest.mark.parametrize(
+    ("name", "other"), [("_SOURCE_HASH", "another"), ("processor_features", lambda: "another")]
+)
+def test_the_cache_key_of_a_demonstration_changes_with_code_and_processor(monkeypatch, name, other):
+    episode = get_episode(SHORT, "test", 1)
     key = demonstration_cache.recording_key(episode)
-    assert demonstration_cache.recording_key(get_episode(SHORT_VIDEO_TASK, "test", 1)) == key
-    assert demonstration_cache.recording_key(get_episode(SHORT_VIDEO_TASK, "test", 2)) != key
+    demonstration_cache._platform_fingerprint.cache_clear()
+    monkeypatch.setattr(demonstration_cache, name, other)
 
-    for name, other in (("_SOURCE_HASH", "another"), ("processor_features", lambda: "another")):
-        with monkeypatch.context() as patch:
-            patch.setattr(demonstration_cache, name, other)
-            demonstration_cache._platform_fingerprint.cache_clear()
-            assert demonstration_cache.recording_key(episode) != key
-        demonstration_cache._platform_fingerprint.cache_clear()
-    assert demonstration_cache.recording_key(episode) == key
+    assert demonstration_cache.recording_key(episode) != key
 
+
+def test_the_cache_key_of_a_demonstration_names_the_libraries_that_compute_motions():
     fingerprint = demonstration_cache._platform_fingerprint()
-    for part in ("sapien 3", "numpy ", "scipy ", "toppra ", "python 3"):
-        assert part in fingerprint
+
+    for library in ("sapien 3", "numpy ", "scipy ", "toppra ", "python 3"):
+        assert library in fingerprint
 
 
-def test_pictures_of_other_meshes_or_frame_rates_have_their_own_cache_entries(cache):
-    """*Faithful* and *light* are ways of drawing; every eleventh
-    frame is another series than every twenty-second."""
-
-    def read(meshes_read_once, every=11):
-        options = {"cameras": ("front",), "meshes": meshes_read_once, "demonstration_frames": every}
-        return reset(**options)[2]["demonstration"]["front_rgb"]
-
-    faithful = read("faithful")
-    assert len(list(cache.glob("frames/*"))) == 1
-
+def test_the_cache_key_of_pictures_names_the_driver():
     key = frame_sequence.rendering_key(FAITHFUL)
+
     assert "llvmpipe" in key or "NVIDIA" in key
     assert ".so" in key
 
-    light = read("light")
-    assert len(list(cache.glob("frames/*"))) == 2
+
+def pictures_with(meshes, every):
+    """Return the pictures of the video, drawn in some way, of every such moment."""
+    video = reset(cameras=("front",), meshes=meshes, demonstration_frames=every).video
+    return video["front_rgb"]
+
+
+def test_pictures_with_other_meshes_have_a_cache_entry_of_their_own(cache):
+    faithful = pictures_with("faithful", every=11)
+    light = pictures_with("light", every=11)
+
     assert not np.array_equal(light, faithful)
-    # Fewer pictures are others, too: not the first ones of the entry that has more.
-    assert all(np.array_equal(read("faithful", 11 * n), faithful[::n]) for n in (1, 2))
+    assert len(list(cache.glob("frames/*"))) == 2
+
+
+def test_fewer_pictures_are_not_the_first_ones_of_a_cache_entry_that_has_more(cache):
+    every_11th = pictures_with("light", every=11)
+
+    every_22nd = pictures_with("light", every=22)
+
+    assert np.array_equal(every_22nd, every_11th[::2])
 
 
 def test_a_recording_is_written_and_read_bit_for_bit():
@@ -390,4 +465,7 @@ def test_a_recording_is_written_and_read_bit_for_bit():
     assert again.actions.tobytes() == recording.actions.tobytes()
     assert [step.stage for step in again.steps()] == [1, 2]
     assert again.end == "ab12"
+
+
+def test_a_recording_of_no_steps_has_no_actions():
     assert Recording.from_steps([], "").actions.shape == (0, 8)

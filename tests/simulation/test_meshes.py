@@ -11,59 +11,78 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays, scalar_dtypes
 
 from roboirg.simulation.model_files import TABLE_FILE, find_model_files
-from roboirg.simulation.rendering import mesh_cache, robot_meshes, table_mesh
+from roboirg.simulation.rendering import mesh_cache, table_mesh
 from roboirg.simulation.rendering.mesh_cache import cached_arrays, pack_arrays, unpack_arrays
 from roboirg.util.cache import open_cache
 
-DERIVED_MESHES = 13
-"""Ten links of the robot, what the front camera sees of one, the wrist camera and the table."""
-
 
 @pytest.fixture
-def cache(tmp_path, monkeypatch):
+def mesh_folder(tmp_path, monkeypatch):
+    """The folder of cached meshes, in a cache that is empty."""
     monkeypatch.setenv("ROBOIRG_CACHE", str(tmp_path))
     return tmp_path / "meshes"
 
 
-def entries(cache):
-    return sorted(path.name for path in cache.glob("[!.]*"))
+def entries_in(mesh_folder):
+    return list(mesh_folder.glob("[!.]*"))
 
 
-names = st.text("abc_0123", min_size=1)
+arrays_by_name = st.dictionaries(
+    st.text("abc_0123", min_size=1),
+    arrays(scalar_dtypes(), array_shapes(min_dims=0, min_side=0)),
+)
 
 
 @settings(max_examples=12)
-@given(st.dictionaries(names, arrays(scalar_dtypes(), array_shapes(min_dims=0, min_side=0))))
-def test_packed_arrays_are_unpacked_bit_for_bit(given_arrays):
-    again = unpack_arrays(memoryview(pack_arrays(given_arrays)))
-    assert list(again) == list(given_arrays)
-    for name, array in given_arrays.items():
-        assert (again[name].dtype, again[name].shape) == (array.dtype, array.shape)
-        assert again[name].tobytes() == array.tobytes()
+@given(arrays_by_name)
+def test_packed_arrays_are_unpacked_bit_for_bit(packed):
+    unpacked = unpack_arrays(memoryview(pack_arrays(packed)))
+
+    assert list(unpacked) == list(packed)
+    for name, array in packed.items():
+        again = unpacked[name]
+        assert (again.dtype, again.shape) == (array.dtype, array.shape)
+        assert again.tobytes() == array.tobytes()
 
 
-def test_cached_arrays_are_computed_once_for_each_source(cache):
-    made = []
+def test_cached_arrays_are_computed_once_for_each_source(mesh_folder):
+    """A source is the bytes of the file from which a mesh is derived."""
+    computed = []
 
-    def make():
-        made.append(None)
-        return {"corners": np.arange(6.0).reshape(2, 3)}
+    def corners():
+        computed.append("corners")
+        return {"corners": np.array([[0, 1, 2], [3, 4, 5]])}
 
-    for sources in (b"first", b"first", b"second"):
-        ((name, array),) = cached_arrays("thing", sources, make).items()
-        assert (name, array.tolist()) == ("corners", [[0, 1, 2], [3, 4, 5]])
-    assert len(made) == len(entries(cache)) == 2
+    cached_arrays("thing", b"first", corners)
+    again = cached_arrays("thing", b"first", corners)
+    cached_arrays("thing", b"second", corners)
+
+    assert again["corners"].tolist() == [[0, 1, 2], [3, 4, 5]]
+    assert len(computed) == 2
+    assert len(entries_in(mesh_folder)) == 2
 
 
-def test_cached_meshes_stay_within_their_sixteenth_of_the_cache(cache, monkeypatch):
-    monkeypatch.setenv("ROBOIRG_CACHE_GIB", str(16 * 10_000 / 2**30))
+def test_cached_meshes_take_at_most_a_sixteenth_of_the_cache(mesh_folder, monkeypatch):
+    """The cache may have 160,000 bytes; 20 meshes of 1,600 bytes do not fit into 10,000."""
+    monkeypatch.setenv("ROBOIRG_CACHE_GIB", str(160_000 / 2**30))
+
     for number in range(20):
         cached_arrays("thing", bytes([number]), lambda: {"zeros": np.zeros(200)})
-        assert sum(path.stat().st_size for path in cache.iterdir()) <= 10_000
-    assert 1 < len(entries(cache)) < 20
 
-    open_cache("actions").write("a1", bytes(5000))
-    assert open_cache("actions").read("a1") == bytes(5000)
+    kept = [path.stat().st_size for path in mesh_folder.iterdir()]
+    assert len(kept) > 1
+    assert sum(kept) <= 10_000
+
+
+def test_meshes_that_fill_their_share_displace_no_recorded_actions(monkeypatch, mesh_folder):
+    """The cache may have 160,000 bytes, of which meshes and actions may fill 10,000 each."""
+    monkeypatch.setenv("ROBOIRG_CACHE_GIB", str(160_000 / 2**30))
+    open_cache("actions").write("a1", bytes(5_000))
+
+    for number in range(20):
+        cached_arrays("thing", bytes([number]), lambda: {"zeros": np.zeros(200)})
+
+    assert open_cache("actions").read("a1") == bytes(5_000)
 
 
 PRINT_CHECKSUM_OF_PICTURE = """
@@ -72,63 +91,79 @@ print(zlib.crc32(roboirg.make("PickXtimes").reset()[0]["front_rgb"].tobytes()))
 """
 
 
+def printed_by_a_process_that_draws():
+    """Return the checksum of a picture that a new process prints, and its warnings."""
+    done = subprocess.run(
+        [sys.executable, "-c", PRINT_CHECKSUM_OF_PICTURE],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout, done.stderr
+
+
 @pytest.mark.slow
 @pytest.mark.sim
-def test_damaged_cached_meshes_are_rebuilt_with_a_warning(cache):
-    """One file is cut off, in another one bit is flipped; the picture must not change."""
+def test_damaged_cached_meshes_are_rebuilt_with_a_warning(mesh_folder):
+    """One file is cut off, in another one a bit is flipped; the picture must not change.
 
-    def draw():
-        done = subprocess.run(
-            [sys.executable, "-c", PRINT_CHECKSUM_OF_PICTURE],
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        return done.stdout, done.stderr
+    There are 13: ten links of the robot, what each camera sees of one of them, and the table.
+    """
+    picture, _ = printed_by_a_process_that_draws()
+    sound = {path: path.read_bytes() for path in mesh_folder.iterdir()}
+    (table,) = mesh_folder.glob("table-*")
+    table.write_bytes(sound[table][:-1000])
+    link = min(mesh_folder.glob("link0-*"))  # what one of the cameras sees of it
+    flipped = bytearray(sound[link])
+    flipped[len(flipped) // 2] ^= 1
+    link.write_bytes(flipped)
 
-    picture, complaints = draw()
-    assert complaints == ""
-
-    sound = {path.name: path.read_bytes() for path in cache.iterdir()}
-    assert len(sound) == len(entries(cache)) == DERIVED_MESHES
-
-    harmed = [next(cache.glob(f"{name}-*")) for name in ("table", "link0")]
-    harmed[0].write_bytes(sound[harmed[0].name][:-1000])
-    raw = bytearray(sound[harmed[1].name])
-    raw[len(raw) // 2] ^= 1
-    harmed[1].write_bytes(raw)
-    again, complaints = draw()
+    again, warnings = printed_by_a_process_that_draws()
 
     assert again == picture
-    for path in harmed:
-        assert f"The cache entry {path} is damaged and will be rebuilt." in complaints
-    assert complaints.count("rebuilt") == 2
-    assert {path.name: path.read_bytes() for path in cache.iterdir()} == sound
+    assert f"The cache entry {table} is damaged and will be rebuilt." in warnings
+    assert f"The cache entry {link} is damaged and will be rebuilt." in warnings
+    assert warnings.count("rebuilt") == 2
+    assert len(sound) == 13
+    assert {path: path.read_bytes() for path in mesh_folder.iterdir()} == sound
+
+
+@pytest.fixture(scope="module")
+def installed_table_parts():
+    """The parts of the table's model as SAPIEN reads it."""
+    return sapien.render.RenderShapeTriangleMesh(str(find_model_files() / TABLE_FILE)).parts
 
 
 @pytest.mark.sim
-def test_our_reduced_table_mesh_equals_the_installed_model():
-    stock = sapien.render.RenderShapeTriangleMesh(str(find_model_files() / TABLE_FILE))
-    for ours, theirs in zip(table_mesh.table_shape().parts, stock.parts, strict=True):
-        for what in ("vertices", "triangles"):
-            assert np.array_equal(getattr(ours, what), getattr(theirs, what))
-        assert np.array_equal(ours.get_vertex_normal(), theirs.get_vertex_normal())
-        assert np.array_equal(ours.get_vertex_uv(), theirs.get_vertex_uv())
+def test_our_reduced_table_mesh_has_the_geometry_of_the_installed_model(installed_table_parts):
+    ours = table_mesh.table_shape().parts
 
-    theirs = stock.parts[0].material
-    assert (theirs.metallic_texture.download()[..., 2] == 255 * table_mesh.METALLIC).all()
-    assert theirs.emission_texture is theirs.transmission_texture is None
+    for mine, theirs in zip(ours, installed_table_parts, strict=True):
+        assert np.array_equal(mine.vertices, theirs.vertices)
+        assert np.array_equal(mine.triangles, theirs.triangles)
+        assert np.array_equal(mine.get_vertex_normal(), theirs.get_vertex_normal())
+        assert np.array_equal(mine.get_vertex_uv(), theirs.get_vertex_uv())
+
+
+@pytest.mark.sim
+def test_what_our_table_leaves_out_of_its_material_has_no_effect(installed_table_parts):
+    """The model is everywhere equally metallic, and neither shines nor lets light through."""
+    material = installed_table_parts[0].material
+    metallic = material.metallic_texture.download()[..., 2]
+
+    assert (metallic == 255 * table_mesh.METALLIC).all()
+    assert material.emission_texture is None
+    assert material.transmission_texture is None
     for texture in table_mesh._TEXTURES:
-        held = getattr(theirs, texture.field)
+        held = getattr(material, texture.field)
         assert (held.is_srgb, held.mipmap_levels) == (texture.srgb, 1)
         assert held.address_mode == "repeat"
 
 
-def test_the_cache_key_of_a_mesh_changes_with_the_code_that_computes_it(cache, monkeypatch):
+def test_the_cache_key_of_a_mesh_changes_with_the_code_that_computes_it(mesh_folder, monkeypatch):
     cached_arrays("thing", b"", dict)
     monkeypatch.setattr(mesh_cache, "source_code", lambda *_: b"other code")
 
     cached_arrays("thing", b"", dict)
 
-    assert len(entries(cache)) == 2
-    assert robot_meshes.source_code("robot_meshes") != mesh_cache.source_code("robot_meshes")
+    assert len(entries_in(mesh_folder)) == 2

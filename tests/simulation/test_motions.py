@@ -16,140 +16,156 @@ from roboirg.simulation.world import World
 pytestmark = pytest.mark.sim
 
 
-def cube(name: str, x: float, y: float, z: float = 0.02, yaw: float = 0.0) -> SceneObject:
+def cube(name, x, y, z=0.02, yaw=0.0):
     return SceneObject(name, "cube", Point(x, y, z), yaw, "red")
 
 
-def place_in_plane(world: World, name: str) -> tuple[float, float]:
+def world_with(objects, *motions):
+    """Return a world without cameras in which objects move by themselves."""
+    return World(Scene(tuple(objects), motions), visible=False)
+
+
+def place(world, name):
+    """Return where on the table an object is now, (x, y) in m."""
     return world.bodies[name].position[:2]
 
 
-def turn(world: World, name: str) -> float:
+def yaw_of(world, name):
     w, _, _, z = world.bodies[name].entity.pose.q
     return 2 * math.atan2(z, w)
 
 
-def test_two_objects_change_places_on_opposite_lanes_and_the_others_stay():
-    """Swap(a, b, from step 10, 50 steps, lane 0.07 m
-    aside, c stays). Places are (x, y) in meters."""
-    places = {"a": (0.0, -0.1), "b": (0.0, 0.1), "c": (0.1, 0.15)}
-    objects = tuple(cube(name, *xy, yaw=0.3 * i) for i, (name, xy) in enumerate(places.items()))
-    world = World(Scene(objects, (Swap("a", "b", 10, 50, 0.07, ("c",)),)), visible=False)
-    rest(world, 10)
+def swapping_world():
+    """a and b change places from step 10 on, in 50 steps, on lanes 0.07 m aside; c stays."""
+    objects = [cube("a", 0.0, -0.1, yaw=0.0), cube("b", 0.0, 0.1, yaw=0.3), cube("c", 0.1, 0.15)]
+    return world_with(objects, Swap("a", "b", 10, 50, 0.07, ("c",)))
 
-    assert place_in_plane(world, "a") == pytest.approx(places["a"], abs=1e-4)
 
-    rest(world, 26)  # the step with k = 35 is half way
-    # a goes towards +y, so its left is -x; b comes the other way on its own left.
-    assert place_in_plane(world, "a") == pytest.approx((-0.07, 0.0), abs=2e-3)
-    assert place_in_plane(world, "b") == pytest.approx((0.07, 0.0), abs=2e-3)
-    assert turn(world, "a") == pytest.approx(0.15, abs=1e-2)
+def test_objects_stay_where_they_are_before_their_swap_begins():
+    world = rest(swapping_world(), 10)
 
-    rest(world, 25)
-    assert place_in_plane(world, "a") == pytest.approx(places["b"], abs=1e-4)
-    assert place_in_plane(world, "b") == pytest.approx(places["a"], abs=1e-4)
-    assert place_in_plane(world, "c") == pytest.approx(places["c"], abs=1e-4)
-    assert turn(world, "a") == pytest.approx(0.3, abs=1e-3)
+    assert place(world, "a") == pytest.approx((0.0, -0.1), abs=1e-4)
+    assert place(world, "b") == pytest.approx((0.0, 0.1), abs=1e-4)
 
-    rest(world, 5)
-    assert place_in_plane(world, "a") == pytest.approx(places["b"], abs=1e-4)
+
+def test_half_way_through_a_swap_the_objects_pass_each_other_on_opposite_lanes():
+    """a goes towards +y, so its left is -x; b comes the other way, on its own left."""
+    world = rest(swapping_world(), 36)
+
+    assert place(world, "a") == pytest.approx((-0.07, 0.0), abs=2e-3)
+    assert place(world, "b") == pytest.approx((0.07, 0.0), abs=2e-3)
+    assert yaw_of(world, "a") == pytest.approx(0.15, abs=1e-2)
+
+
+@pytest.mark.parametrize("step", [61, 66])
+def test_after_a_swap_two_objects_have_changed_places_and_yaw_and_the_others_stay(step):
+    world = rest(swapping_world(), step)
+
+    assert place(world, "a") == pytest.approx((0.0, 0.1), abs=1e-4)
+    assert place(world, "b") == pytest.approx((0.0, -0.1), abs=1e-4)
+    assert yaw_of(world, "a") == pytest.approx(0.3, abs=1e-3)
+    assert place(world, "c") == pytest.approx((0.1, 0.15), abs=1e-4)
 
 
 def test_two_swaps_in_a_row_start_with_the_stage_they_wait_for():
     """First a and b, then a and c; both count their steps from the start of stage 2."""
-    places = {"a": (0.0, -0.15), "b": (0.0, 0.0), "c": (0.0, 0.15)}
-    objects = tuple(cube(name, *xy) for name, xy in places.items())
-    swaps = (
-        Swap("a", "b", 0, 50, 0.07, ("c",), stage=2),
-        Swap("a", "c", 50, 50, 0.07, ("b",), stage=2),
-    )
-    world = World(Scene(objects, swaps), visible=False)
-    rest(world, 20)
-
-    assert place_in_plane(world, "a") == pytest.approx(places["a"], abs=1e-4)
+    objects = [cube("a", 0.0, -0.15), cube("b", 0.0, 0.0), cube("c", 0.0, 0.15)]
+    first = Swap("a", "b", 0, 50, 0.07, ("c",), stage=2)
+    second = Swap("a", "c", 50, 50, 0.07, ("b",), stage=2)
+    world = rest(world_with(objects, first, second), 20)
+    assert place(world, "a") == pytest.approx((0.0, -0.15), abs=1e-4)
 
     world.note_stage(2)
     rest(world, 101)
-    assert place_in_plane(world, "a") == pytest.approx(places["c"], abs=1e-4)
-    assert place_in_plane(world, "b") == pytest.approx(places["a"], abs=1e-4)
-    assert place_in_plane(world, "c") == pytest.approx(places["b"], abs=1e-4)
+
+    assert place(world, "a") == pytest.approx((0.0, 0.15), abs=1e-4)
+    assert place(world, "b") == pytest.approx((0.0, -0.15), abs=1e-4)
+    assert place(world, "c") == pytest.approx((0.0, 0.0), abs=1e-4)
 
 
-def test_an_object_that_is_away_returns_to_its_place_or_to_another_object():
-    """a is away (parked at x > 5 m) from step 0 to 5, and from 8 to 12; then it is put under b."""
-    objects = (cube("a", 0.0, -0.1), cube("b", 0.0, 0.1), cube("c", 0.1, 0.0))
-    motions = (Away("a", 0, 5), Swap("b", "c", 0, 6, 0.0), Away("a", 8, 12, under="b"))
-    world = World(Scene(objects, motions), visible=False)
-    assert Fact("lying", "a") not in world.facts
+def test_an_object_that_is_away_is_parked_far_off_and_returns_to_its_place():
+    """Far off is at x > 5 m, where it does not count as lying on the table."""
+    world = world_with([cube("a", 0.0, -0.1)], Away("a", 0, 5))
 
     rest(world, 5)
-    assert place_in_plane(world, "a")[0] > 5
+    assert place(world, "a")[0] > 5
     assert Fact("lying", "a") not in world.facts
 
     rest(world, 1)
-    assert place_in_plane(world, "a") == pytest.approx((0.0, -0.1), abs=1e-4)
+    assert place(world, "a") == pytest.approx((0.0, -0.1), abs=1e-4)
     assert Fact("lying", "a") in world.facts
 
-    rest(world, 4)
-    assert place_in_plane(world, "a")[0] > 5
 
-    rest(world, 3)
-    # Where b is now, with its own height: they push each other apart afterwards.
-    assert place_in_plane(world, "a") == pytest.approx((0.1, 0.0), abs=0.03)
+def test_an_object_that_was_away_may_return_to_where_another_one_has_gone():
+    """a is put under b, which has changed places with c; then they push each other apart."""
+    objects = [cube("a", 0.0, -0.1), cube("b", 0.0, 0.1), cube("c", 0.1, 0.0)]
+    swap = Swap("b", "c", 0, 6, 0.0)
+    world = world_with(objects, swap, Away("a", 8, 12, under="b"))
+
+    rest(world, 13)
+
+    assert place(world, "a") == pytest.approx((0.1, 0.0), abs=0.03)
 
 
 PRESSED = Fact("pressed", "button")
 TO_AND_FRO = Shuttle("s", Point(0, -0.3, 0.01), Point(0, 0.3, 0.01), 60, 5, PRESSED)
+"""From y = -0.3 m to 0.3 m in 60 steps, and back; five passes, until the button is pressed."""
 
 
-def test_a_shuttle_runs_to_and_fro():
-    """From y = -0.3 to 0.3 in 60 steps, and back; five passes, so it ends at 0.3."""
-    places = [shuttle_position(TO_AND_FRO, step) for step in range(121)]
+@pytest.mark.parametrize(
+    ("step", "y"),
+    [(0, -0.3), (30, 0.0), (60, 0.3), (90, 0.0), (120, -0.3), (300, 0.3), (1000, 0.3)],
+)
+def test_a_shuttle_runs_to_and_fro_and_stays_where_its_last_pass_ends(step, y):
+    assert shuttle_position(TO_AND_FRO, step).y == pytest.approx(y)
 
-    assert places[0] == places[120] == TO_AND_FRO.begin
-    assert places[30].y == pytest.approx(0.0)
-    assert places[60] == TO_AND_FRO.end
-    assert places[90].y == pytest.approx(0.0)
-    assert shuttle_position(TO_AND_FRO, 300) == shuttle_position(TO_AND_FRO, 1000) == TO_AND_FRO.end
-    # Peak speed, from the facts: 0.0150 m a step for 60 steps a pass.
-    assert places[31].y - places[30].y == pytest.approx(0.015, 1e-2)
+
+def test_a_shuttle_is_fastest_in_the_middle_of_its_way():
+    """RoboMME's goes by 0.0150 m a step there, for 60 steps a pass."""
+    y = [shuttle_position(TO_AND_FRO, step).y for step in (30, 31)]
+
+    assert y[1] - y[0] == pytest.approx(0.015, rel=1e-2)
 
 
 def shuttle_world():
     """A world with a shuttle that a button stops, and a target in the middle of its way."""
-    objects = (
-        SceneObject("button", "button", Point(-0.06, 0.0, 0.0075)),
-        SceneObject("target", "target", Point(0.0, 0.0, 0.01), radius=0.036, thickness=0.01),
-        SceneObject("s", "shuttle", TO_AND_FRO.begin, rgb=(0.2, 0.7, 0.4)),
-    )
-    return World(Scene(objects, (TO_AND_FRO,)), visible=False)
+    button = SceneObject("button", "button", Point(-0.06, 0.0, 0.0075))
+    target = SceneObject("target", "target", Point(0.0, 0.0, 0.01), radius=0.036, thickness=0.01)
+    shuttle = SceneObject("s", "shuttle", TO_AND_FRO.begin, rgb=(0.2, 0.7, 0.4))
+    return world_with([button, target, shuttle], TO_AND_FRO)
+
+
+def test_a_world_shows_a_shuttle_s_position_one_step_late():
+    world = shuttle_world()
+
+    rest(world, 20)
+
+    expected = shuttle_position(TO_AND_FRO, 19).y
+    assert world.bodies["s"].position.y == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_shuttle_counts_as_near_from_three_steps_before_the_target_s_middle():
-    """It is at the middle of its way, and of the target, 30 steps after its start."""
+    """The world shows it at the middle of its way, and of the target, at step 31."""
     world = shuttle_world()
     near = []
+
     for step in range(1, 34):
         if Fact("near", "s", "target") in world.step(physics_settings.HOME_ACTION):
             near.append(step)
-        # The step that ends at t shows position t - 1.
-        expected = shuttle_position(TO_AND_FRO, world.elapsed - 1).y
-        assert world.bodies["s"].position.y == pytest.approx(expected, abs=1e-6)
 
-    assert near == [*range(27, 34)]
+    assert near == [27, 28, 29, 30, 31, 32, 33]
 
 
 def test_a_pressed_button_stops_a_shuttle_for_good():
     """At step 33 the shuttle is over its target; the button goes down by 12 mm, and up again."""
-    world = shuttle_world()
+    world = rest(shuttle_world(), 33)
     stopped = Fact("stopped", "s", "target")
-    rest(world, 33)
     button = world.bodies["button"].button
     (joint,) = button.active_joints
 
     button.set_qpos(np.array([-0.012]))
     joint.set_drive_target(-0.012)
-    world.step(physics_settings.HOME_ACTION)
+    rest(world, 1)
     assert PRESSED in world.facts
     assert stopped not in world.facts
     rest(world, 1)
@@ -159,58 +175,46 @@ def test_a_pressed_button_stops_a_shuttle_for_good():
     joint.set_drive_target(0.0)
     rest(world, 30)
     assert PRESSED not in world.facts
-    assert world.bodies["s"].position == where
     assert stopped in world.facts
+    assert world.bodies["s"].position == where
 
 
-def test_a_light_glows_while_something_is_over_its_target_and_lingers():
-    """It lingers for 20 steps; a light that is off is parked at x > 5 m."""
-    over = Fact("over", "a", "target")
-    objects = (
-        cube("a", 0.0, 0.0, z=0.1),
-        SceneObject("target", "target", Point(0.0, 0.0, 0.005), radius=0.04),
-        SceneObject("light", "marker", Point(0.0, 0.0, -0.005), radius=0.0401),
-    )
-    world = World(Scene(objects, (Glow("light", over, 20),)), visible=False)
-    light = world.bodies["light"]
-    falling = world.bodies["a"]
-    rest(world, 1)
+def world_with_a_light():
+    """A cube in the air falls onto a target, whose light lingers for 20 steps after it has left."""
+    falling = cube("a", 0.0, 0.0, z=0.1)
+    target = SceneObject("target", "target", Point(0.0, 0.0, 0.005), radius=0.04)
+    light = SceneObject("light", "marker", Point(0.0, 0.0, -0.005), radius=0.0401)
+    return world_with([falling, target, light], Glow("light", Fact("over", "a", "target"), 20))
 
-    assert over in world.facts
 
-    rest(world, 1)
-    assert light.position == pytest.approx(light.item.position)
+def test_a_light_is_in_its_place_a_step_after_something_was_over_its_target():
+    world = rest(world_with_a_light(), 2)
 
-    falling.put(Point(0.2, 0.2, 0.02))
-    rest(world, 1)
-    assert over not in world.facts
+    assert world.bodies["light"].position == pytest.approx((0.0, 0.0, -0.005))
 
-    rest(world, 20)
-    assert light.position == pytest.approx(light.item.position)
+
+def test_a_light_lingers_and_is_then_parked_far_off():
+    """Far off is at x > 5 m. The cube is put 0.28 m away from the target."""
+    world = rest(world_with_a_light(), 2)
+    world.bodies["a"].put(Point(0.2, 0.2, 0.02))
+
+    rest(world, 21)
+    assert world.bodies["light"].position == pytest.approx((0.0, 0.0, -0.005))
 
     rest(world, 1)
-    assert light.position.x > 5
+    assert world.bodies["light"].position.x > 5
 
 
 def test_a_cube_that_falls_into_the_bin_is_gone_and_stays_counted():
-    """What has vanished is parked at x > 5 m, 10 m high."""
+    """What has vanished is parked at x > 5 m, 10 m high. It falls in within 20 steps."""
     binned = Fact("binned", "a", "bin")
-    objects = (
-        SceneObject("bin", "bin", Point(0.1, 0.0, 0.025), yaw=0.2),
-        cube("a", 0.1, 0.0, z=0.15),
-        cube("b", 0.1, 0.2),
-    )
-    world = World(Scene(objects, (Vanish("a", binned),)), visible=False)
-    steps = 0
-    while binned not in world.facts:
-        rest(world, 1)
-        steps += 1
-        assert steps < 20
+    tray = SceneObject("bin", "bin", Point(0.1, 0.0, 0.025), yaw=0.2)
+    world = world_with([tray, cube("a", 0.1, 0.0, z=0.15)], Vanish("a", binned))
 
-    assert world.bodies["a"].position.x > 5
+    rest(world, 30)
 
-    rest(world, 10)
+    x, _, z = world.bodies["a"].position
+    assert x > 5
+    assert z == pytest.approx(10.0, abs=0.02)
     assert binned in world.facts
     assert Fact("lying", "a") not in world.facts
-    assert Fact("lying", "b") in world.facts
-    assert world.bodies["a"].position.z == pytest.approx(10.0, abs=0.02)

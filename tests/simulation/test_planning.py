@@ -22,7 +22,6 @@ from roboirg.simulation.expert.trajectory_timing import (
 )
 from roboirg.simulation.physics_settings import CONTROL_PERIOD, HOME
 from roboirg.simulation.world import World
-from roboirg.tasks.shared.unmask import APPEAR_STEP
 from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
@@ -35,88 +34,109 @@ def planner():
     return MotionPlanner(World(get_episode("PickXtimes", "test", 0).scene, visible=False).robot)
 
 
-def random_goals(count):
+def pose_facing_down(x, y, z, yaw=0.0):
+    """Return the tool's pose at a point, m, with the fingers down and turned, radians."""
+    return ToolPose(np.array([x, y, z], float), DOWN * Rotation.from_rotvec([0, 0, yaw]))
+
+
+def angle_between(pose, other):
+    return (pose.rotation.inv() * other.rotation).magnitude()
+
+
+def random_poses(count):
+    """Return poses all over the workspace."""
     rng = np.random.default_rng(1)
-    for _ in range(count):
-        position = rng.uniform([-0.3, -0.25, 0.0], [0.15, 0.25, 0.3])
-        yield pose_with_yaw(position, rng.uniform(-0.8, 0.8))
-
-
-def pose_with_yaw(position: np.ndarray, angle: float) -> ToolPose:
-    return ToolPose(position, DOWN * Rotation.from_rotvec([0, 0, angle]))
+    low = [-0.3, -0.25, 0.0, -0.8]
+    high = [0.15, 0.25, 0.3, 0.8]
+    return [pose_facing_down(*rng.uniform(low, high)) for _ in range(count)]
 
 
 def test_forward_kinematics_of_home_is_where_the_simulator_has_the_tool(planner):
     """Position of the tool in meters, at the arm's resting position."""
-    assert planner.forward_kinematics(HOME).position == pytest.approx(
-        [-0.0605, 0.0, 0.5211], abs=1e-4
-    )
+    home = planner.forward_kinematics(HOME)
+
+    assert home.position == pytest.approx([-0.0605, 0.0, 0.5211], abs=1e-4)
 
 
-def test_planned_moves_are_straight_and_keep_the_limits_of_speed_and_acceleration(planner):
-    """They end at the goal, and planning again gives the same path."""
-    for goal in random_goals(12):
+def test_a_planned_path_leads_from_the_start_to_the_goal(planner):
+    for goal in random_poses(12):
         path = planner.plan_straight(HOME, goal)
-        assert path[0] == pytest.approx(HOME, abs=1e-9)
+
         end = planner.forward_kinematics(path[-1])
+        assert path[0] == pytest.approx(HOME, abs=1e-9)
         assert end.position == pytest.approx(goal.position, abs=1e-5)
-        assert (end.rotation.inv() * goal.rotation).magnitude() < 1e-5
-        start = planner.forward_kinematics(path[0]).position
-        along = (goal.position - start) / np.linalg.norm(goal.position - start)
-        for arm in path:
-            offset = planner.forward_kinematics(arm).position - start
-            assert np.linalg.norm(offset - along * (offset @ along)) < 1e-3
+        assert angle_between(end, goal) < 1e-5
+
+
+def test_a_planned_path_is_straight_within_a_millimeter(planner):
+    start = planner.forward_kinematics(HOME).position
+    for goal in random_poses(12):
+        direction = (goal.position - start) / np.linalg.norm(goal.position - start)
+
+        for joints in planner.plan_straight(HOME, goal):
+            offset = planner.forward_kinematics(joints).position - start
+            sideways = offset - direction * (offset @ direction)
+            assert np.linalg.norm(sideways) < 1e-3
+
+
+def test_a_planned_path_keeps_the_limits_of_speed_and_acceleration(planner):
+    """Its samples are up to a fraction of a step closer in time than the control period."""
+    for goal in random_poses(12):
+        path = planner.plan_straight(HOME, goal)
+
         speed = np.diff(path, axis=0) / CONTROL_PERIOD
-        # Samples are up to a fraction of a step closer in time than the control period.
-        slack = len(path) / (len(path) - 1) * 1.02
-        assert np.abs(speed).max() <= JOINT_SPEED_LIMIT * slack
         acceleration = np.diff(speed, axis=0) / CONTROL_PERIOD
-        assert np.abs(acceleration).max() <= JOINT_ACCELERATION_LIMIT * slack**2 * 1.05
-    assert np.array_equal(planner.plan_straight(HOME, goal), path)
+        slack = 1.02 * len(path) / (len(path) - 1)
+        assert np.abs(speed).max() <= slack * JOINT_SPEED_LIMIT
+        assert np.abs(acceleration).max() <= 1.05 * slack**2 * JOINT_ACCELERATION_LIMIT
 
 
 def test_inverse_kinematics_finds_joint_positions_within_their_limits(planner):
-    """From random positions, with one joint pushed against its limit."""
+    """From random positions, with one joint far beyond its limit."""
     rng = np.random.default_rng(2)
     for _ in range(15):
         begin = rng.uniform(JOINT_LOW, JOINT_HIGH)
-        begin[rng.integers(7)] = 9.0  # pushed against a limit
+        begin[rng.integers(7)] = 9.0
         goal = planner.forward_kinematics(rng.uniform(JOINT_LOW, JOINT_HIGH))
-        arm = planner.inverse_kinematics(begin, goal)
-        found = planner.forward_kinematics(arm)
-        assert np.abs(found.position - goal.position).max() < 2e-3
-        assert (found.rotation.inv() * goal.rotation).magnitude() < 2e-3
-        assert ((arm > JOINT_LOW - 1e-4) & (arm < JOINT_HIGH + 1e-4)).all()
-        assert np.array_equal(planner.inverse_kinematics(begin, goal), arm)
+
+        joints = planner.inverse_kinematics(begin, goal)
+
+        reached = planner.forward_kinematics(joints)
+        assert reached.position == pytest.approx(goal.position, abs=2e-3)
+        assert angle_between(reached, goal) < 2e-3
+        assert (joints > JOINT_LOW - 1e-4).all()
+        assert (joints < JOINT_HIGH + 1e-4).all()
 
 
 def test_poses_one_centimeter_apart_need_small_joint_movements(planner):
-    for goal in random_goals(10):
-        arm = planner.plan_straight(HOME, goal)[-1]
+    for goal in random_poses(10):
+        joints = planner.plan_straight(HOME, goal)[-1]
         near = ToolPose(goal.position + np.array([0.01, -0.01, 0.01]), goal.rotation)
-        assert np.abs(planner.inverse_kinematics(arm, near) - arm).max() < 0.2
+
+        moved = planner.inverse_kinematics(joints, near)
+
+        assert moved == pytest.approx(joints, abs=0.2)
 
 
+@pytest.mark.parametrize("method", ["inverse_kinematics", "plan_move"])
 @pytest.mark.parametrize("position", [(1.5, 0, 0.3), (1e308, -1e308, 0)])
-def test_an_unreachable_pose_is_a_planning_error_even_with_huge_numbers(planner, position):
-    goal = ToolPose(np.array(position, dtype=float), DOWN)
-    for plan in (planner.inverse_kinematics, planner.plan_move):
-        with pytest.raises(MotionPlanningError):
-            plan(HOME, goal)
+def test_an_unreachable_pose_is_a_planning_error_even_with_huge_numbers(planner, method, position):
+    with pytest.raises(MotionPlanningError):
+        getattr(planner, method)(HOME, pose_facing_down(*position))
 
 
 def test_a_pose_that_no_straight_line_reaches_is_reached_by_way_of_home(planner):
-    """Home is the arm's resting position."""
-    place = np.array([-0.1, 0.0, 0.2])
-    twisted = planner.plan_straight(HOME, pose_with_yaw(place, -2.8))[-1]
-    # The short way round would turn the last joint beyond its limit.
-    goal = pose_with_yaw(place, 1.6)
+    """Home is the arm's resting position. The short way turns the last joint beyond its limit."""
+    twisted = planner.plan_straight(HOME, pose_facing_down(-0.1, 0.0, 0.2, yaw=-2.8))[-1]
+    goal = pose_facing_down(-0.1, 0.0, 0.2, yaw=1.6)
     with pytest.raises(MotionPlanningError, match="joint limit"):
         planner.plan_straight(twisted, goal)
 
     path = planner.plan_move(twisted, goal)
+
+    end = planner.forward_kinematics(path[-1])
     assert np.abs(path - HOME).max(axis=1).min() < 1e-6
-    assert planner.forward_kinematics(path[-1]).position == pytest.approx(goal.position, abs=1e-5)
+    assert end.position == pytest.approx([-0.1, 0.0, 0.2], abs=1e-5)
 
 
 def test_a_move_to_where_one_is_takes_no_time():
@@ -137,74 +157,91 @@ def test_every_short_move_has_a_timing(exponent, direction):
     assert path[-1] == pytest.approx(HOME + way, abs=1e-6)
 
 
-@pytest.mark.parametrize("tilt", [0.0, 1e-4])
-def test_a_goal_at_the_current_pose_does_not_lead_by_way_of_home(planner, tilt):
-    start = planner.plan_straight(HOME, ToolPose(np.array([-0.1, 0.0, 0.2]), DOWN))[-1]
+@pytest.mark.parametrize("distance_m", [0.0, 1e-4])
+def test_a_goal_at_the_current_pose_does_not_lead_by_way_of_home(planner, distance_m):
+    start = planner.plan_straight(HOME, pose_facing_down(-0.1, 0.0, 0.2))[-1]
     place = planner.forward_kinematics(start)
 
-    goal = ToolPose(place.position + tilt, place.rotation)
+    path = planner.plan_move(start, ToolPose(place.position + distance_m, place.rotation))
 
-    assert len(planner.plan_move(start, goal)) <= 2
+    assert len(path) <= 2
 
 
 @pytest.mark.parametrize(
-    ("travel", "low", "high"),
+    ("goal", "fewest", "most"),
     [
-        ((0, 0, -0.10), 20, 26),
-        ((0, 0, -0.15), 20, 27),
-        ((0, 0.10, 0), 16, 22),
-        ((0, 0.2, 0), 22, 30),
+        ((-0.1, 0.0, 0.10), 20, 26),
+        ((-0.1, 0.0, 0.05), 20, 27),
+        ((-0.1, 0.1, 0.20), 16, 22),
+        ((-0.1, 0.2, 0.20), 22, 30),
     ],
+    ids=["down 10 cm", "down 15 cm", "aside 10 cm", "aside 20 cm"],
 )
-def test_free_moves_take_as_long_as_robomme_s(planner, travel, low, high):
-    """`travel` is in meters, `low` and `high` are numbers of control steps."""
-    start = planner.plan_straight(HOME, ToolPose(np.array([-0.1, 0.0, 0.2]), DOWN))[-1]
-    goal = ToolPose(np.array([-0.1, 0.0, 0.2]) + travel, DOWN)
-    assert low <= len(planner.plan_straight(start, goal)) <= high
+def test_free_moves_take_as_many_control_steps_as_robomme_s(planner, goal, fewest, most):
+    start = planner.plan_straight(HOME, pose_facing_down(-0.1, 0.0, 0.2))[-1]
+
+    path = planner.plan_straight(start, pose_facing_down(*goal))
+
+    assert fewest <= len(path) <= most
 
 
 @pytest.mark.parametrize(
-    ("task", "primitive", "low", "high"),
+    ("task", "primitive", "fewest", "most"),
     [("PickXtimes", "pick_cube", 89, 157), ("VideoUnmask", "pick_container", 77, 134)],
 )
-def test_first_picks_take_as_long_as_robomme_s(task, primitive, low, high):
-    for index in range(3):
-        episode = get_episode(task, "test", index)
-        world = World(episode.scene, visible=False)
-        stage = next(stage for stage in episode.stages if stage.primitive.kind == primitive)
-        rest(world, APPEAR_STEP + 8)  # containers have to be there and at rest
-        begun = world.elapsed
-        execute(world, stage.primitive)
-        assert low <= world.elapsed - begun <= high
-        assert stage.expects in world.facts
+@pytest.mark.parametrize("index", range(3))
+def test_first_picks_take_as_many_control_steps_as_robomme_s(task, index, primitive, fewest, most):
+    """After 40 steps containers are there and at rest."""
+    episode = get_episode(task, "test", index)
+    stage = next(stage for stage in episode.stages if stage.primitive.kind == primitive)
+    world = rest(World(episode.scene, visible=False), 40)
+
+    execute(world, stage.primitive)
+
+    assert fewest <= world.elapsed - 40 <= most
+    assert stage.expects in world.facts
 
 
-def is_picked_up(*objects: SceneObject) -> bool:
-    """Whether the expert picks up the first of several objects."""
+def is_picked_up(*objects):
+    """Return whether the expert picks up the first of several objects on a table."""
     world = World(Scene(objects), visible=False)
     execute(world, Primitive("pick_cube", objects[0].name))
     return Fact("picked", objects[0].name) in world.facts
 
 
-def cube(name: str, x: float, y: float, yaw: float = 0.0) -> SceneObject:
+def cube(name, x, y, yaw=0.0):
     return SceneObject(name, "cube", Point(x, y, CUBE_HALF), yaw, "red")
 
 
 def test_a_cube_at_the_edge_of_the_workspace_is_gripped_short_of_its_middle(planner):
-    """Its middle is out of reach, but the near edge is not; 2 cm farther away, that is, too."""
-    place = np.array([0.171, -0.159, CUBE_HALF])
+    """Its middle, 20 mm above the table, is out of reach, but its near edge is not."""
     with pytest.raises(MotionPlanningError, match="cannot reach"):
-        planner.plan_move(HOME, ToolPose(place, DOWN))
-    assert is_picked_up(cube("far", *place[:2], yaw=2.22))
+        planner.plan_move(HOME, pose_facing_down(0.171, -0.159, 0.02))
+
+    assert is_picked_up(cube("far", 0.171, -0.159, yaw=2.22))
+
+
+def test_a_cube_beyond_the_workspace_is_a_planning_error():
     with pytest.raises(MotionPlanningError, match="cannot reach"):
-        is_picked_up(cube("too_far", place[0] + 0.02, place[1]))
+        is_picked_up(cube("too_far", 0.191, -0.159))
 
 
-def test_a_cube_between_close_neighbors_is_picked_with_half_open_fingers(monkeypatch):
-    """Four cubes stand 7 cm around it; with open fingers the pick fails."""
-    around = [(0.07, 0.0), (-0.07, 0.0), (0.0, 0.07), (0.0, -0.07)]
-    cubes = [cube(f"cube_{number}", -0.05 + x, 0.1 + y) for number, (x, y) in enumerate(around)]
-    assert is_picked_up(cube("middle", -0.05, 0.1), *cubes)
+FIVE_CUBES = (
+    cube("middle", -0.05, 0.10),
+    cube("behind", 0.02, 0.10),
+    cube("before", -0.12, 0.10),
+    cube("left", -0.05, 0.17),
+    cube("right", -0.05, 0.03),
+)
+"""One in the middle of four others, which are 7 cm away."""
 
+
+def test_a_cube_between_close_neighbors_is_picked():
+    assert is_picked_up(*FIVE_CUBES)
+
+
+def test_open_fingers_would_not_fit_between_close_neighbors(monkeypatch):
+    """So the fingers of the picks among neighbors are half open, which is called narrow."""
     monkeypatch.setattr(primitives, "NARROW", primitives.OPEN)
-    assert not is_picked_up(cube("middle", -0.05, 0.1), *cubes)
+
+    assert not is_picked_up(*FIVE_CUBES)

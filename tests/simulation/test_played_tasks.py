@@ -23,33 +23,9 @@ pytestmark = pytest.mark.sim
 TASKS = tuple(every_task())
 PICTURES = Path(__file__).parent / "pictures"
 
-# Another version of the driver may move a pixel at an edge or change it by a level.
-FAR_OFF_LEVELS = 24
-FAR_OFF_SHARE = 0.01
-
+FRONT = ("front",)
 END = -1
-PICTURE_STEPS = {
-    ("PickXtimes", 2): {1: "start", 95: "middle", END: "end"},
-    ("StopCube", 3): {END: "stopped"},
-    ("SwingXtimes", 3): {END: "glowing"},
-    ("BinFill", 3): {160: "filling"},
-    ("VideoUnmaskSwap", 3): {90: "swapping"},
-    ("VideoUnmask", 3): {20: "start", 160: "middle", END: "end"},
-    ("ButtonUnmaskSwap", 3): {140: "swapping"},
-    ("ButtonUnmask", 3): {END: "lifted"},
-    ("VideoRepick", 2): {236: "swapping"},
-    ("VideoPlaceButton", 3): {END: "placed"},
-    ("VideoPlaceOrder", 3): {END: "placed"},
-    ("PutInBox", 0): {1: "start", END: "inside"},
-    ("PickByCount", 1): {1: "start", END: "done"},
-}
-"""Elapsed steps of the oracle's run; the last is the step of success, whichever it is."""
-BOTH_CAMERAS = {"PickXtimes", "VideoUnmask", "PutInBox", "PickByCount"}
-"""For the other tasks only the front picture is stored; the wrist's shows no other objects."""
-REPEATED = {"PickXtimes", "VideoUnmask", "PutInBox"}
-
-HIDDEN_KINDS = {"hidden_cube", "site", "marker"}
-"""What the front camera need not see, because a container, nothing or a light shows it."""
+"""The step of success, whichever it is."""
 
 
 def unused_scene(task, difficulty):
@@ -58,7 +34,10 @@ def unused_scene(task, difficulty):
 
 
 def oracle_s_play(task, index, shoot=None):
-    """Rewards, events and a hash of every action and joint position of the oracle's play."""
+    """Play an episode with the oracle, which succeeds.
+
+    Returns its rewards, its events, and a hash of every action and joint position.
+    """
     env = roboirg.make(task, episode=index, cameras=())
     env.set_frame_hook(shoot)
     digest = hashlib.sha256()
@@ -76,11 +55,39 @@ def oracle_s_play(task, index, shoot=None):
     return rewards, env.events, digest.hexdigest()
 
 
-@pytest.mark.parametrize(("task", "index"), PICTURE_STEPS)
-def test_the_oracle_succeeds_and_its_pictures_equal_the_stored_ones(task, index):
-    """The stored pictures were looked at by people; 1 % of the pixels may differ."""
-    moments = PICTURE_STEPS[task, index]
-    cameras = CAMERAS if task in BOTH_CAMERAS else ("front",)
+def share_of_other_pixels(picture, name):
+    """Return the share of the pixels that differ from a stored picture by more than 24 of 255.
+
+    Another version of the driver may move a pixel at an edge or change it by a level.
+    """
+    stored = cv2.cvtColor(cv2.imread(str(PICTURES / name)), cv2.COLOR_BGR2RGB)
+    apart = np.abs(picture.astype(int) - stored.astype(int)).max(axis=2)
+    return (apart > 24).mean()
+
+
+@pytest.mark.parametrize(
+    ("task", "index", "moments", "cameras"),
+    [
+        ("PickXtimes", 2, {1: "start", 95: "middle", END: "end"}, CAMERAS),
+        ("StopCube", 3, {END: "stopped"}, FRONT),
+        ("SwingXtimes", 3, {END: "glowing"}, FRONT),
+        ("BinFill", 3, {160: "filling"}, FRONT),
+        ("VideoUnmaskSwap", 3, {90: "swapping"}, FRONT),
+        ("VideoUnmask", 3, {20: "start", 160: "middle", END: "end"}, CAMERAS),
+        ("ButtonUnmaskSwap", 3, {140: "swapping"}, FRONT),
+        ("ButtonUnmask", 3, {END: "lifted"}, FRONT),
+        ("VideoRepick", 2, {236: "swapping"}, FRONT),
+        ("VideoPlaceButton", 3, {END: "placed"}, FRONT),
+        ("VideoPlaceOrder", 3, {END: "placed"}, FRONT),
+        ("PutInBox", 0, {1: "start", END: "inside"}, CAMERAS),
+        ("PickByCount", 1, {1: "start", END: "done"}, CAMERAS),
+    ],
+)
+def test_the_oracle_succeeds_and_its_pictures_equal_the_stored_ones(task, index, moments, cameras):
+    """The stored pictures were looked at by people; 1 % of the pixels may differ.
+
+    `moments` are control steps of the oracle's play, with a name for each.
+    """
     taken = {}
 
     def shoot(env, _demonstration):
@@ -89,47 +96,65 @@ def test_the_oracle_succeeds_and_its_pictures_equal_the_stored_ones(task, index)
             for camera in cameras:
                 taken[f"{task}_{moments[elapsed]}_{camera}.png"] = env.picture(camera)
 
-    first = oracle_s_play(task, index, shoot)
+    rewards, _, _ = oracle_s_play(task, index, shoot)
 
-    rewards = first[0]
     assert sum(rewards) == rewards[-1] == 1.0
     assert len(taken) == len(moments) * len(cameras)
     for name, picture in taken.items():
-        known = cv2.cvtColor(cv2.imread(str(PICTURES / name)), cv2.COLOR_BGR2RGB).astype(int)
-        off = np.abs(picture.astype(int) - known).max(axis=2) > FAR_OFF_LEVELS
-        assert off.mean() < FAR_OFF_SHARE, f"{name} differs"
-    if task in REPEATED:  # to the bit, also without pictures
-        assert oracle_s_play(task, index) == first
+        assert share_of_other_pixels(picture, name) < 0.01, name
+
+
+@pytest.mark.parametrize(("task", "index"), [("PickXtimes", 2), ("PutInBox", 0)])
+def test_a_play_repeats_itself_to_the_bit_also_while_pictures_are_drawn(task, index):
+    def shoot(env, _demonstration):
+        if env.session.world.elapsed % 50 == 0:
+            env.picture("front")
+
+    assert oracle_s_play(task, index, shoot) == oracle_s_play(task, index)
+
+
+def names_moved_by(motions):
+    """Return the names of all objects that scripted motions move or hold."""
+    names = set()
+    for motion in motions:
+        if isinstance(motion, Swap):
+            names |= {motion.first, motion.second, *motion.pinned}
+        else:
+            names.add(motion.subject)
+    return names
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_nothing_falls_or_drifts_while_the_robot_rests(task):
-    for difficulty in ("easy", "hard"):
-        episode = unused_scene(task, difficulty)
-        world = rest(World(episode.scene, visible=False), 60)
-        moved = set()
-        for motion in episode.scene.motions:
-            swaps = isinstance(motion, Swap)
-            moved |= {motion.first, motion.second, *motion.pinned} if swaps else {motion.subject}
-        for name, body in world.bodies.items():
-            if name not in moved and body.item.kind != "hidden_cube":
-                assert np.allclose(body.position, body.item.position, atol=2e-3), (episode, name)
+    """By more than 2 mm in 60 steps; a hidden cube may be pushed by its container."""
+    scene = unused_scene(task, "hard").scene
+    moved = names_moved_by(scene.motions)
+
+    world = rest(World(scene, visible=False), 60)
+
+    for item in scene.objects:
+        if item.name not in moved and item.kind != "hidden_cube":
+            position = world.bodies[item.name].position
+            assert position == pytest.approx(item.position, abs=2e-3), item.name
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_the_front_camera_sees_every_object_that_is_there(task):
-    """At least 20 pixels of each, after 34 steps; what appears later is left out."""
-    episode = unused_scene(task, "easy")
-    world = rest(World(episode.scene), 34)
+    """At least 20 pixels of each after 34 steps.
+
+    What appears later is left out, and what a container, nothing or a light shows.
+    """
+    scene = unused_scene(task, "easy").scene
     late = set()
-    for motion in episode.scene.motions:
+    for motion in scene.motions:
         if isinstance(motion, Glow) or (isinstance(motion, Away) and motion.end > 33):
             late.add(motion.subject)
+    world = rest(World(scene), 34)
 
     pixels = Counter(world.cameras.segmentation("front").ravel().tolist())
 
     for name, body in world.bodies.items():
-        if body.item.kind in HIDDEN_KINDS or name in late:
+        if body.item.kind in {"hidden_cube", "site", "marker"} or name in late:
             continue
         entity = body.entity if body.button is None else body.button.links[1].entity
-        assert pixels[entity.per_scene_id] >= 20, (episode.key, name)
+        assert pixels[entity.per_scene_id] >= 20, name

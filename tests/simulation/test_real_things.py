@@ -1,4 +1,7 @@
-"""Boxes and rolls of tape in the simulator: sizes, masses, holes, and what comes of using them."""
+"""Boxes and rolls of tape in the simulator: sizes, masses, holes, and what comes of using them.
+
+A roll of tape is 35 mm high and 55 mm wide, with a hole of 30 mm; a box is 130 mm wide.
+"""
 
 import itertools
 
@@ -7,50 +10,48 @@ import pytest
 from moved_worlds import execute, rest
 
 import roboirg
-from roboirg.core import object_sizes
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Primitive, Scene, SceneObject
 from roboirg.core.motions import Point
 from roboirg.policies import make_policy, play
-from roboirg.simulation import physics_settings
 from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.simulation.world import World
 from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
 
-TAPE_ROLL = SceneObject("tape", "tape", Point(0.0, 0.0, object_sizes.TAPE_HALF), 0.0, "yellow")
-GREEN_BOX = SceneObject(
-    "box_green", "box", Point(0.0, 0.0, object_sizes.BOX_HEIGHT / 2), 0.2, "green"
-)
-HALF_OPEN = -0.1
-"""A gripper action at which each finger is 0.0125 from the middle: one fits into the hole."""
+TAPE_ROLL = SceneObject("tape", "tape", Point(0.0, 0.0, 0.0175), 0.0, "yellow")
+GREEN_BOX = SceneObject("box_green", "box", Point(0.0, 0.0, 0.02), 0.2, "green")
+
+
+def world_with_tape():
+    """Return a world without cameras in which a roll of tape lies in the middle of the table."""
+    return World(Scene((TAPE_ROLL,)), visible=False)
 
 
 def step_through(world, pieces, gripper=None):
+    """Execute pieces of a motion, perhaps with another gripper action: -1 closes, 1 opens."""
     for action in itertools.chain.from_iterable(pieces):
         if gripper is not None:
             action[-1] = gripper
         world.step(action)
 
 
-def world_after_drop(x, y, height, box=GREEN_BOX):
-    """The world after a tape has fallen from a height and come to rest."""
-    tape = SceneObject("tape", "tape", Point(x, y, height), 0.7, "yellow")
-    return rest(World(Scene((box, tape)), visible=False), 40)
+def world_after_drop(x, y, z):
+    """Return a world with a box, after a tape has fallen from a point, m, and come to rest."""
+    tape = SceneObject("tape", "tape", Point(x, y, z), 0.7, "yellow")
+    return rest(World(Scene((GREEN_BOX, tape)), visible=False), 40)
 
 
-def test_a_roll_of_tape_weighs_50_to_100_grams_and_lies_still():
-    world = rest(World(Scene((TAPE_ROLL,)), visible=False), 40)
-    body = world.bodies["tape"]
+def test_a_roll_of_tape_weighs_50_to_100_grams():
+    tape = world_with_tape().bodies["tape"]
 
-    assert 0.05 <= body.physics.mass <= 0.1
-    assert body.position == pytest.approx(TAPE_ROLL.position, abs=1e-4)
-    assert Fact("lying", "tape") in world.facts
+    assert 0.05 <= tape.physics.mass <= 0.1
 
 
 def test_a_roll_of_tape_can_be_gripped_around_its_outside():
-    world = World(Scene((TAPE_ROLL,)), visible=False)
+    world = world_with_tape()
+
     execute(world, Primitive("pick_cube", "tape"))
 
     assert Fact("picked", "tape") in world.facts
@@ -58,91 +59,91 @@ def test_a_roll_of_tape_can_be_gripped_around_its_outside():
 
 
 def test_a_roll_of_tape_can_be_gripped_by_its_wall():
-    """A finger fits into the hole; the wall is what is held then."""
-    world = World(Scene((TAPE_ROLL,)), visible=False)
+    """The wall is 12.5 mm thick, with its middle 21.25 mm from the axis.
+
+    At a gripper action of -0.1 each finger is 12.5 mm from the middle: one fits into the hole.
+    """
+    world = world_with_tape()
     expert = MotionPrimitives(world)
-    rotation = expert._rotation()  # closes along y
-    middle = (object_sizes.TAPE_RADIUS + object_sizes.TAPE_HOLE_RADIUS) / 2
-    above, at = (Point(0.0, middle, z) for z in (0.15, object_sizes.TAPE_HALF))
-    step_through(world, [expert._move(above, rotation)], HALF_OPEN)
-    step_through(world, [expert._grip(physics_settings.OPEN)], HALF_OPEN)
-    step_through(world, [expert._move(at, rotation)], HALF_OPEN)
+    closes_along_y = expert._rotation()
+    above = expert._move(Point(0.0, 0.02125, 0.15), closes_along_y)
+    step_through(world, [above, expert._grip(1.0)], gripper=-0.1)
+    step_through(world, [expert._move(Point(0.0, 0.02125, 0.0175), closes_along_y)], gripper=-0.1)
+    assert world.bodies["tape"].position == pytest.approx((0.0, 0.0, 0.0175), abs=2e-3)
 
-    assert world.bodies["tape"].position == pytest.approx(TAPE_ROLL.position, abs=2e-3)
+    step_through(world, [expert._grip(-1.0)])
+    assert world.robot.finger_positions.sum() == pytest.approx(0.0125, abs=3e-3)
 
-    step_through(world, [expert._grip(physics_settings.CLOSED)])
-    wall = object_sizes.TAPE_RADIUS - object_sizes.TAPE_HOLE_RADIUS
-    assert world.robot.finger_positions.sum() == pytest.approx(wall, abs=3e-3)
-
-    step_through(world, [expert._move(above, rotation)])
+    step_through(world, [expert._move(Point(0.0, 0.02125, 0.15), closes_along_y)])
     assert Fact("picked", "tape") in world.facts
 
 
 @pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (-0.02, 0.03)])
 def test_tape_that_falls_between_the_walls_of_a_box_is_in_the_box(x, y):
-    """(x, y) is from where it falls, relative to the middle of the box, in meters."""
-    world = world_after_drop(x, y, 0.12)
-    # One that has touched a wall may stand on its edge.
-    low, high = (
-        object_sizes.BOX_FLOOR + size for size in (object_sizes.TAPE_HALF, object_sizes.TAPE_RADIUS)
-    )
+    """From 12 cm above the table. The box's floor is 2 mm high, and one that has touched a wall
+    may stand on its edge, so the tape's center may be 19.5 to 29.5 mm high."""
+    world = world_after_drop(x, y, z=0.12)
 
-    assert low - 1e-3 <= world.bodies["tape"].position.z <= high + 1e-3
+    assert 0.0185 <= world.bodies["tape"].position.z <= 0.0305
     assert Fact("binned", "tape", "box_green") in world.facts
-    assert world.bodies["box_green"].position == pytest.approx(GREEN_BOX.position)
+
+
+def test_a_box_is_not_moved_by_what_falls_into_it():
+    world = world_after_drop(-0.02, 0.03, z=0.12)
+
+    assert world.bodies["box_green"].position == pytest.approx((0.0, 0.0, 0.02))
 
 
 def test_tape_next_to_a_box_is_not_in_it():
-    world = world_after_drop(0.0, 0.11, 0.02)
+    world = world_after_drop(0.0, 0.11, z=0.02)
+
     assert Fact("lying", "tape") in world.facts
     assert Fact("binned", "tape", "box_green") not in world.facts
 
 
 def test_tape_held_over_a_box_is_not_in_it_until_it_is_dropped():
     """The first two pieces of the motion carry it over the box."""
-    episode = get_episode("PutInBox", "test", 0)
-    world = World(episode.scene, visible=False)
+    world = World(get_episode("PutInBox", "test", 0).scene, visible=False)
     expert = MotionPrimitives(world)
-    box = f"box_{episode.goal.text('color')}"
+    in_box = Fact("binned", "tape", "box_green")
     step_through(world, expert.execute(Primitive("pick_cube", "tape")))
-    into = expert.execute(Primitive("put_into", "tape", box))
-    inside = Fact("binned", "tape", box)
-    step_through(world, itertools.islice(into, 2))
+    pieces = expert.execute(Primitive("put_into", "tape", "box_green"))
 
-    assert inside not in world.facts
+    step_through(world, itertools.islice(pieces, 2))
+    assert in_box not in world.facts
 
-    step_through(world, into)
-    assert inside in world.facts
+    step_through(world, pieces)
+    assert in_box in world.facts
 
 
 def test_putting_tape_into_a_box_makes_no_other_contact_with_the_box():
-    episode = get_episode("PutInBox", "train", 11)  # where 0.06 would be too high
-    env = roboirg.make(episode, cameras=())
+    """In this episode the hand would touch the box if the tape were let go 6 cm high."""
+    env = roboirg.make("PutInBox", split="train", episode=11, cameras=())
     touched = set()
 
-    def look(env, _demonstration):
-        world = env.session.world
-        for contact in world._physics.get_contacts():
+    def note_contacts_with_boxes(env, _demonstration):
+        for contact in env.session.world._physics.get_contacts():
             names = {body.entity.name for body in contact.bodies}
-            forces = [np.linalg.norm(point.impulse) for point in contact.points]
-            if any(forces) and any(name.startswith("box") for name in names):
+            has_force = any(np.any(point.impulse) for point in contact.points)
+            if has_force and any(name.startswith("box") for name in names):
                 touched.update(names)
 
-    env.set_frame_hook(look)
+    env.set_frame_hook(note_contacts_with_boxes)
 
     assert play(env, make_policy("oracle", 0))["status"] == "success"
-    assert touched <= {"tape", f"box_{episode.goal.text('color')}"}
+    assert touched <= {"tape", f"box_{env.episode.goal.text('color')}"}
 
 
 def test_the_front_camera_sees_the_target_through_the_hole_of_a_roll_of_tape():
+    """In the middle column of the tape's pixels, between its first and its last one."""
     disc = SceneObject("target", "target", Point(0.0, 0.0, 0.005), radius=0.05)
     world = rest(World(Scene((disc, TAPE_ROLL))), 2)
+    tape = world.bodies["tape"].entity.per_scene_id
+    target = world.bodies["target"].entity.per_scene_id
 
     seen = world.cameras.segmentation("front")
 
-    tape, target = (world.bodies[name].entity.per_scene_id for name in ("tape", "target"))
-    rows, columns = np.nonzero(seen == tape)
-    inside = seen[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
-    middle = inside[:, inside.shape[1] // 2]
-    first, *_, last = np.flatnonzero(middle == tape)
-    assert target in middle[first:last]
+    _, columns = np.nonzero(seen == tape)
+    column = seen[:, (columns.min() + columns.max()) // 2]
+    first, *_, last = np.flatnonzero(column == tape)
+    assert target in column[first:last]

@@ -17,7 +17,7 @@ from roboirg.core.observations import CAMERAS
 from roboirg.policies import make_policy, play
 from roboirg.simulation import bodies, physics_settings
 from roboirg.simulation.cameras import Cameras
-from roboirg.simulation.panda import BASE_LINK, CAMERA_LINK, FINGERS, Panda
+from roboirg.simulation.panda import Panda
 from roboirg.simulation.rendering import shaders
 from roboirg.simulation.rendering.render_device import render_system
 from roboirg.simulation.rendering.render_settings import FAITHFUL, LIGHT, STOCK, RenderSettings
@@ -25,16 +25,6 @@ from roboirg.simulation.scenery import add_scenery
 from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
-
-CULLING_ALONE = RenderSettings(slim_shader=False, meshes="stock")
-
-FRAMES = 12
-"""Of a run."""
-
-FAITHFUL_SHARE = 1e-5
-NOTICEABLE_LEVELS = 8
-NOTICEABLE_SHARE = 0.01
-MEAN_LEVELS = 0.5
 
 
 class DrawnScene:
@@ -65,25 +55,23 @@ class DrawnScene:
 
 
 def some_evenly_spaced(taken):
-    """Return some moments, evenly spaced."""
-    return [taken[number] for number in np.linspace(0, len(taken) - 1, FRAMES).astype(int)]
+    """Return twelve moments, evenly spaced."""
+    return [taken[number] for number in np.linspace(0, len(taken) - 1, 12).astype(int)]
 
 
 @functools.cache
 def states_of_oracle_s_run(task, index):
-    """Return moments of an oracle's run."""
+    """Return the moments of an oracle's run: joints, poses of bodies, and depths of buttons."""
     taken = []
 
     def note(env, _demonstration):
         world = env.session.world
-        bodies = world.bodies.values()
-        taken.append(
-            (
-                world.robot.articulation.get_qpos().copy(),
-                [body.entity.pose for body in bodies],
-                [None if it.button is None else it.button.get_qpos().copy() for it in bodies],
-            )
-        )
+        poses = []
+        presses = []
+        for body in world.bodies.values():
+            poses.append(body.entity.pose)
+            presses.append(None if body.button is None else body.button.get_qpos().copy())
+        taken.append((world.robot.articulation.get_qpos().copy(), poses, presses))
 
     env = roboirg.make(task, episode=index, cameras=())
     env.set_frame_hook(note)
@@ -91,65 +79,97 @@ def states_of_oracle_s_run(task, index):
     return taken
 
 
-class Differences:
-    """Sums over all pictures."""
+@functools.cache
+def differences_from_stock(rendering):
+    """Draw a dozen moments in some way, and with SAPIEN's own shader and meshes.
 
-    def __init__(self):
-        self.pixels = self.changed = self.noticeable = self.segments = 0
-        self.levels = 0.0
-
-    def add(self, ours, stock):
-        apart = np.abs(ours[0] - stock[0])
-        self.pixels += apart[..., 0].size
-        self.changed += int((apart.max(axis=-1) > 0).sum())
-        self.noticeable += int((apart.max(axis=-1) > NOTICEABLE_LEVELS).sum())
-        self.levels += float(apart.mean(axis=-1).sum())
-        self.segments += int((ours[1] != stock[1]).sum())
+    Returns how far apart colors are, of 256 levels, (24, 256, 256, 3), and which pixels of the
+    segmentations are others, (24, 256, 256).
+    """
+    scene = get_episode("VideoPlaceButton", "test", 2).scene
+    ours = DrawnScene(scene, rendering)
+    stock = DrawnScene(scene, STOCK)
+    apart = []
+    others = []
+    for moment in some_evenly_spaced(states_of_oracle_s_run("VideoPlaceButton", 2)):
+        pictures, segments = ours.show(moment)
+        stock_pictures, stock_segments = stock.show(moment)
+        apart.append(np.abs(pictures - stock_pictures))
+        others.append(segments != stock_segments)
+    return np.concatenate(apart), np.concatenate(others)
 
 
 @pytest.mark.slow
-def test_fast_drawing_gives_the_pictures_of_sapien_s_own_shader_and_meshes():
-    """*Faithful* may differ in a hundred-thousandth of the pixels; *light* has simpler meshes,
-    and may differ visibly in 1 %. Leaving out what is out of sight changes nothing."""
+def test_leaving_out_what_is_out_of_sight_changes_no_pixel():
+    culling_alone = RenderSettings(slim_shader=False, meshes="stock")
+
+    apart, others = differences_from_stock(culling_alone)
+
+    assert not apart.any()
+    assert not others.any()
+
+
+@pytest.mark.slow
+def test_faithful_drawing_differs_from_sapien_s_in_a_hundred_thousandth_of_the_pixels():
+    apart, others = differences_from_stock(FAITHFUL)
+
+    assert apart.any(axis=-1).mean() <= 1e-5
+    assert others.mean() <= 1e-5
+
+
+@pytest.mark.slow
+def test_light_drawing_differs_from_sapien_s_visibly_in_a_hundredth_of_the_pixels():
+    """That is by more than 8 levels of 256. It has simpler meshes; the mean is half a level."""
+    apart, _ = differences_from_stock(LIGHT)
+
+    assert 0 < apart.mean() <= 0.5
+    assert (apart.max(axis=-1) > 8).mean() <= 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rendering", [FAITHFUL, LIGHT], ids=["faithful", "light"])
+def test_each_way_of_drawing_gives_the_same_pixels_without_culling(rendering):
+    """Culling leaves out what is out of sight."""
     scene = get_episode("VideoPlaceButton", "test", 2).scene
-    differences = {rendering: Differences() for rendering in (CULLING_ALONE, FAITHFUL, LIGHT)}
-    uncut = {rendering: replace(rendering, culling=False) for rendering in (FAITHFUL, LIGHT)}
-    renderings = (STOCK, *differences, *uncut.values())
-    stages = {rendering: DrawnScene(scene, rendering) for rendering in renderings}
+    culled = DrawnScene(scene, rendering)
+    whole = DrawnScene(scene, replace(rendering, culling=False))
 
     for moment in some_evenly_spaced(states_of_oracle_s_run("VideoPlaceButton", 2)):
-        shown = {rendering: stage.show(moment) for rendering, stage in stages.items()}
-        for rendering, found in differences.items():
-            found.add(shown[rendering], shown[STOCK])
-        for rendering, whole in uncut.items():
-            for picture, wanted in zip(shown[rendering], shown[whole], strict=True):
-                assert np.array_equal(picture, wanted)
-
-    culled = differences[CULLING_ALONE]
-    assert culled.changed == culled.segments == 0
-    faithful = differences[FAITHFUL]
-    assert faithful.changed <= FAITHFUL_SHARE * faithful.pixels
-    assert faithful.segments <= FAITHFUL_SHARE * faithful.pixels
-    light = differences[LIGHT]
-    assert light.changed > 0
-    assert light.noticeable <= NOTICEABLE_SHARE * light.pixels
-    assert light.levels <= MEAN_LEVELS * light.pixels
+        check_same(culled.show(moment), whole.show(moment))
 
 
-def test_parts_of_the_robot_that_a_camera_cannot_see_are_not_drawn(takes):
+def check_same(shown, expected):
+    """Assert that pictures and segmentations are equal."""
+    for ours, wanted in zip(shown, expected, strict=True):
+        assert np.array_equal(ours, wanted)
+
+
+@pytest.fixture
+def links_drawn(takes):
+    """The links of the robot that each camera draws in an episode, by their names."""
     stage = DrawnScene(get_episode("PickXtimes", "test", 2).scene, FAITHFUL)
     for moment in some_evenly_spaced(states_of_oracle_s_run("PickXtimes", 2)):
         stage.show(moment)
-
     links = {camera: {} for camera in CAMERAS}
     for camera, drawn in takes:
         for body in drawn:
             if body in stage.robot.cullable_bodies:
                 links[camera][body.entity.name] = body
-    assert {BASE_LINK, *FINGERS} <= set(links["wrist"])
-    assert not {"panda_hand", CAMERA_LINK} & set(links["wrist"])
-    seen_by_wrist = triangle_count(links["wrist"][BASE_LINK])
-    assert triangle_count(links["front"][BASE_LINK]) < 0.2 * seen_by_wrist
+    return links
+
+
+def test_the_wrist_camera_draws_the_fingers_and_the_base_but_not_its_own_hand(links_drawn):
+    drawn = links_drawn["wrist"].keys()
+
+    assert {"panda_link0", "panda_leftfinger", "panda_rightfinger"} <= drawn
+    assert not {"panda_hand", "camera_link"} & drawn
+
+
+def test_the_front_camera_draws_less_than_a_fifth_of_the_base(links_drawn):
+    front = triangle_count(links_drawn["front"]["panda_link0"])
+    wrist = triangle_count(links_drawn["wrist"]["panda_link0"])
+
+    assert front < 0.2 * wrist
 
 
 def triangle_count(body):
@@ -161,43 +181,51 @@ def triangle_count(body):
 
 
 def test_a_camera_draws_again_only_when_something_in_its_view_has_moved(takes):
-    """Twenty steps in which the arm, which carries the
-    wrist camera, moves far from the front view."""
+    """In 20 steps the cubes rest, and the arm, which carries the wrist camera, is far away."""
+    ours = DrawnScene(get_episode("PickXtimes", "test", 2).scene, FAITHFUL)
+
+    for moment in states_of_oracle_s_run("PickXtimes", 2)[10:30]:
+        ours.show(moment)
+
+    drawn = [camera for camera, _ in takes]
+    assert drawn.count("front") == 1
+    assert drawn.count("wrist") > 18
+
+
+def test_pictures_that_are_not_drawn_again_equal_those_that_are():
     scene = get_episode("PickXtimes", "test", 2).scene
     ours = DrawnScene(scene, FAITHFUL)
     always = DrawnScene(scene, RenderSettings(culling=False))
-    some = states_of_oracle_s_run("PickXtimes", 2)[10:30]
 
-    for moment in some:
-        for mine, wanted in zip(ours.show(moment), always.show(moment), strict=True):
-            assert np.array_equal(mine, wanted)
-
-    # The cubes have come to rest, and the arm, which carries the other camera, is still far away.
-    drawn = [camera for camera, _ in takes]
-    assert drawn.count("front") == 1
-    assert drawn.count("wrist") > 0.9 * len(some)
+    for moment in states_of_oracle_s_run("PickXtimes", 2)[10:30]:
+        check_same(ours.show(moment), always.show(moment))
 
 
 def test_a_sapien_version_with_another_shader_is_refused(monkeypatch):
     monkeypatch.setattr(shaders, "_STOCK_SHA256", "of another version")
+
     with pytest.raises(InvalidValueError, match=r"install sapien==3\.0\.3 again"):
         shaders.slim_shader.__wrapped__()
 
 
 def test_a_damaged_shader_in_the_cache_is_rewritten(monkeypatch, tmp_path):
     monkeypatch.setenv("ROBOIRG_CACHE", str(tmp_path))
-    folder = Path(shaders.slim_shader.__wrapped__())
-    assert folder.is_relative_to(tmp_path)
+    vertices = Path(shaders.slim_shader.__wrapped__(), "gbuffer.vert")
+    text = vertices.read_text()
+    vertices.write_text(text[:100])
+    vertices.with_name("gbuffer.frag").unlink()
 
-    text = (folder / "gbuffer.vert").read_text()
-    (folder / "gbuffer.vert").write_text(text[:100])
-    (folder / "gbuffer.frag").unlink()
-    assert shaders.slim_shader.__wrapped__() == str(folder)
+    folder = Path(shaders.slim_shader.__wrapped__())
+
+    assert folder.is_relative_to(tmp_path)
     assert (folder / "gbuffer.vert").read_text() == text
     assert (folder / "gbuffer.frag").is_file()
 
-    monkeypatch.setenv("ROBOIRG_CACHE", "off")
-    passing = Path(shaders.slim_shader.__wrapped__())
-    assert (passing / "gbuffer.vert").read_text() == text
 
-    shutil.rmtree(passing.parent)
+def test_without_a_cache_the_shader_is_in_a_temporary_folder(monkeypatch):
+    monkeypatch.setenv("ROBOIRG_CACHE", "off")
+
+    folder = Path(shaders.slim_shader.__wrapped__())
+
+    assert (folder / "gbuffer.vert").is_file()
+    shutil.rmtree(folder.parent)

@@ -1,45 +1,62 @@
 """Triangles that share corners are the same triangles."""
 
+import itertools
+
 import numpy as np
 
 from roboirg.simulation.rendering.triangles import Triangles, duplicate_vertices, index_triangles
 
 
-def triangles_of_hills():
-    """Triangles over a grid of points with uneven heights."""
-    ticks = np.arange(6.0)
-    x, y = np.meshgrid(ticks, ticks, indexing="ij")
-    heights = np.random.default_rng(0).random(x.shape).round(1)
-    points = np.stack([x, y, heights], axis=-1).astype(np.float32)
-    halves = [(points[:-1, :-1], points[1:, :-1], points[:-1, 1:])]
-    halves += [(points[1:, :-1], points[1:, 1:], points[:-1, 1:])]
-    corners = np.concatenate([np.stack(half, axis=2).reshape(-1, 3, 3) for half in halves])
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return Triangles(corners, normals)
+def octahedron():
+    """Eight faces with six corners, on the axes at ±1, and a normal of its own for each face."""
+    corners = []
+    normals = []
+    for x, y, z in itertools.product((-1, 1), repeat=3):
+        corners.append([(x, 0, 0), (0, y, 0), (0, 0, z)])
+        normals.append((x, y, z))
+    return Triangles(np.float32(corners), np.float32(normals) / np.sqrt(3))
 
 
-def test_sharing_corners_keeps_each_triangle_and_its_normal():
-    """A mesh lists three corners for each triangle, or shared corners and their numbers."""
-    corners, normals = triangles_of_hills()
-    shared = index_triangles(triangles_of_hills())
+def test_an_octahedron_needs_as_many_vertices_as_it_has_normals():
+    """Not 24, three for each of its eight faces; a mesh has a list of vertices that faces share."""
+    shared = index_triangles(octahedron())
 
-    assert np.array_equal(shared.normals[shared.triangles[:, 0]], normals)
-    for given, kept in zip(corners, shared.vertices[shared.triangles], strict=True):
-        assert any(np.array_equal(np.roll(given, turn, axis=0), kept) for turn in range(3))
-    assert len(shared.vertices) < 0.5 * 3 * len(corners)
+    assert len(shared.vertices) == 8
 
 
-def test_triangles_with_shared_corners_can_get_their_own_again():
-    shared = index_triangles(triangles_of_hills())
+def test_two_triangles_of_a_square_share_two_vertices():
+    low = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+    high = [(1, 0, 0), (1, 1, 0), (0, 1, 0)]
+    square = Triangles(np.float32([low, high]), np.float32([(0, 0, 1), (0, 0, 1)]))
+
+    shared = index_triangles(square)
+
+    assert len(shared.vertices) == 4
+
+
+def test_sharing_vertices_keeps_each_triangle_and_its_normal():
+    """A triangle may begin at another of its corners than before."""
+    shared = index_triangles(octahedron()).to_triangles()
+
+    assert np.array_equal(shared.normals, octahedron().normals)
+    for kept, corners in zip(shared.corners, octahedron().corners, strict=True):
+        turned = [np.roll(corners, turn, axis=0).tolist() for turn in range(3)]
+        assert kept.tolist() in turned
+
+
+def test_triangles_with_shared_vertices_can_get_their_own_again():
+    shared = index_triangles(octahedron())
+
     own = duplicate_vertices(shared)
 
-    assert len(own.vertices) == 3 * len(own.triangles)
+    assert len(own.vertices) == 24
     assert np.array_equal(own.to_triangles().corners, shared.to_triangles().corners)
-    assert np.array_equal(own.to_triangles().normals, triangles_of_hills().normals)
+    assert np.array_equal(own.to_triangles().normals, octahedron().normals)
 
 
-def test_a_mesh_without_triangles_needs_no_special_case():
+def test_a_mesh_without_triangles_stays_one():
     nothing = Triangles(np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.float32))
+
     shared = index_triangles(nothing)
 
     assert [len(field) for field in shared] == [0, 0, 0]

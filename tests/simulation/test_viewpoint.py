@@ -3,95 +3,95 @@
 import numpy as np
 import pytest
 import sapien
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from roboirg.core.observations import PICTURE_SIZE
-from roboirg.simulation.rendering.viewpoint import (
-    FOCAL_LENGTH,
-    FRONT_EYE,
-    FRONT_TARGET,
-    reach_pixels,
-    to_front_camera,
-)
-
-GRID = 256
-"""Subpixel grid to which renderers round corners."""
-WINDOW = 12
-"""Half width of the tested area at the picture's center, pixels."""
+from roboirg.simulation.rendering.viewpoint import reach_pixels, to_front_camera
 
 
 def covered(corners, shift):
-    """Return for each triangle whether it covers the center of a pixel of the window.
+    """Return for each triangle whether it covers a pixel's center near the middle of the picture.
 
-    `shift` displaces its corners, pixels.
+    As renderers do it that round corners to 256 places in a pixel.
+
+    Args:
+        corners: (n, 3, 3), m: three points of each triangle, in front of the camera.
+        shift: pixels by which corners are displaced.
     """
-    places = FOCAL_LENGTH * corners[..., :2] / corners[..., 2:] + PICTURE_SIZE / 2
-    places = np.round((places + shift) * GRID) / GRID
-    ticks = np.arange(PICTURE_SIZE // 2 - WINDOW, PICTURE_SIZE // 2 + WINDOW) + 0.5
-    x, y = np.meshgrid(ticks, ticks)
-    (ax, ay), (bx, by) = (
-        np.moveaxis(corner, -1, 0)[..., None, None]
-        for corner in (places, np.roll(places, -1, axis=1))
-    )
-    areas = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+    places = 128 * corners[..., :2] / corners[..., 2:] + 128
+    places = np.round((places + shift) * 256) / 256
+    centers = np.arange(116, 140) + 0.5
+    x, y = np.meshgrid(centers, centers)
+    begin_x, begin_y = np.moveaxis(places, -1, 0)[..., None, None]
+    end_x, end_y = np.moveaxis(np.roll(places, -1, axis=1), -1, 0)[..., None, None]
+    areas = (end_x - begin_x) * (y - begin_y) - (end_y - begin_y) * (x - begin_x)
     inside = (areas <= 0).all(axis=1) | (areas >= 0).all(axis=1)
     return (inside & (areas.sum(axis=1) != 0)).any(axis=(1, 2))
 
 
-@st.composite
-def random_triangles(draw):
-    """Triangles (n, 3, 3) in the window, from specks to ones that fill it; some have no area."""
-    random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    count = draw(st.integers(1, 60))
-    size = 10.0 ** random.uniform(-2, 1, (count, 1, 1))
-    middle = random.uniform(-WINDOW, WINDOW, (count, 1, 2))
-    pixels = np.clip(middle + size * random.standard_normal((count, 3, 2)), -WINDOW, WINDOW)
-    for corners in pixels:
-        if random.random() < 0.2:
-            corners[2] = corners[0] + random.choice([0.0, 0.5, 1.0]) * (corners[1] - corners[0])
-    depths = 1 + random.uniform(0, 0.3, (count, 1)) + random.uniform(0, 0.02, (count, 3))
-    return np.concatenate([pixels / FOCAL_LENGTH * depths[..., None], depths[..., None]], axis=2)
+def random_triangles(random):
+    """Return 60 triangles (60, 3, 3), m, in the middle of the picture: specks and large ones."""
+    size = 10.0 ** random.uniform(-2, 1, (60, 1, 1))
+    middle = random.uniform(-12, 12, (60, 1, 2))
+    pixels = np.clip(middle + size * random.standard_normal((60, 3, 2)), -12, 12)
+    depth = 1 + random.uniform(0, 0.3, (60, 3, 1))
+    return np.concatenate([pixels / 128 * depth, depth], axis=2)
 
 
-@settings(max_examples=40)
-@given(random_triangles(), st.integers(0, 99))
-def test_no_triangle_that_covers_a_pixel_is_left_out(corners, seed):
+def test_no_triangle_that_covers_a_pixel_is_left_out():
     """Compares with a renderer that tries every triangle, with corners shifted by rounding."""
-    shown = reach_pixels(corners)
-    random = np.random.default_rng(seed)
-    for size in (0.0, 0.01, 0.01, 0.01):
-        assert shown[covered(corners, random.uniform(-size, size, (*corners.shape[:2], 2)))].all()
+    random = np.random.default_rng(0)
+    for _ in range(40):
+        corners = random_triangles(random)
+        shift = random.uniform(-0.01, 0.01, (60, 3, 2))
+
+        shown = reach_pixels(corners)
+
+        assert shown[covered(corners, 0.0)].all()
+        assert shown[covered(corners, shift)].all()
 
 
 def square_across_the_view(depth, half, center=(0.0, 0.0)):
-    """Two triangles across the view, `half` pixels from the center to the sides."""
+    """Return two triangles (2, 3, 3), m: a square, `half` pixels from its center to its sides."""
     ends = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=float) * half + center
-    points = np.column_stack([ends / FOCAL_LENGTH, np.ones(4)]) * depth
+    points = np.column_stack([ends / 128, np.ones(4)]) * depth
     return points[[(0, 2, 1), (0, 3, 2)]]
 
 
-def test_a_square_between_pixel_centers_is_left_out():
-    """Half its width is 0.4 pixels, so it covers a
-    center only where it is moved by half a pixel."""
-    assert not reach_pixels(square_across_the_view(1.0, 0.4)).any()
-    assert reach_pixels(square_across_the_view(1.0, 0.4, center=(0.5, 0.5))).all()
-    assert reach_pixels(square_across_the_view(1.0, 0.49)).all(), (
-        "it may be rounded to where it is shown"
-    )
+@pytest.mark.parametrize(
+    ("half", "center", "kept"),
+    [
+        (0.4, (0.0, 0.0), False),
+        (0.4, (0.5, 0.5), True),
+        (0.49, (0.0, 0.0), True),
+        (8.0, (256.0, 0.0), False),
+    ],
+    ids=["between centers", "over a center", "within rounding of centers", "beside the picture"],
+)
+def test_a_square_is_kept_if_it_may_cover_the_center_of_a_pixel(half, center, kept):
+    """In pixels from the middle of the picture, where four pixels meet: centers are 0.5 away."""
+    square = square_across_the_view(1.0, half, center)
+
+    assert reach_pixels(square).tolist() == [kept, kept]
 
 
-def test_a_square_outside_the_picture_is_left_out_and_one_behind_the_eye_is_kept():
-    beside = square_across_the_view(1.0, 8, center=(PICTURE_SIZE, 0))
-    behind = square_across_the_view(1.0, 8) * [1, 1, -1]
-    assert reach_pixels(np.concatenate([beside, behind])).tolist() == [False] * 2 + [True] * 2
+def test_a_square_behind_the_eye_is_kept():
+    """Its projection means nothing."""
+    behind = square_across_the_view(1.0, 8.0) * [1, 1, -1]
+
+    assert reach_pixels(behind).tolist() == [True, True]
 
 
 def test_the_front_camera_s_matrix_puts_its_target_straight_ahead():
+    """The camera is at (0.3, 0, 0.4) and looks at (0, 0, -0.2), 0.6708 m away."""
     matrix = to_front_camera(sapien.Pose())
-    far = np.linalg.norm(np.subtract(FRONT_TARGET, FRONT_EYE))
 
-    assert matrix @ [*FRONT_TARGET, 1] == pytest.approx([0, 0, far, 1], abs=1e-6)
-    # The camera looks back at the robot: the world's y is to its right, up is against its y.
-    assert matrix[0, 1] == pytest.approx(1, abs=1e-6)
-    assert matrix[1, 2] < 0
+    assert matrix @ [0.0, 0.0, -0.2, 1.0] == pytest.approx([0.0, 0.0, 0.6708, 1.0], abs=1e-4)
+
+
+def test_the_front_camera_has_the_world_s_y_to_its_right_and_up_against_its_y():
+    """It looks back at the robot."""
+    matrix = to_front_camera(sapien.Pose())
+
+    right = matrix[:3, :3] @ [0, 1, 0]
+    up = matrix[:3, :3] @ [0, 0, 1]
+    assert right == pytest.approx([1, 0, 0], abs=1e-6)
+    assert up[1] < 0

@@ -6,9 +6,7 @@ from moved_worlds import rest
 
 from roboirg.core import waiting
 from roboirg.core.conditions import Fact
-from roboirg.core.episode import Scene
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.motions import Away
 from roboirg.simulation import physics_settings
 from roboirg.simulation.world import World
 from roboirg.tasks import every_task
@@ -19,112 +17,139 @@ pytestmark = pytest.mark.sim
 TASKS = tuple(every_task())
 
 
-def world_of(task: str, index: int = 3, *, visible: bool = False) -> World:
+def world_of(task, index=3, *, visible=False):
     episode = get_episode(task, "test", index)
     return World(episode.scene, visible=visible)
 
 
 def test_physics_and_drawing_report_when_they_begin_and_end(monkeypatch):
-    """A driver may hang in them; a listener gets (code, time of begin, or 0 at the end)."""
-    calls: list[tuple[str, float]] = []
+    """A driver may hang in them; a listener gets (code, time of begin, or 0 at the end).
+
+    A picture is begun in the background, and then fetched, so drawing is reported twice.
+    """
+    calls = []
     world = world_of("PickXtimes", visible=True)
     monkeypatch.setattr(waiting, "_native_listeners", [lambda *call: calls.append(call)])
 
     rest(world, 1).picture("front")
 
-    # A picture is begun in the background, and then fetched.
     assert [(code, since > 0.0) for code, since in calls] == [
-        *[("physics", True), ("physics", False)],
-        *[("drawing", True), ("drawing", False)] * 2,
+        ("physics", True),
+        ("physics", False),
+        ("drawing", True),
+        ("drawing", False),
+        ("drawing", True),
+        ("drawing", False),
     ]
 
 
-def test_cubes_and_buttons_rest_where_and_weigh_what_robomme_s_do():
-    """Heights in meters, masses in kilograms."""
+@pytest.mark.parametrize(("name", "kilograms"), [("cube_red", 0.064), ("button", 0.0427)])
+def test_cubes_and_buttons_weigh_what_robomme_s_do(name, kilograms):
+    body = world_of("PickXtimes").bodies[name]
+
+    assert body.physics.mass == pytest.approx(kilograms, abs=1e-4)
+
+
+def test_cubes_and_buttons_rest_where_robomme_s_do():
+    """A cube's center is 20 mm above the table, and a button is pressed by its weight by 0.5 mm."""
     world = rest(world_of("PickXtimes"), 40)
-    cube = world.bodies["cube_red"]
-    button = world.bodies["button"]
-    assert cube.position.z == pytest.approx(0.02, abs=1e-5)
-    assert cube.physics.mass == pytest.approx(0.064)
-    assert button.physics.mass == pytest.approx(0.0427, abs=1e-4)
-    assert button.pressed_depth == pytest.approx(0.0005, abs=5e-5)
 
-    cubes = {Fact("lying", f"cube_{color}") for color in ("red", "green", "blue")}
-    assert world.facts == {Fact("still", "robot"), Fact("home", "robot"), *cubes}
+    assert world.bodies["cube_red"].position.z == pytest.approx(0.02, abs=1e-5)
+    assert world.bodies["button"].pressed_depth == pytest.approx(0.0005, abs=5e-5)
 
 
-def test_containers_appear_over_their_cubes_after_32_steps():
-    """Until then they are parked 10 m high."""
-    world = world_of("VideoUnmask")
-    rest(world, 32)
-    assert all(
-        body.position.z > 5 for body in world.bodies.values() if body.item.kind == "container"
-    )
-    # Where they are parked is not a lift.
+def test_in_a_world_at_rest_the_robot_is_still_and_at_home_and_cubes_lie():
+    world = rest(world_of("PickXtimes"), 40)
+
+    assert world.facts == {
+        Fact("still", "robot"),
+        Fact("home", "robot"),
+        Fact("lying", "cube_red"),
+        Fact("lying", "cube_green"),
+        Fact("lying", "cube_blue"),
+    }
+
+
+def test_containers_are_parked_high_up_for_32_steps_and_do_not_count_as_lifted():
+    world = rest(world_of("VideoUnmask"), 32)
+
+    for name in ("container_0", "container_1", "container_2"):
+        assert world.bodies[name].position.z > 5, name
     assert world.facts == {Fact("still", "robot"), Fact("home", "robot")}
 
-    rest(world, 33)
-    for body in world.bodies.values():
-        if body.item.kind == "container":
-            assert body.position[:2] == pytest.approx(body.item.position[:2], abs=1e-3)
-            # Over a cube a container rests on it, 1.3 mm high.
-            empty = world_scene(world).hidden_in(body.item.name) is None
-            assert body.position.z == pytest.approx(0.0520 if empty else 0.0533, abs=1e-4)
-            assert body.physics.mass == pytest.approx(0.1311, abs=1e-4)
 
+def test_containers_appear_at_their_places_after_32_steps():
+    """At rest an empty one's center is 52.0 mm high; over a cube it is 1.3 mm higher."""
+    episode = get_episode("VideoUnmask", "test", 3)
+    world = rest(World(episode.scene, visible=False), 65)
 
-def world_scene(world: World) -> Scene:
-    return Scene(tuple(body.item for body in world.bodies.values()))
+    for item in episode.scene.of_kind("container"):
+        body = world.bodies[item.name]
+        height_m = 0.0520 if episode.scene.hidden_in(item.name) is None else 0.0533
+        assert body.position[:2] == pytest.approx(item.position[:2], abs=1e-3)
+        assert body.position.z == pytest.approx(height_m, abs=1e-4)
+        assert body.physics.mass == pytest.approx(0.1311, abs=1e-4)
 
 
 def test_a_container_that_has_appeared_falls_when_it_is_let_go():
-    """`Away` keeps it parked at first, and must leave it to physics afterward."""
-    episode = get_episode("VideoUnmask", "test", 0)
-    moved = World(episode.scene, visible=False)
-    rest(moved, 40)
-    assert all(isinstance(motion, Away) for motion in episode.scene.motions)
+    """Its motion keeps it parked for 32 steps, and must leave it to physics afterward."""
+    world = rest(world_of("VideoUnmask"), 40)
+    container = world.bodies["container_0"]
+    container.put(container.position._replace(z=0.3))
 
-    body = moved.bodies["container_0"]
-    body.put(body.item.position._replace(z=0.3))
-    rest(moved, 2)
-    assert body.position.z < 0.3
+    rest(world, 2)
+
+    assert container.position.z < 0.3
+
+
+def states_of(task, actions):
+    """Return the state after each action: joints, facts, and the poses of all bodies."""
+    world = world_of(task)
+    states = []
+    for action in actions:
+        facts = world.step(action)
+        joints = world.robot.articulation.get_qpos().tobytes()
+        poses = []
+        for body in world.bodies.values():
+            poses.append((body.entity.pose.p.tobytes(), body.entity.pose.q.tobytes()))
+        states.append((joints, facts, poses))
+    return states
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_a_world_repeats_itself_bit_for_bit_even_next_to_another_one(task):
-    rng = np.random.default_rng(0)
-    actions = physics_settings.HOME_ACTION + np.append(
-        rng.normal(0, 0.2, (40, 7)), np.zeros((40, 1)), 1
-    )
+    """The other one is alive and has moved."""
+    noise = np.random.default_rng(0).normal(0, 0.2, (40, 8))
+    noise[:, -1] = 0  # the gripper stays open
+    actions = physics_settings.HOME_ACTION + noise
+    first = states_of(task, actions)
+    other = rest(world_of("PickXtimes", index=1), 7)
 
-    def trace():
-        world = world_of(task)
-        states = []
-        for action in actions:
-            facts = world.step(action)
-            poses = [body.entity.pose for body in world.bodies.values()]
-            qpos = world.robot.articulation.get_qpos()
-            states.append((qpos.tobytes(), facts, *((p.p.tobytes(), p.q.tobytes()) for p in poses)))
-        return states
+    assert states_of(task, actions) == first
 
-    first = trace()
-    other = world_of(TASKS[0], index=1)  # another world alive and moving makes no difference
-
-    rest(other, 7)
-
-    assert trace() == first
+    del other
 
 
-def test_the_gripper_opens_and_closes():
+def test_the_gripper_closes_and_opens():
+    """Each finger is 0.04 m from the middle when the gripper is open."""
     world = world_of("PickXtimes")
-    closing = np.append(physics_settings.HOME, -1.0)
     for _ in range(10):
-        world.step(closing)
-    assert world.robot.finger_positions == pytest.approx([0, 0], abs=1e-3)
-    assert Fact("home", "robot") not in world.facts
+        world.step(np.append(physics_settings.HOME, -1.0))
+    closed = world.robot.finger_positions.copy()
 
     rest(world, 10)
+
+    assert closed == pytest.approx([0, 0], abs=1e-3)
     assert world.robot.finger_positions == pytest.approx([0.04, 0.04], abs=1e-3)
+
+
+def test_a_robot_with_a_closed_gripper_is_not_at_home():
+    world = world_of("PickXtimes")
+
+    for _ in range(10):
+        facts = world.step(np.append(physics_settings.HOME, -1.0))
+
+    assert Fact("home", "robot") not in facts
 
 
 def test_the_robot_is_not_still_while_its_arm_moves():
@@ -132,17 +157,19 @@ def test_the_robot_is_not_still_while_its_arm_moves():
     world = world_of("PickXtimes")
     action = physics_settings.HOME_ACTION.copy()
     action[0] += 0.3
-    world.step(action)
 
-    assert Fact("still", "robot") not in world.facts
+    facts = [world.step(action) for _ in range(41)]
 
-    for _ in range(40):
-        world.step(action)
-    assert Fact("still", "robot") in world.facts
+    assert Fact("still", "robot") not in facts[0]
+    assert Fact("still", "robot") in facts[-1]
 
 
-def test_a_world_without_rendering_or_an_unknown_camera_gives_no_picture():
-    with pytest.raises(InvalidValueError, match="without pictures"):
-        world_of("PickXtimes").picture("front")
-    with pytest.raises(InvalidValueError, match="no camera 'side'"):
-        world_of("PickXtimes", visible=True).picture("side")
+@pytest.mark.parametrize(
+    ("visible", "camera", "sentence"),
+    [(False, "front", "without pictures"), (True, "side", "no camera 'side'")],
+)
+def test_a_world_without_rendering_or_an_unknown_camera_gives_no_picture(visible, camera, sentence):
+    world = world_of("PickXtimes", visible=visible)
+
+    with pytest.raises(InvalidValueError, match=sentence):
+        world.picture(camera)

@@ -12,7 +12,7 @@ import pytest
 from drawn_scenes import drawn_scenes
 
 from roboirg.core.conditions import Fact
-from roboirg.core.episode import DIFFICULTIES, Goal
+from roboirg.core.episode import DIFFICULTIES, Goal, Primitive
 from roboirg.core.errors import SceneRejectedError
 from roboirg.tasks.video_place_button import TASK as VIDEO_PLACE_BUTTON
 from roboirg.tasks.video_place_order import TASK as VIDEO_PLACE_ORDER
@@ -37,27 +37,32 @@ def scenes(task, difficulty):
     return [scene for scene, _ in drawn(task, difficulty)]
 
 
-def primitives_of(stages):
-    """Each stage's primitive in short, with its place if it has one."""
-    found = []
-    for stage in stages:
-        kind, subject, place, *_ = stage.primitive
-        found.append((kind, subject) if place is None else (kind, subject, place))
-    return found
-
-
 @every_task
 @every_difficulty
 def test_a_video_shows_the_facts_of_the_past_in_order_and_can_never_fail(task, difficulty):
     """The past of a scene is what the video shows, and what a goal may refer to."""
     for scene in scenes(task, difficulty):
         stages = task.demonstration(scene)
+
+        shown = [stage.expects for stage in stages if stage.expects in scene.past]
+        assert shown == list(scene.past)
         assert not any(stage.forbids for stage in stages)
-        assert [stage.in_video for stage in stages] == [True] * (len(stages) - 1) + [False]
-        assert stages[-1].expects == Fact("home", "robot")
-        expected = iter(stage.expects for stage in stages)
-        assert all(fact in expected for fact in scene.past)
-        for stage in stages:
+
+
+@every_task
+def test_the_last_stage_of_a_video_takes_the_robot_home_and_is_not_shown(task):
+    for scene in scenes(task, "hard"):
+        *shown, last = task.demonstration(scene)
+
+        assert last.expects == Fact("home", "robot")
+        assert not last.in_video
+        assert all(stage.in_video for stage in shown)
+
+
+@every_task
+def test_in_the_stages_of_a_video_in_which_the_robot_is_still_it_is_called_static(task):
+    for scene in scenes(task, "hard"):
+        for stage in task.demonstration(scene):
             if stage.expects.kind == "still":
                 assert stage.lasting == stage.primitive.steps > 0
                 assert stage.subgoal == "static"
@@ -67,20 +72,33 @@ def test_a_video_shows_the_facts_of_the_past_in_order_and_can_never_fail(task, d
 
 
 def test_a_repick_is_a_pick_and_a_put_down_for_each_repetition_then_a_press():
+    """It is put down from 1 cm above the table."""
     scene, _ = drawn(VIDEO_REPICK, "hard")[0]
-    target = scene.past[0].subject
-    stages = VIDEO_REPICK.stages(scene, Goal.of(repeats=2))
-    cycle = [("pick_cube", target), ("put_down", target)]
+    cube = scene.past[0].subject
 
-    assert primitives_of(stages) == [*cycle, *cycle, ("press", "button")]
-    assert [stage.primitive.height for stage in stages[1:4:2]] == [0.01, 0.01]
-    assert [stage.timer for stage in stages] == ["pick", "put down", "pick", "put down", None]
-    assert [stage.subgoal for stage in stages] == [
-        "pick up the correct cube {at} for the first time",
-        "put it down",
-        "pick up the correct cube {at} for the second time",
-        "put it down",
-        "press the button {at} to finish",
+    stages = VIDEO_REPICK.stages(scene, Goal.of(repeats=2))
+
+    assert [stage.primitive for stage in stages] == [
+        Primitive("pick_cube", cube),
+        Primitive("put_down", cube, height=0.01),
+        Primitive("pick_cube", cube),
+        Primitive("put_down", cube, height=0.01),
+        Primitive("press", "button"),
+    ]
+
+
+def test_the_subgoals_and_timers_of_a_repick():
+    """A timer decides when a press is too early."""
+    scene, _ = drawn(VIDEO_REPICK, "hard")[0]
+
+    stages = VIDEO_REPICK.stages(scene, Goal.of(repeats=2))
+
+    assert [(stage.subgoal, stage.timer) for stage in stages] == [
+        ("pick up the correct cube {at} for the first time", "pick"),
+        ("put it down", "put down"),
+        ("pick up the correct cube {at} for the second time", "pick"),
+        ("put it down", "put down"),
+        ("press the button {at} to finish", None),
     ]
 
 
@@ -100,29 +118,42 @@ def test_hard_place_scenes_swap_any_two_of_four_discs_while_the_robot_waits(task
     assert len(pairs) == 12
 
 
-def test_each_goal_of_place_button_moves_a_cube_to_the_disc_before_or_after_the_press():
-    """Three colors, each before or after the press: six goals."""
+def test_place_button_has_a_goal_for_each_color_before_and_after_the_press():
     scene, _ = drawn(VIDEO_PLACE_BUTTON, "hard")[0]
-    goals = VIDEO_PLACE_BUTTON.goals(scene)
-    assert len(goals) == 6
 
-    for goal in goals:
-        cube = f"cube_{goal.text('color')}"
-        answer = {"before": "target_0", "after": "target_1"}[goal.text("relation")]
-        stages = VIDEO_PLACE_BUTTON.stages(scene, goal)
-        assert primitives_of(stages) == [("pick_cube", cube), ("place_on", cube, answer)]
+    goals = VIDEO_PLACE_BUTTON.goals(scene)
+
+    assert {(goal.text("color"), goal.text("relation")) for goal in goals} == {
+        ("red", "before"),
+        ("red", "after"),
+        ("green", "before"),
+        ("green", "after"),
+        ("blue", "before"),
+        ("blue", "after"),
+    }
+
+
+@pytest.mark.parametrize(("relation", "disc"), [("before", "target_0"), ("after", "target_1")])
+def test_place_button_moves_a_cube_to_the_disc_before_or_after_the_press(relation, disc):
+    scene, _ = drawn(VIDEO_PLACE_BUTTON, "hard")[0]
+
+    stages = VIDEO_PLACE_BUTTON.stages(scene, Goal.of(color="red", relation=relation))
+
+    assert [stage.primitive for stage in stages] == [
+        Primitive("pick_cube", "cube_red"),
+        Primitive("place_on", "cube_red", disc),
+    ]
 
 
 @every_place_task
 def test_seeds_without_room_for_all_targets_are_rejected_but_not_too_many(task):
     """About 35 and 75 of 100: few enough for the 30 seeds that an episode may try."""
-
-    def rejected(seed):
+    reasons = []
+    for seed in range(40):
         try:
             task.sample(np.random.default_rng(seed), "medium")
         except SceneRejectedError as error:
-            return str(error).startswith("no place for target_")
-        return False
+            reasons.append(str(error))
 
-    # About 35 and 75 of 100: few enough for the 30 seeds that an episode may try.
-    assert 4 <= sum(map(rejected, range(40))) <= 35
+    assert all(reason.startswith("no place for target_") for reason in reasons)
+    assert 4 <= len(reasons) <= 35

@@ -56,9 +56,7 @@ def published_scenes(task, difficulty):
     found = (
         published_episode(task, split, index) for split in SPLITS for index in range(MOST_EPISODES)
     )
-    return [
-        (drawn.scene, drawn.goal) for drawn in found if drawn and drawn.difficulty == difficulty
-    ]
+    return [(made.scene, made.goal) for made in found if made and made.difficulty == difficulty]
 
 
 @functools.cache
@@ -94,9 +92,8 @@ def quantities(scene, goal):
         found["wanted x"] = wanted.position.x
         found["wanted y"] = wanted.position.y
     for run in scene.motions_of(Shuttle):
-        x, y, z = (end - begin for begin, end in zip(run.begin, run.end, strict=True))
-        found["length of path"] = math.hypot(x, y, z)
-        found["direction"] = math.atan2(x, y)
+        found["length of path"] = math.dist(run.begin, run.end)
+        found["direction"] = math.atan2(run.end.x - run.begin.x, run.end.y - run.begin.y)
         for number, value in enumerate(scene["shuttle"].rgb):
             found[f"rgb {number}"] = value
     return found
@@ -243,16 +240,17 @@ def test_random_scenes_are_distributed_as_published_ones(task, difficulty):
 def test_a_wrong_distance_between_cubes_is_detected_by_the_comparison(monkeypatch):
     """A check of the check: with gaps around whole cubes, the nearest ones stand farther apart."""
     monkeypatch.setattr(fixtures, "cube_obstacle", footprint)
-    draw_anew = our_scenes.__wrapped__
-    assert "nearest cubes" in significant_differences(
-        "BinFill", "hard", draw_anew("BinFill", "hard")
-    )
+    drawn_anew = our_scenes.__wrapped__("BinFill", "hard")
+
+    found = significant_differences("BinFill", "hard", drawn_anew)
+
+    assert "nearest cubes" in found
 
 
 def test_a_number_that_is_never_drawn_is_detected_by_the_comparison():
     """A check of the check: three repetitions are replaced by two."""
-    fewer = [
-        (scene, Goal.of(color=goal["color"], repeats=min(goal["repeats"], 2)))
-        for scene, goal in our_scenes("PickXtimes", "easy")
-    ]
+    fewer = []
+    for scene, goal in our_scenes("PickXtimes", "easy"):
+        fewer.append((scene, Goal.of(color=goal["color"], repeats=min(goal["repeats"], 2))))
+
     assert "repeats 0" in significant_differences("PickXtimes", "easy", fewer)

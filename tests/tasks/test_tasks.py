@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -18,48 +19,6 @@ from roboirg.tasks.shared.fixtures import footprint
 from roboirg.tasks.splits.splits import get_episode, make_episode, split_episodes
 
 TASKS = tuple(every_task())
-HEIGHTS = {
-    "cube": (0.02,),
-    "hidden_cube": (0.02 / 1.2,),
-    "container": (0.052,),
-    "target": (0.005, 0.01),
-    "button": (0.0075,),
-    "bin": (0.025,),
-    "site": (0.005,),
-    "shuttle": (0.01,),
-    "marker": (-0.005,),
-    "box": (0.02,),
-    "tape": (0.0175,),
-}
-"""Of the origin of a thing that lies on the table, meters."""
-
-REGISTERED = [
-    (1, "PickXtimes", "counting", True),
-    (2, "StopCube", "counting", False),
-    (3, "SwingXtimes", "counting", True),
-    (4, "BinFill", "counting", True),
-    (5, "VideoUnmaskSwap", "permanence", True),
-    (6, "VideoUnmask", "permanence", True),
-    (7, "ButtonUnmaskSwap", "permanence", True),
-    (8, "ButtonUnmask", "permanence", True),
-    (9, "VideoRepick", "reference", False),
-    (10, "VideoPlaceButton", "reference", False),
-    (11, "VideoPlaceOrder", "reference", False),
-    (12, "PutInBox", "real", True),
-    (13, "PickByCount", "real", True),
-]
-"""Code, name, suite, and whether words for sides name its objects."""
-
-REACH = 0.85
-"""How far from its base the robot is asked to handle anything, meters in the plane. Its own is
-0.855; the farthest corner of all regions in which things are placed is 0.815 away."""
-
-# Front camera, RoboMME: world to camera, OpenCV convention, and 90 degrees over 256 pixels.
-FRONT_CAMERA = np.array(
-    [[0, 1, 0, 0], [0.89443, 0, -0.44721, -0.08944], [-0.44721, 0, -0.89443, 0.49194]]
-)
-FOCAL = CENTER = 128
-
 each_task = pytest.mark.parametrize("task", TASKS)
 
 
@@ -76,34 +35,60 @@ def first_episodes(task, difficulty, count=1):
 
 
 def test_the_registry_holds_each_task_once_in_the_order_of_its_code():
-    """Also: only tasks with words for sides have the setting *spatial*."""
+    """Code, name, suite, and whether words for sides name its objects."""
     registered = [
         (task.code, task.name, task.suite, task.spatial) for task in every_task().values()
     ]
-    assert registered == REGISTERED
-    assert tuple(every_task()) == tuple(name for _, name, *_ in registered)
+
+    assert registered == [
+        (1, "PickXtimes", "counting", True),
+        (2, "StopCube", "counting", False),
+        (3, "SwingXtimes", "counting", True),
+        (4, "BinFill", "counting", True),
+        (5, "VideoUnmaskSwap", "permanence", True),
+        (6, "VideoUnmask", "permanence", True),
+        (7, "ButtonUnmaskSwap", "permanence", True),
+        (8, "ButtonUnmask", "permanence", True),
+        (9, "VideoRepick", "reference", False),
+        (10, "VideoPlaceButton", "reference", False),
+        (11, "VideoPlaceOrder", "reference", False),
+        (12, "PutInBox", "real", True),
+        (13, "PickByCount", "real", True),
+    ]
+
+
+def test_only_tasks_with_words_for_sides_have_the_setting_spatial():
     for name, task in every_task().items():
-        sides = ("spatial",) if task.spatial else ()
-        assert plain_settings(task)[:4] == ("explicit", "direct", "reasoning", "contextual"), name
-        assert plain_settings(task)[4:] == sides, name
+        settings = plain_settings(task)
+
+        assert name == task.name
+        assert settings[:4] == ("explicit", "direct", "reasoning", "contextual"), name
+        assert settings[4:] == (("spatial",) if task.spatial else ()), name
 
 
-NUMBERS_OF_OTHER_GOALS = {
-    "PickXtimes": [0, 2, 2], "StopCube": [3, 3, 3], "SwingXtimes": [2, 8, 8],
-    "BinFill": [0, 1, 7], "VideoUnmaskSwap": [5, 2, 5], "VideoUnmask": [2, 2, 5],
-    "ButtonUnmaskSwap": [5, 2, 5], "ButtonUnmask": [2, 2, 5], "VideoRepick": [0, 0, 0],
-    "VideoPlaceButton": [1, 5, 5], "VideoPlaceOrder": [3, 8, 5], "PutInBox": [1, 1, 1],
-    "PickByCount": [1, 1, 1],
-}  # fmt: skip
-"""How many goals of a scene take as many picks as its own and are not on the way, by episode."""
-
-
-@each_task
-def test_the_number_of_goals_that_can_replace_that_of_an_episode_is_stable(task):
+@pytest.mark.parametrize(
+    ("task", "easy", "medium", "hard"),
+    [
+        ("PickXtimes", 0, 2, 2),
+        ("StopCube", 3, 3, 3),
+        ("SwingXtimes", 2, 8, 8),
+        ("BinFill", 0, 1, 7),
+        ("VideoUnmaskSwap", 5, 2, 5),
+        ("VideoUnmask", 2, 2, 5),
+        ("VideoRepick", 0, 0, 0),
+        ("VideoPlaceButton", 1, 5, 5),
+        ("VideoPlaceOrder", 3, 8, 5),
+        ("PutInBox", 1, 1, 1),
+    ],
+)
+def test_the_number_of_goals_that_can_replace_that_of_an_episode_is_stable(
+    task, easy, medium, hard
+):
     """Control runs command another goal of the same scene, which needs
     as many picks and is not reached on the way to the right one."""
-    episodes = [get_episode(task, "test", index) for index in (0, 2, 3)]
-    assert [len(other_goals(episode)) for episode in episodes] == NUMBERS_OF_OTHER_GOALS[task]
+    numbers = [len(other_goals(get_episode(task, "test", index))) for index in (0, 2, 3)]
+
+    assert numbers == [easy, medium, hard]
 
 
 @each_task
@@ -131,41 +116,51 @@ def test_every_goal_of_a_scene_has_a_plan_of_its_own(task):
     for difficulty in DIFFICULTIES:
         (episode,) = first_episodes(task, difficulty)
         goals = get_task(task).goals(episode.scene)
+
         plans = [get_task(task).stages(episode.scene, goal) for goal in goals]
+
         assert all(plans)
         assert len(set(plans)) == len(plans)
-        assert get_task(task).stages(episode.scene, episode.goal) == episode.stages
+        assert plans[goals.index(episode.goal)] == episode.stages
 
 
 def names_moved(motion):
-    """Every name that a motion speaks of."""
+    """Return every name that a motion speaks of, and perhaps None."""
     match motion:
         case Swap():
             return {motion.first, motion.second, *motion.pinned}
         case Away():
-            return {motion.subject, motion.under} - {None}
+            return {motion.subject, motion.under}
         case Glow(during=fact) | Vanish(when=fact) | Shuttle(stopped_by=fact):
-            return {motion.subject, fact.subject, fact.place} - {None}
+            return {motion.subject, fact.subject, fact.place}
     raise AssertionError(motion)
 
 
 @each_task
-def test_stages_and_motions_name_only_objects_of_the_scene(task):
+def test_stages_point_at_and_handle_only_objects_of_the_scene(task):
+    """The facts of stages are checked wherever an episode is made."""
     for episode in episodes(task):
         objects = {item.name for item in episode.scene.objects}
-        assert len(objects) == len(episode.scene.objects)
         for stage in (*episode.demonstration, *episode.stages):
-            # Its facts are checked by `check_stages` wherever an episode is made.
             handled = {stage.primitive.subject, stage.primitive.place, stage.points_at}
-            assert handled <= objects | {"robot", None}
-            assert stage.expects not in stage.forbids
-            assert ("{at}" in stage.subgoal) == (stage.points_at is not None)
+            assert handled <= objects | {"robot", None}, episode.key
+            assert stage.expects not in stage.forbids, episode.key
+            assert ("{at}" in stage.subgoal) == (stage.points_at is not None), episode.key
+
+
+@each_task
+def test_a_scene_has_each_object_once_and_names_no_other(task):
+    """In motions, in its past, which only a video shows, and where a cube is in a container."""
+    for episode in episodes(task):
+        objects = {item.name for item in episode.scene.objects}
+        named = {item.inside for item in episode.scene.objects}
         for motion in episode.scene.motions:
-            assert names_moved(motion) <= objects
+            named |= names_moved(motion)
         for fact in episode.scene.past:
-            assert {fact.subject, fact.place} - {None} <= objects
-        assert {item.inside for item in episode.scene.objects} - {None} <= objects
-        assert bool(episode.scene.past) <= bool(episode.demonstration)
+            named |= {fact.subject, fact.place}
+        assert len(objects) == len(episode.scene.objects), episode.key
+        assert named <= objects | {None}, episode.key
+        assert episode.demonstration or not episode.scene.past, episode.key
 
 
 def solid_areas(scene):
@@ -186,16 +181,23 @@ def disc_areas(scene, *kinds):
     ]
 
 
+def check_apart(areas, key):
+    for first, second in itertools.combinations(areas, 2):
+        assert not overlap(first, second), key
+
+
 @each_task
-def test_things_on_the_table_do_not_touch(task):
-    """Solid things and targets keep apart, and targets and sites; a cube may lie on a site."""
+def test_solid_things_and_targets_on_the_table_do_not_touch(task):
     for episode in episodes(task):
-        # Cubes may lie where the video puts one back, as in RoboMME.
-        for areas in (
-            [*solid_areas(episode.scene), *disc_areas(episode.scene, "target")],
-            disc_areas(episode.scene, "target", "site"),
-        ):
-            assert not any(overlap(*pair) for pair in itertools.combinations(areas, 2)), episode.key
+        targets = disc_areas(episode.scene, "target")
+        check_apart([*solid_areas(episode.scene), *targets], episode.key)
+
+
+@pytest.mark.parametrize("task", ["VideoPlaceButton", "VideoPlaceOrder"])
+def test_targets_and_sites_do_not_touch(task):
+    """But a cube may lie on a site, where the video puts one back, as in RoboMME."""
+    for episode in episodes(task):
+        check_apart(disc_areas(episode.scene, "target", "site"), episode.key)
 
 
 @each_task
@@ -207,28 +209,50 @@ def test_hidden_cubes_are_in_the_middle_of_their_containers(task):
 
 
 @each_task
-def test_objects_lie_on_the_table_and_those_to_handle_are_within_reach(task):
-    """`REACH` is 0.85 m from the robot's base, in the plane."""
+def test_objects_lie_on_the_table(task):
+    """At the heights of the origins of each kind, meters."""
+    heights = {
+        "cube": (0.02,),
+        "hidden_cube": (0.02 / 1.2,),
+        "container": (0.052,),
+        "target": (0.005, 0.01),
+        "button": (0.0075,),
+        "bin": (0.025,),
+        "site": (0.005,),
+        "shuttle": (0.01,),
+        "marker": (-0.005,),
+        "box": (0.02,),
+        "tape": (0.0175,),
+    }
     for episode in episodes(task):
         for item in episode.scene.objects:
-            heights = HEIGHTS[item.kind]
-            assert any(item.position.z == pytest.approx(height, abs=1e-6) for height in heights), (
-                item
-            )
+            off = [abs(item.position.z - height) for height in heights[item.kind]]
+            assert min(off) < 1e-6, item
+
+
+@each_task
+def test_objects_to_handle_are_within_the_robot_s_reach(task):
+    """0.85 m from its base, in the plane. Its own reach is 0.855; the farthest corner of all
+    regions in which things are placed is 0.815 away."""
+    for episode in episodes(task):
         for stage in (*episode.demonstration, *episode.stages):
-            handled = {stage.primitive.subject, stage.primitive.place} - {None, "robot"}
-            for x, y, _ in (episode.scene[name].position for name in handled):
-                assert np.hypot(x - ROBOT_BASE[0], y - ROBOT_BASE[1]) <= REACH
+            for name in {stage.primitive.subject, stage.primitive.place} - {None, "robot"}:
+                place = episode.scene[name].position
+                assert math.dist(place[:2], ROBOT_BASE[:2]) <= 0.85, (episode.key, name)
 
 
 @each_task
 def test_the_front_camera_s_picture_contains_every_object(task):
-    """Projects each object's origin to pixels (u, v) of the picture, 256 by 256."""
+    """Projects each object's origin to pixels of the picture: 256 by 256, 90 degrees wide.
+
+    RoboMME's camera: the matrix takes the world to right, down and ahead of it, meters.
+    """
+    camera = np.array(
+        [[0, 1, 0, 0], [0.89443, 0, -0.44721, -0.08944], [-0.44721, 0, -0.89443, 0.49194]]
+    )
     for episode in episodes(task):
         for item in episode.scene.objects:
-            right, down, ahead = FRONT_CAMERA @ (*item.position, 1)
-            u = CENTER + FOCAL * right / ahead
-            v = CENTER + FOCAL * down / ahead
+            right, down, ahead = camera @ (*item.position, 1)
             assert ahead > 0
-            assert 0 <= u < 256, item
-            assert 0 <= v < 256, item
+            assert 0 <= 128 + 128 * right / ahead < 256, item
+            assert 0 <= 128 + 128 * down / ahead < 256, item
