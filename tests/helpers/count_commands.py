@@ -1,6 +1,6 @@
 """Print the commands with their options and arguments, and how many there are of each.
 
-python scripts/count_commands.py
+python tests/helpers/count_commands.py
 """
 
 from __future__ import annotations
