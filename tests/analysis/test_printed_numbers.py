@@ -286,6 +286,11 @@ def test_halves_are_rounded_up_in_whole_percentages_and_away_from_0_in_gaps():
     assert gaps == ["+13", "−13", "+6.3", "−6.3"]
 
 
+def test_a_gap_that_rounds_to_zero_has_no_sign_of_its_own():
+    assert points(-0.001) == "±0"
+    assert points(0.0004, 1) == "±0.0"
+
+
 def test_what_several_seeds_played_is_counted_in_trials_below_the_terminals_table():
     results = [make_result(policy_seed=seed) for seed in (0, 1)]
 
