@@ -23,7 +23,7 @@ PUBLISHED_WORDS = "robomme@1a2b3c4d"
 
 def results_like_the_papers(
     episodes=range(50), tasks=("PickXtimes",), settings=("explicit",), **fields
-) -> list:
+):
     """Return results as the paper has them: 50 episodes of PickXtimes, 4 of 5 won."""
     usual = {"wordings": PUBLISHED_WORDS, "environment_version": ENVIRONMENT_VERSION} | fields
     return [
@@ -44,7 +44,7 @@ def run_data_of(*results):
     return RunData(frame_of(*results))
 
 
-def named_differences(results, planned=()) -> tuple[str, ...] | None:
+def named_differences(results, planned=()):
     """Return what keeps the only cell of these results from the paper's; None if it has no such."""
     ((key, cell),) = cells_of(frame_of(results, planned=planned)).items()
     return differences_of(key, cell)

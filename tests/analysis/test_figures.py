@@ -19,16 +19,13 @@ from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.published import published_rows
 from roboirg.analysis.results.frame import make_frame
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.records.record import Summary
 from roboirg.runs.plan.plan import Plan
 from roboirg.stats.intervals import Interval
 
 pytest.importorskip("matplotlib")
 
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
@@ -41,19 +38,19 @@ PLAN = Plan(
 
 
 @functools.cache
-def results_of_two_policies() -> list[Summary]:
+def results_of_two_policies():
     """Return results of which the forgetful policy loses all implicit ones, the listener none."""
     return [*played(PLAN)]
 
 
-def run_data(found: list[Summary] | None = None, **options: object) -> RunData:
+def run_data(found=None, **options):
     """Return what figures are drawn from: these results, or those of the two policies."""
     if found is None:
         found = results_of_two_policies()
     return RunData(make_frame([("run", found)], **options))
 
 
-def drawn_texts(figure: Figure) -> list[Text]:
+def drawn_texts(figure):
     """The texts of a figure that are seen, after it was laid out."""
     FigureCanvasAgg(figure).draw()
     owners = [*(panel for panel in figure.axes if panel.get_visible()), *figure.legends]
@@ -61,18 +58,18 @@ def drawn_texts(figure: Figure) -> list[Text]:
     return [text for text in found if text.get_visible() and text.get_text()]
 
 
-def text_without_line_breaks(text: Text) -> str:
+def text_without_line_breaks(text):
     return " ".join(text.get_text().split())
 
 
-def drawn_figure(name: str, found: RunData, *, published: bool = False) -> Figure:
+def drawn_figure(name, found, *, published=False):
     """Return a figure that has something to show, next to the published rates or without them."""
     figure = draw_figure(name, found, published=published)
     assert figure is not None
     return figure
 
 
-def dot_positions(figure: Figure) -> dict[tuple[str, str], list[float]]:
+def dot_positions(figure):
     """Return where the dots of each row stand, in percent, by panel and label of the row.
 
     A row has two dots, the reference and the rate, or the rate alone, as in
@@ -139,7 +136,7 @@ def test_a_figure_has_its_labels_its_counts_and_the_conditions_of_its_runs(name,
     assert CONDITIONS_BELOW_A_FIGURE in texts[0]
 
 
-def bar_widths_by_color(panel: Axes) -> dict[str, float]:
+def bar_widths_by_color(panel):
     """The length of a panel's bars by color; each part of a bar begins where the last one ends."""
     found: dict[str, float] = {}
     ends: defaultdict[float, float] = defaultdict(float)

@@ -20,7 +20,6 @@ from page_text import PLAN, broken, played, store, words
 from roboirg.analysis.page.page_server import run_server
 from roboirg.analysis.page.report import write_report
 from roboirg.records.episode_log import EpisodeLog, log_path
-from roboirg.records.record import Record
 from roboirg.runs.play.video_writer import VideoWriter
 
 pytest.importorskip("jinja2")
@@ -35,7 +34,7 @@ PRINTED = Path(__file__).with_name("printed_page.txt")
 
 
 @functools.cache
-def records_of_page() -> tuple[Record, ...]:
+def records_of_page():
     """Return the records of the plan: the forgetful policy fails where it must remember.
 
     The last is an error, and episode 0 of PickXtimes was filmed.

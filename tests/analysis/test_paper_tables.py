@@ -21,7 +21,6 @@ from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
 from roboirg.analysis.tables.rendering import get_format
 from roboirg.analysis.tables.rendering.terminal import renderable
-from roboirg.analysis.tables.table import Table
 from roboirg.language.settings import settings_of
 from roboirg.stats.rates import mean_percent, percent
 from roboirg.tasks import all_tasks
@@ -45,7 +44,7 @@ def test_the_mean_of_printed_rates_is_rounded_half_up_too():
 STORED_TABLE = Path(__file__).with_name("printed_main_table.md")
 
 
-def entries_of_row(table: Table, group: str, name: str | None = None, source: str = "ours"):
+def entries_of_row(table, group, name=None, source="ours"):
     """Return the entries of the only such row by column; without a name, that of any policy."""
     (row,) = [
         row
@@ -55,7 +54,7 @@ def entries_of_row(table: Table, group: str, name: str | None = None, source: st
     return dict(zip((column.name for column in table.columns), row.entries, strict=True))
 
 
-def results_of_all_tasks(policy: str = "a", settings=("explicit", "direct"), **fields) -> list:
+def results_of_all_tasks(policy="a", settings=("explicit", "direct"), **fields):
     """Return two episodes of every task that has the setting, the first won, the second lost."""
     found = []
     for name, task in all_tasks().items():
@@ -67,7 +66,7 @@ def results_of_all_tasks(policy: str = "a", settings=("explicit", "direct"), **f
     return found
 
 
-def table_of(which: str, *results: list, planned=(), **options) -> Table:
+def table_of(which, *results, planned=(), **options):
     return make_table(which, RunData(frame_of(*results, planned=planned)), **options)
 
 
@@ -120,7 +119,7 @@ def test_each_split_has_its_own_row_of_chance():
     assert rates[0] != rates[1]
 
 
-def informative_tables(*results: list) -> set[str]:
+def informative_tables(*results):
     """Return the names of the tables that are shown if none is asked for."""
     data = RunData(frame_of(*results))
     return {name for name in WHICH if is_informative(name, data)}
@@ -169,7 +168,7 @@ def test_the_table_of_planners_is_shown_if_a_planner_stands_next_to_another_poli
 LONG_POLICY_NAME = "a_package.with_a_long_name.policies:" + "Net" * 40
 
 
-def drawn_table(table: Table, width: int, *, in_terminal: bool) -> str:
+def drawn_table(table, width, *, in_terminal):
     """Return a table as it is drawn in so many characters, in a terminal or into a file."""
     console = Console(
         file=io.StringIO(), width=width, force_terminal=in_terminal, color_system=None

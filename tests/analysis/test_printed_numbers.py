@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,10 +17,9 @@ from roboirg.analysis.measures.comparison import compare
 from roboirg.analysis.measures.comparison_text import sentences
 from roboirg.analysis.measures.failure_rates import measure_ends
 from roboirg.analysis.measures.headline import measure_headline
-from roboirg.analysis.measures.measure import ALL_TASKS, KEPT_APART, Measured
+from roboirg.analysis.measures.measure import ALL_TASKS, KEPT_APART
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.page.matrix import notes as cell_notes
-from roboirg.analysis.results.frame import Frame
 from roboirg.analysis.run_results import Results
 from roboirg.analysis.tables.arm_table import make_arm_table
 from roboirg.analysis.tables.diagnostic_tables import (
@@ -32,10 +30,9 @@ from roboirg.analysis.tables.diagnostic_tables import (
 )
 from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.analysis.tables.run_tables import make_run_tables
-from roboirg.analysis.tables.table import Table
 from roboirg.core.errors import InvalidValueError
 from roboirg.records.record import Summary
-from roboirg.stats.intervals import TOO_FEW, Interval
+from roboirg.stats.intervals import TOO_FEW
 from roboirg.stats.rates import points, whole_percent
 
 TASKS = ("PickXtimes", "BinFill")
@@ -77,7 +74,7 @@ USUAL_CONDITIONS = ResultConditions(
 
 
 @st.composite
-def conditions_that_nearly_agree(draw: st.DrawFn) -> list[ResultConditions]:
+def conditions_that_nearly_agree(draw):
     """Draw conditions of which each differs from the one before in one or two things.
 
     So they could be taken for each other: two that differ in the split alone, for example.
@@ -91,7 +88,7 @@ def conditions_that_nearly_agree(draw: st.DrawFn) -> list[ResultConditions]:
     return list(dict.fromkeys(found))
 
 
-def numbers_in_table(table: Table, *names: str) -> Iterator[float]:
+def numbers_in_table(table, *names):
     """Yield the numbers of a table in some columns, or in all.
 
     Of an entry such as ``−33 (≠) 2…`` this is -33.0; empty entries and dashes have none.
@@ -103,7 +100,7 @@ def numbers_in_table(table: Table, *names: str) -> Iterator[float]:
                 yield float(word)
 
 
-def all_rates_of(frame: Frame) -> Iterator[float]:
+def all_rates_of(frame):
     """Yield every rate in percent, and every difference of two in points."""
     data = RunData(frame)
     for table in make_run_tables(frame):
@@ -127,7 +124,7 @@ def all_rates_of(frame: Frame) -> Iterator[float]:
         yield 100 * rate
 
 
-def results_of(data: RunData) -> Results:
+def results_of(data):
     """Return what a caller gets, of results that were never stored."""
     results = Results(Path())
     results.__dict__["_data"] = data
@@ -177,7 +174,7 @@ def test_the_rate_over_tasks_is_the_same_in_the_terminal_on_the_page_and_in_pyth
     assert results_of(data).rates() == {("listener", "explicit"): 0.7}
 
 
-def intervals_of(measured: Measured) -> Iterator[Interval | None]:
+def intervals_of(measured):
     """Yield the intervals of a rate, of that beside it, and of the gaps between them."""
     yield from (measured.interval, measured.other_interval)
     for gap in (measured.gap, measured.second_gap):
@@ -264,7 +261,7 @@ def test_a_sentence_of_a_comparison_has_an_interval_or_the_reason_why_there_is_n
             assert ("95 % interval" in sentence) != (TOO_FEW in sentence)
 
 
-def frame_with_outcomes(outcomes: Mapping[tuple, str]) -> Frame:
+def frame_with_outcomes(outcomes):
     """Return the results with these outcomes, of which each letter is an episode.
 
     ``{("listener", "BinFill", "direct", "implicit", "told", 0): "10!"}`` are three: won, lost, and

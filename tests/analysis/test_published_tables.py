@@ -22,7 +22,6 @@ from roboirg.analysis.published import (
 )
 from roboirg.analysis.tables.paper_tables import WHICH, make_table
 from roboirg.analysis.tables.rendering import FORMATS
-from roboirg.analysis.tables.table import Entry, Table
 from roboirg.analysis.tables.table_kinds import TWIN_MARK
 from roboirg.language.settings import settings_of
 from roboirg.stats.intervals import interval_of_values
@@ -33,13 +32,13 @@ NO_RESULTS = RunData(frame_of())
 FILES = {"main": "main", "planner": "planner", "context": "context", "real": "real_world"}
 
 
-def lines_of_stored_file(table: str) -> list[dict[str, str]]:
+def lines_of_stored_file(table):
     """Return the lines of the file of a table as they are, without the package's loader."""
     path = resources.files("roboirg.analysis") / "published_results" / f"{FILES[table]}.csv"
     return list(csv.DictReader(path.read_text().splitlines()))
 
 
-def place(line: dict[str, str]) -> tuple[str, str]:
+def place(line):
     """The group and the name of the row to which a line of a file belongs."""
     if "stages" in line:
         return line["model"], line["stages"]
@@ -52,7 +51,7 @@ def table_of_results_like_the_papers(request):
     return make_table(request.param, RunData(frame_of(results)), published=True)
 
 
-def rows_of(table: Table, source: str) -> dict[tuple[str, str], dict[str, Entry]]:
+def rows_of(table, source):
     """Return entries by place, which is the setting and the policy but for contexts, and column."""
     names = [column.name for column in table.columns]
     found = {}

@@ -24,7 +24,6 @@ from roboirg.records.episode_log import EpisodeLog, log_path
 from roboirg.records.record import (
     EventRecord,
     MentionSpan,
-    Record,
     SubgoalRecord,
     UtteranceRecord,
 )
@@ -61,7 +60,7 @@ class Page:
 
 
 @functools.cache
-def records_with_an_error_last() -> tuple[Record, ...]:
+def records_with_an_error_last():
     """Return the records of one task: the forgetful policy fails where it must remember.
 
     The last one is an error, with markup in its texts.

@@ -15,7 +15,7 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.runs.plan.plan_maker import make_plan
 
 
-def write_run(folder: Path, policies: tuple[str, ...], device: str | None = None) -> Path:
+def write_run(folder, policies, device=None):
     """Write the records of 8 episodes of two tasks in two settings, and return the folder.
 
     The listener wins all, others explicit episodes alone.

@@ -9,9 +9,7 @@ from msgspec.structs import replace
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.tables.rewriter_table import NO_SHARE, make_rewriter_table
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.policy_ref import PolicyRef
 from roboirg.policies.by_name.finding import read_policy
-from roboirg.records.record import Summary
 
 SERVED = "openpi://localhost:8000"
 ALONE = read_policy(SERVED, "alone")
@@ -19,13 +17,13 @@ RULES = read_policy(f"resolve:surface?policy={SERVED}", "rules")
 OTHER = read_policy("resolve:surface?policy=mme-vla://localhost:8000", "other")
 
 
-def results(ref: PolicyRef, outcomes: str, setting: str, task: str = "PickXtimes") -> list[Summary]:
+def results(ref, outcomes, setting, task="PickXtimes"):
     """One result of a policy a letter: 1 for a success, 0 for a failure."""
     made = make_results(outcomes, setting, policy=ref.name, task=task)
     return [replace(result, ref=ref) for result in made]
 
 
-def rows_of(*made: list[Summary]) -> list[tuple[str, str, list[str]]]:
+def rows_of(*made):
     table = make_rewriter_table(RunData(frame_of(*made)))
     return [(row.group, row.name, list(row.cells)) for row in table.rows]
 

@@ -11,7 +11,6 @@ from rich.console import Console
 
 from roboirg.analysis.measures.breakdowns import BREAKDOWNS
 from roboirg.analysis.measures.run_data import RunData
-from roboirg.analysis.results.frame import Frame
 from roboirg.analysis.tables.diagnostic_tables import (
     diagnostic_tables,
     make_breakdown_table,
@@ -24,14 +23,14 @@ from roboirg.analysis.tables.run_tables import (
     make_run_tables,
     print_failures,
 )
-from roboirg.records.record import Attribution, Summary
+from roboirg.records.record import Attribution
 
 
-def printed(frame: Frame, width: int = 100) -> str:
+def printed(frame, width=100):
     console = Console(file=io.StringIO(), width=width)
     print_tables(make_run_tables(frame), console)
     print_failures(frame, console)
-    return console.file.getvalue()  # type: ignore[attr-defined,no-any-return]
+    return console.file.getvalue()
 
 
 STORED_OUTPUT = """\
@@ -127,7 +126,7 @@ END_OF_LETTER = {
 }
 
 
-def results_that_ended(letters: str, setting: str) -> list[Summary]:
+def results_that_ended(letters, setting):
     """Return an episode for each letter, which ended as `END_OF_LETTER` says."""
     found = []
     for episode, letter in enumerate(letters):

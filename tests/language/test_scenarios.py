@@ -28,7 +28,6 @@ from roboirg.apps.language_lab.scenarios.sentence_rules import broken_sentences,
 from roboirg.core.episode import SPLITS, Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.motions import Swap
 from roboirg.core.word_pools import POOLS
 from roboirg.language import LANGUAGE_VERSION, instruct, instruct_with
 from roboirg.language.generator import find_refusal, request_of, spoken_instruction
@@ -91,75 +90,68 @@ def read_scenario_file(text, task="PickXtimes"):
     return read_task_scenarios(text, "mine.toml")[task]
 
 
-def report_on_ours(task, frame, scenes):
-    """Return the checker's report on one of our own scenarios."""
-    (report,) = check_scenarios(task_scenarios(task), frame, scenes)
-    return report
-
-
 @pytest.mark.parametrize(
     ("before", "after", "complaint"),
     [
-        ("{repeats} today", "{repeat} today", "introduction: There is no slot 'repeat'; known: "),
-        (
+        pytest.param(
+            "{repeats} today",
+            "{repeat} today",
+            "introduction: There is no slot 'repeat'; known: ",
+            id="misspelled slot",
+        ),
+        pytest.param(
             "<it color: it>.",
             "<it color: that thing>.",
             "<it color: that thing>, which does not exist; the nearest for a color: <that",
+            id="unknown pointer",
         ),
-        (
+        pytest.param(
             "<it color: it>.",
             "<them color: it>.",
             "<them color: it>; in pointers.toml these words have the class 'it' for a color.",
+            id="class of another color pointer",
         ),
-        (
+        pytest.param(
             "<each repeats:",
             "<it repeats:",
             "|once for each year]>; in pointers.toml these words have the class 'each' for a nu",
+            id="class of another number pointer",
         ),
-        ("<it color: it>.", "<it color it>.", "has a bracket that is no mark"),
-        ("{rival color}", "{rival visit}", "known: aside.0"),
-        ("\ncue = ", "\nclue = ", "'birthday': There is no field 'clue'; known: competing, cue,"),
-        (
+        pytest.param(
+            "<it color: it>.", "<it color it>.", "has a bracket that is no mark", id="no colon"
+        ),
+        pytest.param("{rival color}", "{rival visit}", "known: aside.0", id="no such rival"),
+        pytest.param(
+            "\ncue = ",
+            "\nclue = ",
+            "'birthday': There is no field 'clue'; known: competing, cue,",
+            id="misspelled field",
+        ),
+        pytest.param(
             '\ncue = "Let\'s surprise {him} with the cube."',
             "",
             "'birthday' has no cue; direct needs introduction, reinf",
+            id="missing field",
         ),
-        (
-            "say.color",
-            "say.colour",
-            "'birthday': There is no field 'say.colour'; known: competing, cue, ",
+        pytest.param(
+            'pool = "train"',
+            'pool = "dev"',
+            "'birthday', pool is 'dev'; it must be train or test.",
+            id="unknown pool",
         ),
-        ('pool = "train"', 'pool = "dev"', "'birthday', pool is 'dev'; it must be train or test."),
-        ('pool = "train"\n', "", "'birthday' has no pool."),
-        ('pool = "train"\n', 'pool = "train"\npeople.he = [5]\n', "people: Expected a text, got"),
-        (
-            'introduction = "',
-            'introduction = 5\nlead = "',
-            "introduction has the words 5; they must",
-        ),
-        ('"{he}', '"\u2019{he}', "must be printable ASCII"),
-        ("[[scenario]]", "[[scenario", "(at line 3, column 11)"),
-        ('["PickXtimes"]', "[]", "has no tasks; add a line such as tasks = "),
-        ('["PickXtimes"]', '["Juggle"]', "There is no task 'Juggle'; known: "),
-        (
+        pytest.param('pool = "train"\n', "", "'birthday' has no pool.", id="no pool"),
+        pytest.param("[[scenario]]", "[[scenario", "(at line 3, column 11)", id="no TOML"),
+        pytest.param(
             "[[scenario]]",
             '[commands.StopCube]\ntrain = ["Go."]\n[[scenario]]',
             "'StopCube'; known: PickXtimes, all.",
+            id="commands of another task",
         ),
-        (
-            "[[scenario]]",
-            '[commands.all]\ntrain = ["Go."]\n[[scenario]]',
-            "has no commands of PickXtimes in the pool test.",
-        ),
-        (
-            "[[scenario]]",
-            '[commands.all]\ntrain = ["Put {colour} {repeats}."]\n[[scenario]]',
-            "commands of PickXtimes has other marks than {color} and {repeats}: 'Put {colour} ",
-        ),
-        (
+        pytest.param(
             'pool = "train"\n',
             'pool = "train"\nneeds.tasks = ["StopCube"]\n',
             "'birthday', needs.tasks: There is no task 'StopCube'; known: PickXtimes.",
+            id="needs another task",
         ),
     ],
 )
@@ -171,24 +163,11 @@ def test_a_mistake_in_a_scenario_file_is_reported_with_file_scenario_and_field(
     Its text is in wording_stand_ins.py; the table pointers.toml lists the words that refer back.
     """
     assert before in BIRTHDAY
+
     with pytest.raises(InvalidValueError, match=r"^mine\.toml") as found:
         read_scenario_file(BIRTHDAY.replace(before, after))
+
     assert complaint in str(found.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "before", "after", "complaint"),
-    [
-        (TWO_CUBES, "Not <former", "Not <latter", "have the class 'former' for a"),
-        (FEWER, "once for each photo", "once per photo", "which does not exist"),
-    ],
-    ids=["wrong class", "not in the table"],
-)
-def test_a_pointer_that_the_table_does_not_have_is_refused(text, before, after, complaint):
-    """*The former* is of the class "former"; *once per photo* is said by none of our scenarios."""
-    assert before in text
-    with pytest.raises(InvalidValueError, match=complaint):
-        read_scenario_file(text.replace(before, after))
 
 
 def test_an_unknown_pointer_is_refused_with_the_five_nearest_known_ones():
@@ -283,30 +262,40 @@ def test_the_checker_finds_nothing_wrong_with_a_good_scenario(text):
 @pytest.mark.parametrize(
     ("before", "after", "rule"),
     [
-        ("turns {repeats} today and ", "", "points at what the"),
-        ("wants to", "has a {color} one and wants to", "has 2 antecedents"),
-        ("Let's surprise", "You saw this. Surprise", "what was seen is not checked"),
-        ("The cake", "The second cake", "names second, which could be a value"),
-        ("The cake", "Look at that cake", "may be covered"),
-        ('say.color = ["', 'lead = "Twice: "\nsay.color = ["', "names twice"),
-        ('say.color = ["', 'lead = "Twice: "\nsay.color = ["', "gives away twice"),
-        ("The cake", "The cake " + "is so very good " * 9, "only 64 are heard"),
-        (
+        pytest.param("turns {repeats} today and ", "", "points at what the", id="not introduced"),
+        pytest.param(
+            "wants to", "has a {color} one and wants to", "has 2 antecedents", id="named twice"
+        ),
+        pytest.param(
+            "Let's surprise", "You saw this. Surprise", "what was seen is not checked", id="seen"
+        ),
+        pytest.param(
+            "The cake", "The second cake", "names second, which could be a value", id="a value"
+        ),
+        pytest.param("The cake", "On the left, the cake", "names on the left", id="a place"),
+        pytest.param("The cake", "Four, the cake", "names four", id="a number"),
+        pytest.param("The cake", "Look at that cake", "may be covered", id="another pointer"),
+        pytest.param(
+            'say.color = ["', 'lead = "Twice: "\nsay.color = ["', "gives away twice", id="leak"
+        ),
+        pytest.param(
+            "The cake", "The cake " + "is so very good " * 9, "only 64 are heard", id="too long"
+        ),
+        pytest.param(
             "{rival color} one",
             "{rival color} one {list}",
             "a competing remark with a value for list or rival color in this",
+            id="no list",
         ),
-        ("The cake", "Twice, the cake", "names twice"),
-        ("The cake", "On the left, the cake", "names on the left"),
-        ("The cake", "Once, the cake", "names once"),
-        ("The cake", "Four, the cake", "names four"),
     ],
 )
 def test_the_checker_for_authors_names_the_rule_that_a_scenario_breaks(before, after, rule):
     """Each case replaces `before` by `after` in a scenario that breaks none, a birthday story."""
     assert before in BIRTHDAY
+
     broken = report_on(BIRTHDAY.replace(before, after), every=10).broken
-    assert any(rule in sentence for sentence in broken), list(broken)
+
+    assert rule in "\n".join(broken)
 
 
 @pytest.mark.parametrize(
@@ -329,8 +318,10 @@ def test_the_checker_finds_pointers_that_stand_for_another_value_or_for_none(
     the number of photos, *I took two* fits every goal.
     """
     assert before in text
+
     broken = report_on(text.replace(before, after), every=10).broken
-    assert any(rule in sentence for sentence in broken), list(broken)
+
+    assert rule in "\n".join(broken)
 
 
 def only_command(text, mentions=(), landmarks=()):
@@ -400,12 +391,6 @@ def test_adding_a_scenario_changes_only_the_episodes_that_choose_it(text, settin
             assert after == before, episode.key
 
     assert 3 < choosing_it < 60
-
-
-def test_the_example_file_of_the_documentation_breaks_no_rule():
-    words = parse_wordings(USER_FILE_OF_THE_PAGE, "mine.toml").tasks["PickXtimes"]
-    (report,) = check_scenarios(words, None, scenes_of("PickXtimes"))
-    assert not report.broken
 
 
 def test_the_example_file_of_the_documentation_has_a_scenario_for_every_scene():
@@ -1098,39 +1083,3 @@ say.color = ["<other taken: the other one>"]
     broken = report_on(text, "VideoPlaceButton", every=10).broken
     assert "means no goal, another one, or several" in broken
     assert "say.color must stand for the goal's value; it stands for blue or red" in broken
-
-
-@pytest.mark.parametrize(
-    ("task", "frame"),
-    [("VideoUnmask", "video series"), ("VideoPlaceButton", "belongs there")],
-    ids=["a list of colors, then one by its position", "one for a cube and one for a moment"],
-)
-def test_two_pointers_of_one_scenario_of_ours_are_understood(task, frame):
-    """*It's the second one's turn, so lift the container over it*; *put the one … on that one*.
-
-    The checker finds scenes that the scenario fits, and in all of them its words mean the goal.
-    """
-    report = report_on_ours(task, frame, scenes_of(task, 0)[::10])
-    assert report.scenes
-    assert not report.broken
-
-
-def test_a_target_that_has_moved_may_still_be_called_there():
-    """The scenario "target to test", in episodes whose targets change places."""
-    episodes = scenes_of("VideoPlaceButton", 0)
-    moved = [episode for episode in episodes if episode.scene.motions_of(Swap)][::5]
-
-    report = report_on_ours("VideoPlaceButton", "target to test", moved)
-
-    assert report.scenes
-    assert not report.broken
-
-
-def test_the_target_on_the_left_is_not_taken_for_words_that_refer_back():
-    """The resolved form names the place, and *on the left* is a part of it."""
-    scenes = scenes_of("VideoPlaceButton")
-
-    report = report_on_ours("VideoPlaceButton", "going with that target", scenes)
-
-    assert any("target on the left" in text for text in report.resolved)
-    assert not report.broken

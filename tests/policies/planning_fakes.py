@@ -8,7 +8,6 @@ import os
 import re
 import threading
 import time
-from collections.abc import Callable
 from contextlib import contextmanager
 from fractions import Fraction
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -161,7 +160,7 @@ def google_reply(text):
 
 
 @contextmanager
-def fake_vlm(answer: Callable | list | Path):
+def fake_vlm(answer):
     """A running server; `answer` may be a list of replies, the last of which stays, or the path of
     a file with one reply a line, as JSON texts."""
     if isinstance(answer, Path):

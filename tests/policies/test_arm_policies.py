@@ -8,11 +8,10 @@ from types import SimpleNamespace
 import pytest
 
 from roboirg.analysis.measures.chance import silent_chance
-from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import expressible
-from roboirg.language.arms import ArmWords, say_arm
+from roboirg.language.arms import say_arm
 from roboirg.policies import make_policy
 from roboirg.stats.intervals import interval_of_values
 from roboirg.tasks import all_tasks, with_goal
@@ -27,7 +26,7 @@ Scene = tuple[str, int]
 
 
 @functools.cache
-def scenes(count: int = EPISODES) -> tuple[Scene, ...]:
+def scenes(count=EPISODES):
     return tuple(
         (task, index)
         for task in all_tasks()
@@ -37,7 +36,7 @@ def scenes(count: int = EPISODES) -> tuple[Scene, ...]:
 
 
 @functools.cache
-def words_of_control(task: str, index: int, arm: str) -> ArmWords | None:
+def words_of_control(task, index, arm):
     episode = get_episode(task, "test", index)
     options = InstructionOptions(SETTING)
     try:
@@ -46,15 +45,15 @@ def words_of_control(task: str, index: int, arm: str) -> ArmWords | None:
         return None
 
 
-def goal_chosen_by(policy: str, said: ArmWords, seed: int = 0) -> Goal | None:
+def goal_chosen_by(policy, said, seed=0):
     env = SimpleNamespace(
         episode=said.episode, original=said.original, instruction=said.instruction
     )
-    decide = make_policy(policy, seed).decide  # type: ignore[attr-defined]
-    return decide(env, said.instruction.text)  # type: ignore[no-any-return]
+    decide = make_policy(policy, seed).decide
+    return decide(env, said.instruction.text)
 
 
-def succeeds(policy: str, scene: Scene, arm: str, seed: int = 0) -> bool | None:
+def succeeds(policy, scene, arm, seed=0):
     """Return whether the goal that a policy chooses would succeed; None without the arm."""
     said = words_of_control(*scene, arm)
     if said is None:
@@ -64,7 +63,7 @@ def succeeds(policy: str, scene: Scene, arm: str, seed: int = 0) -> bool | None:
     return goal is not None and begins_with(stages, said.episode.stages)
 
 
-def share_won_in_all(policy: str, *arms: str) -> float:
+def share_won_in_all(policy, *arms):
     """Return the share of scenes with all arms in which a policy succeeds in all of them."""
     wins = []
     for scene in scenes():
