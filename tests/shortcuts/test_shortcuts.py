@@ -237,18 +237,6 @@ def test_upper_case_and_doubled_spaces_do_not_change_a_guess(text, rule, task):
     assert guess_goal(rule, shouted, task) == guess_goal(rule, text, task)
 
 
-@settings(max_examples=25)
-@given(named=st.lists(st.sampled_from(COLORS), min_size=1, max_size=6))
-def test_rules_guess_the_first_the_last_or_an_unnamed_color(named):
-    """*I like red. I like blue. Take it.* If all colors are named, elimination draws from all."""
-    text = " ".join(f"I like {color}." for color in named) + " Take it."
-    unnamed = tuple(color for color in COLORS if color not in named)
-
-    assert guess_goal("first-mention", text, "PickXtimes")["color"] == ((named[0],),)
-    assert guess_goal("last-mention", text, "PickXtimes")["color"] == ((named[-1],),)
-    assert guess_goal("elimination", text, "PickXtimes")["color"] == (unnamed or COLORS,)
-
-
 def test_a_misspelled_rule_is_refused_with_the_right_name():
     with pytest.raises(UnknownNameError, match="first-mention"):
         guess_goal("first-mentoin", "Take it.", "PickXtimes")

@@ -49,14 +49,20 @@ def test_every_subgoal_of_a_task_is_encoded_with_its_motion(task):
 
 
 def test_a_point_in_a_subgoal_is_encoded_as_the_place_on_the_table():
+    """The last three numbers say whether there is a point, and where it is, in meters."""
     place = np.array([-0.05, 0.11, 0.02])
     subgoal = SubgoalTemplate("pick up the red cube {at}").at(points_of(place))
-    assert split_point(subgoal)[1] is not None
 
     found = encode_request(subgoal, OBJECTS)
-    assert found[-3] == 1
-    assert np.allclose(found[-2:], place[:2], atol=0.004)
+
+    assert found[-3:] == pytest.approx([1, -0.05, 0.11], abs=0.004)
+
+
+def test_a_subgoal_without_a_point_is_encoded_without_a_place():
     assert encode_request("pick up the red cube", OBJECTS)[-3] == 0
+
+
+def test_words_that_are_no_subgoal_are_not_encoded():
     assert encode_request("make me a sandwich", OBJECTS) is None
 
 
@@ -77,63 +83,116 @@ def recording_of(episode, done):
     )  # fmt: skip
 
 
-def test_recordings_give_the_due_subgoal_with_the_point_at_its_start():
-    """The first two looks are of stage 0, the others of stage 1; objects move on meanwhile."""
+@pytest.fixture
+def recording_of_two_stages():
+    """An episode, and a recording whose first two looks are of stage 0, the others of stage 1."""
     episode = get_episode("PickXtimes", "train", 0)
-    done = [0, 0, 1, 1, 1]
-    stages = [episode.stages[number] for number in done]
-    recorded = recording_of(episode, done)
+    return episode, recording_of(episode, [0, 0, 1, 1, 1])
+
+
+def test_recordings_give_the_subgoal_of_the_stage_that_is_due(recording_of_two_stages):
+    episode, recorded = recording_of_two_stages
+    first, second, *_ = episode.stages
 
     due = subgoals_due(recorded, episode, range(5))
+
+    words = [decision.move.words for decision in due]
+    assert words == [first.subgoal] * 2 + [second.subgoal] * 3
+    objects = [recorded.names[decision.object_number] for decision in due]
+    assert objects == [first.points_at] * 2 + [second.points_at] * 3
+
+
+def test_the_point_of_a_recorded_subgoal_is_that_at_its_start(recording_of_two_stages):
+    """Objects move on at every look; a point is row and column in the picture."""
+    episode, recorded = recording_of_two_stages
+    number = recorded.names.index(episode.stages[1].points_at)
+    column, row = points_of(recorded.things[2, number, :3].astype(float))
+
+    found = recorded_subgoals(recorded, episode, [0, 0, 1, 1, 1], None)
+
+    assert found[0] == found[1] != found[2] == found[3] == found[4]
+    assert split_point(found[2])[1] == pytest.approx((row, column), abs=0.5)
+
+
+def test_points_of_recorded_subgoals_are_moved_a_little_for_training(recording_of_two_stages):
+    episode, recorded = recording_of_two_stages
+    done = [0, 0, 1, 1, 1]
+
     exact = recorded_subgoals(recorded, episode, done, None)
-
-    assert [decision.move.words for decision in due] == [stage.subgoal for stage in stages]
-    names = [recorded.names[decision.object_number] for decision in due]
-    assert names == [stage.points_at for stage in stages]
-    assert exact[0] == exact[1] != exact[2] == exact[3] == exact[4]
-    wanted = points_of(recorded.things[2, due[2].object_number, :3].astype(float))
-    assert np.abs(np.array(split_point(exact[2])[1])[::-1] - wanted).max() <= 0.5
-
     moved = recorded_subgoals(recorded, episode, done, np.random.default_rng(0))
+
     away = np.subtract(split_point(moved[2])[1], split_point(exact[2])[1])
     assert 0 < np.abs(away).max() <= MOST_POINT_NOISE + 1
 
 
-def test_planner_history_keeps_the_looks_at_which_the_subgoal_changed():
-    """Subgoal templates are numbered; 0 is due at looks 2 and 4, 1 at 7, 0 again at 9."""
+@pytest.fixture
+def history_of_three_changes():
+    """Of three templates of subgoals, 0 is due at looks 2 and 4, 1 at look 7, 0 again at look 9."""
     history = PlannerHistory(3)
     for template, look in ((0, 2), (0, 4), (1, 7), (0, 9)):
         history.name(template, look)
-    assert history.switches == [2, 7, 9]
+    return history
 
-    # At look 19, of three templates: how often each was done, which is under way, and since when.
-    done, under_way, rest = np.split(history.context(19), [3, 6])
-    assert done.tolist() == [1, 1, 0]
-    assert under_way.tolist() == [1, 0, 0]
-    assert rest.tolist() == [0.25, 0, 0, 0]
-    assert len(history.context(19)) == context_size(3)
 
-    kept = history.kept(video=2, look=19)
+def test_planner_history_keeps_the_looks_at_which_the_subgoal_changed(history_of_three_changes):
+    assert history_of_three_changes.switches == [2, 7, 9]
+
+
+def test_the_context_of_a_planner_is_what_was_done_what_is_under_way_and_since_when(
+    history_of_three_changes,
+):
+    """At look 19: template 0 was done once, 1 once, 2 never; 0 is under way for 10 of 40 looks."""
+    context = history_of_three_changes.context(19)
+
+    assert len(context) == context_size(3)
+    assert context[:3].tolist() == [1, 1, 0]
+    assert context[3:6].tolist() == [1, 0, 0]
+    assert context[6:].tolist() == [0.25, 0, 0, 0]
+
+
+def test_a_planner_sees_the_video_the_changes_and_the_current_look(history_of_three_changes):
+    """The video has looks 0 and 1; what is left of the fixed number of frames is -1."""
+    kept = history_of_three_changes.kept(video=2, look=19)
+
     assert [look for look in kept if look >= 0] == [0, 1, 2, 7, 9, 19]
     assert len(kept) == VIDEO_FRAMES + MAX_SWITCHES + 1
 
 
-def test_neighboring_key_frames_are_merged_into_their_middle_one():
-    """Looks are as far apart as the merge rule's gap, so that neighbors join."""
+@pytest.mark.parametrize(
+    ("chosen", "kept"),
+    [
+        ([[5, 6, 7], [20, 21], [23, 40]], [6, 21, 23, 40]),
+        ([[5, 6, 7], [20, 21], [23, 40], [22]], [6, 22, 40]),
+    ],
+    ids=["neighbors", "one between two groups"],
+)
+def test_neighboring_key_frames_are_merged_into_their_middle_one(chosen, kept):
+    """Looks are as far apart as the merge rule's gap; of an even group the later middle counts."""
     history = KeyframeHistory(3)
-    history.choose([5, 6, 7])
-    history.choose([20, 21])
-    history.choose([23, 40])
-    kept = history.kept(video=0, look=60)
+    for looks in chosen:
+        history.choose(looks)
 
-    assert kept[:4].tolist() == [6, 21, 23, 40]
-    assert kept[4 : 4 + RECENT].tolist() == recent_looks(60)
+    found = history.kept(video=0, look=60)
 
-    history.choose([22])  # joins what was apart, as of an even group the later one counts
-    assert history.kept(video=0, look=60)[:3].tolist() == [6, 22, 40]
+    assert found[: len(kept)].tolist() == kept
 
+
+def test_at_most_a_fixed_number_of_key_frames_is_kept():
+    history = KeyframeHistory(3)
     history.choose(range(100, 200, 2))
-    assert (history.kept(video=50, look=300) >= 0).sum() == VIDEO_FRAMES + MAX_CHOSEN + RECENT
+
+    found = history.kept(video=50, look=300)
+
+    assert (found >= 0).sum() == VIDEO_FRAMES + MAX_CHOSEN + RECENT
+
+
+def test_a_planner_with_key_frames_sees_the_recent_looks_too():
+    history = KeyframeHistory(3)
+    history.choose([6])
+
+    found = history.kept(video=0, look=60)
+
+    assert found[: 1 + RECENT].tolist() == [6, *recent_looks(60)]
 
 
 def test_training_inputs_equal_those_of_a_planner_that_is_always_right():
