@@ -109,14 +109,11 @@ def test_each_split_has_its_own_row_of_chance():
 
     both = table_of("main", test, val, floors=(CHANCE,))
 
-    rates = []
-    for split, results in (("test", test), ("val", val)):
-        alone = table_of("main", results, floors=(CHANCE,))
-        row = entries_of_row(both, "direct", f"{CHANCE}, split {split}", "chance")
-        row_alone = entries_of_row(alone, "direct", CHANCE, "chance")
-        assert row["BinFill"].percent == row_alone["BinFill"].percent
-        rates.append(row["BinFill"].percent)
-    assert rates[0] != rates[1]
+    of_test = entries_of_row(both, "direct", f"{CHANCE}, split test", "chance")["BinFill"]
+    of_val = entries_of_row(both, "direct", f"{CHANCE}, split val", "chance")["BinFill"]
+    alone = entries_of_row(table_of("main", test, floors=(CHANCE,)), "direct", CHANCE, "chance")
+    assert of_test.percent == alone["BinFill"].percent
+    assert of_val.percent != of_test.percent
 
 
 def informative_tables(*results):
@@ -263,12 +260,13 @@ def test_results_in_simulation_are_marked_and_kept_apart_from_those_of_a_real_ro
 
 def test_the_note_on_averages_counts_the_tasks_of_the_run_next_to_published_rows():
     """Two tasks were played, and one of them has no spatial setting; the paper has 7 of 11."""
-    results = []
-    for task, settings in (("StopCube", ["explicit"]), ("PickXtimes", ["explicit", "spatial"])):
-        for setting in settings:
-            results += make_results("10", setting, task=task)
+    results = [
+        *make_results("10", "explicit", task="StopCube"),
+        *make_results("10", "explicit", task="PickXtimes"),
+        *make_results("10", "spatial", task="PickXtimes"),
+    ]
 
-    notes = make_table("main", RunData(frame_of(results)), published=True).notes
+    notes = table_of("main", results, published=True).notes
 
     (note,) = [note for note in notes if note.startswith("Averages of spatial")]
     assert "over the 1 of 2 tasks that have it" in note
@@ -277,15 +275,17 @@ def test_the_note_on_averages_counts_the_tasks_of_the_run_next_to_published_rows
 @pytest.mark.parametrize(
     "difference",
     [{"split": "val"}, {"max_steps": 900}, {"language_version": "2"}, {"episode": 5}],
-    ids=lambda difference: next(iter(difference)),
+    ids=["split", "step limit", "language", "episodes"],
 )
 def test_no_rate_is_bold_against_one_of_another_split_limit_version_or_other_episodes(difference):
-    good = [make_result("success", policy="good"), make_result("success", 1, policy="good")]
-    poor = [make_result("failure", policy="poor"), make_result("failure", 1, policy="poor")]
-    others = [make_result(**{"outcome": "failure", "policy": "poor", **difference})]
+    good = make_results("11", policy="good")
+    other = [make_result("failure", policy="poor", **difference)]
 
-    alike = table_of("main", good, poor)
-    apart = table_of("main", good, others)
+    assert "**" not in get_format("markdown").draw(table_of("main", good, other))
 
-    assert "**100.00**" in get_format("markdown").draw(alike)
-    assert "**" not in get_format("markdown").draw(apart)
+
+def test_the_best_rate_of_the_same_episodes_is_bold():
+    good = make_results("11", policy="good")
+    poor = make_results("00", policy="poor")
+
+    assert "**100.00**" in get_format("markdown").draw(table_of("main", good, poor))

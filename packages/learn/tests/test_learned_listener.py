@@ -94,20 +94,25 @@ def test_digits_are_read_as_words():
     assert "57" in split_words(said)
 
 
-def test_intervals_grow_with_the_differences_between_trainings():
-    """Rates of 11 tasks, each trained with three seeds on 50 episodes."""
-    rng = np.random.default_rng(0)
-    tasks = [(rng.random((3, 50)) < 0.8).astype(float) for _ in range(11)]
+def test_three_trainings_that_agree_have_the_interval_of_a_single_one():
+    """A row is a training, a column an episode: 40 of 50 are right."""
+    single = np.array([[1.0] * 40 + [0.0] * 10])
 
-    alike = trained_rate([np.tile(task[:1], (3, 1)) for task in tasks])
-    single = trained_rate([task[:1] for task in tasks])
-    assert alike.rate == pytest.approx(single.rate)
-    assert alike.interval == pytest.approx(single.interval)
+    alike = trained_rate([np.tile(single, (3, 1))])
 
-    apart = trained_rate([task * [[1], [1], [0.5]] for task in tasks])
-    assert len(set(apart.by_seed)) == 3
-    low, high = apart.interval
-    assert low < min(apart.by_seed) < max(apart.by_seed) < high
+    assert alike.rate == pytest.approx(0.8)
+    assert alike.interval == pytest.approx(trained_rate([single]).interval)
+
+
+def test_the_interval_of_trainings_that_differ_contains_each_of_their_rates():
+    """Three trainings are right in 40, 40 and 20 of 50 episodes."""
+    trainings = np.array([[1.0] * 40 + [0.0] * 10] * 2 + [[1.0] * 20 + [0.0] * 30])
+
+    found = trained_rate([trainings])
+
+    low, high = found.interval
+    assert low < 0.4
+    assert high > 0.8
 
 
 def test_a_rate_of_one_has_an_interval_below_it():

@@ -195,25 +195,44 @@ def test_a_planner_with_key_frames_sees_the_recent_looks_too():
     assert found[: 1 + RECENT].tolist() == [6, *recent_looks(60)]
 
 
-def test_training_inputs_equal_those_of_a_planner_that_is_always_right():
+@pytest.fixture
+def inputs_of_five_looks():
+    """What a planner learns from looks 1, 4, 6, 9, 12, at which templates 0, 0, 1, 1, 0 are due."""
     templates = np.array([0, 0, 1, 1, 0])
-    looks = np.array([1, 4, 6, 9, 12])
-    inputs = ideal_planner_inputs(KeyframeHistory(2), templates, looks, 0)
+    return ideal_planner_inputs(KeyframeHistory(2), templates, np.array([1, 4, 6, 9, 12]), 0)
+
+
+def test_training_inputs_equal_those_of_a_planner_that_is_always_right(inputs_of_five_looks):
+    """Before its third answer, at look 6, it has named template 0 at looks 1 and 4."""
     history = KeyframeHistory(2)
-    for number, (template, look) in enumerate(zip(templates, looks, strict=True)):
-        assert np.array_equal(inputs.context[number], history.context(look))
-        assert np.array_equal(inputs.kept_looks[number], history.kept(0, look))
-        history.name(template, look)
-        if look in history.switches:
-            history.choose([look])
+    history.name(0, 1)
+    history.choose([1])
+    history.name(0, 4)
 
-    assert inputs.to_keep[:, -1].tolist() == [1, 0, 1, 0, 1]
+    assert np.array_equal(inputs_of_five_looks.context[2], history.context(6))
+    assert np.array_equal(inputs_of_five_looks.kept_looks[2], history.kept(0, 6))
 
-    unasked = ideal_planner_inputs(KeyframeHistory(2), np.array([0, -1, 1]), np.array([1, 2, 6]), 0)
+
+def test_a_planner_learns_to_keep_the_looks_at_which_the_subgoal_changes(inputs_of_five_looks):
+    """The last column is the current look; the first has none of the recent looks before it."""
+    to_keep = inputs_of_five_looks.to_keep
+
+    assert to_keep[:, -1].tolist() == [1, 0, 1, 0, 1]
+    assert to_keep[0, :-2].tolist() == [-1] * (RECENT - 2)
+    (kept_at_look_9,) = np.flatnonzero(to_keep[3] == 1)
+    assert recent_looks(9)[kept_at_look_9] == 6
+
+
+def test_a_look_at_which_no_subgoal_is_due_teaches_nothing():
+    """A template of -1 is none: what comes after looks as if nothing had been asked."""
+    looks = np.array([1, 2, 6])
+
+    unasked = ideal_planner_inputs(KeyframeHistory(2), np.array([0, -1, 1]), looks, 0)
+
     assert (unasked.to_keep[1] == -1).all()
-    assert np.array_equal(unasked.context[2], inputs.context[2])
-    assert inputs.to_keep[0, :-2].tolist() == [-1] * (RECENT - 2)
-    assert [recent_looks(9)[index] for index in np.flatnonzero(inputs.to_keep[3] == 1)] == [6]
+    history = KeyframeHistory(2)
+    history.name(0, 1)
+    assert np.array_equal(unasked.context[2], history.context(6))
 
 
 @pytest.fixture(params=["subgoal", "keyframes"])
