@@ -84,10 +84,11 @@ def figure_named(data, name):
 @pytest.mark.parametrize(
     ("acts", "use", "habit"),
     [
-        pytest.param(DOES_WHAT_IT_HEARS, 1.0, 0.0, id="does what it hears"),
-        pytest.param(SAME_GOAL_IN_EVERY_ARM, 0.0, 1.0, id="always its own goal"),
-        pytest.param(ALWAYS_THE_OTHER_GOAL, 0.0, 1.0, id="always the other goal"),
+        (DOES_WHAT_IT_HEARS, 1.0, 0.0),
+        (SAME_GOAL_IN_EVERY_ARM, 0.0, 1.0),
+        (ALWAYS_THE_OTHER_GOAL, 0.0, 1.0),
     ],
+    ids=["does what it hears", "always its own goal", "always the other goal"],
 )
 def test_who_follows_the_words_is_told_from_who_does_the_same_whatever_it_hears(acts, use, habit):
     """*Language use* is a difference of two rates in the arm *other-goal*.
@@ -111,9 +112,10 @@ def test_who_follows_the_words_is_told_from_who_does_the_same_whatever_it_hears(
 @pytest.mark.parametrize(
     ("acts", "worth"),
     [
-        pytest.param(DOES_WHAT_IT_HEARS, 1.0, id="does what it hears"),
-        pytest.param(SAME_GOAL_IN_EVERY_ARM, 0.0, id="always its own goal"),
+        (DOES_WHAT_IT_HEARS, 1.0),
+        (SAME_GOAL_IN_EVERY_ARM, 0.0),
     ],
+    ids=["does what it hears", "always its own goal"],
 )
 def test_words_are_worth_what_success_loses_in_silence_and_their_order_when_scrambled(
     contrast, acts, worth

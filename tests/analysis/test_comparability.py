@@ -98,10 +98,11 @@ def test_a_planned_trial_counts_as_played_although_policy_and_words_came_from_an
 @pytest.mark.parametrize(
     ("fields", "reason"),
     [
-        pytest.param({"settings": ("direct",)}, IMPLICIT, id="implicit setting"),
-        pytest.param({"tasks": ("PutInBox",)}, REAL, id="task of the paper's real robot"),
-        pytest.param({"tasks": ("Outside",)}, None, id="task in no table of the paper"),
+        ({"settings": ("direct",)}, IMPLICIT),
+        ({"tasks": ("PutInBox",)}, REAL),
+        ({"tasks": ("Outside",)}, None),
     ],
+    ids=["implicit setting", "task of the paper's real robot", "task in no table of the paper"],
 )
 def test_implicit_settings_real_robots_and_unknown_tasks_have_their_own_reasons(fields, reason):
     assert named_differences(results_like_the_papers(**fields)) == reason

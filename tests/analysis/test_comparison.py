@@ -161,11 +161,10 @@ def test_policies_without_a_common_episode_are_refused(changes):
 @pytest.mark.parametrize(
     ("added", "reason"),
     [
-        pytest.param(results("11"), "name one as RUN:forgetful", id="two policies"),
-        pytest.param(
-            make_results("--1", policy_version="2"), "in several versions", id="two versions"
-        ),
+        (results("11"), "name one as RUN:forgetful"),
+        (make_results("--1", policy_version="2"), "in several versions"),
     ],
+    ids=["two policies", "two versions"],
 )
 def test_each_side_of_a_comparison_must_be_one_policy_of_one_version(added, reason):
     listener = make_results("11")

@@ -192,9 +192,10 @@ def test_a_policy_that_lacks_a_planned_trial_is_marked_as_incomplete():
 @pytest.mark.parametrize(
     ("rate", "ends"),
     [
-        pytest.param(Rate(0.5, None, Interval(0.25, 0.625)), [25, 62.5], id="rate"),
-        pytest.param(Rate(0.5, 0.75, Interval(-0.375, -0.125)), [37.5, 62.5], id="difference"),
+        (Rate(0.5, None, Interval(0.25, 0.625)), [25, 62.5]),
+        (Rate(0.5, 0.75, Interval(-0.375, -0.125)), [37.5, 62.5]),
     ],
+    ids=["rate", "difference"],
 )
 def test_an_interval_is_drawn_around_its_rate(rate, ends):
     """Of a difference to a reference, 0.75, it is added to the reference: 0.75 - 0.375 = 37.5 %."""

@@ -137,10 +137,11 @@ def test_a_second_setting_on_the_same_episodes_does_not_narrow_the_interval():
 @pytest.mark.parametrize(
     ("played", "settings"),
     [
-        pytest.param(("reasoning", "spatial"), SETTINGS, id="no explicit results"),
-        pytest.param(("explicit", "reasoning"), SETTINGS, id="a setting was not played"),
-        pytest.param(("explicit", "reasoning"), (), id="no setting counts"),
+        (("reasoning", "spatial"), SETTINGS),
+        (("explicit", "reasoning"), SETTINGS),
+        (("explicit", "reasoning"), ()),
     ],
+    ids=["no explicit results", "a setting was not played", "no setting counts"],
 )
 def test_there_is_no_headline_without_explicit_or_without_one_of_its_settings(played, settings):
     results = []
@@ -179,20 +180,19 @@ def test_a_headline_is_called_incomplete_if_an_episode_behind_it_ended_in_an_err
 @pytest.mark.parametrize(
     ("wins", "fields", "reason"),
     [
-        pytest.param("1", {}, "1 episode cannot give it an interval; play more.", id="one episode"),
-        pytest.param(
+        ("1", {}, "1 episode cannot give it an interval; play more."),
+        (
             "1111",
             {"language_version": "0.9"},
             "no floors were measured for its language",
-            id="a language without floors",
         ),
-        pytest.param(
+        (
             "1111",
             {"wordings": "robomme@1a2b3c4d"},
             "the floors are those of our own words of",
-            id="words of a file",
         ),
     ],
+    ids=["one episode", "a language without floors", "words of a file"],
 )
 def test_a_policy_without_a_headline_has_the_reason_below_its_table(wins, fields, reason):
     results = []

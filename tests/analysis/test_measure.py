@@ -135,27 +135,30 @@ def test_implicit_and_resolved_instructions_are_pooled_if_the_call_asks_for_it(f
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
-        pytest.param({"by": ["polcy"]}, "There is no column 'polcy'", id="unknown column"),
-        pytest.param(
+        ({"by": ["polcy"]}, "There is no column 'polcy'"),
+        (
             {"by": ["policy"], "family": ["task"]},
             "The column 'task' is not in by: policy.",
-            id="a family outside of by",
         ),
-        pytest.param(
+        (
             {"by": ["policy"], "against": {"setting": "direct"}},
             "'setting' is not in by",
-            id="a reference outside of by",
         ),
-        pytest.param(
+        (
             {"by": ["setting"], "against": {"setting": "drect"}},
             "no row with the setting 'drect'",
-            id="unknown reference",
         ),
-        pytest.param(
+        (
             {"by": ["setting"]},
             r"over several values of policy \(forgetful, listener\): add 'policy' to by",
-            id="two policies in a group",
         ),
+    ],
+    ids=[
+        "unknown column",
+        "a family outside of by",
+        "a reference outside of by",
+        "unknown reference",
+        "two policies in a group",
     ],
 )
 def test_a_call_that_asks_for_what_is_not_there_is_refused_with_the_reason(

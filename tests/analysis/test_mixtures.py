@@ -139,9 +139,10 @@ def test_runs_on_other_devices_or_of_other_policy_versions_are_compared(fields, 
 @pytest.mark.parametrize(
     "other_fields",
     [
-        pytest.param({"verdict_code": "0a", "package_version": "1"}, id="same digest"),
-        pytest.param({"verdict_code": None}, id="no digest, same package version"),
+        {"verdict_code": "0a", "package_version": "1"},
+        {"verdict_code": None},
     ],
+    ids=["same digest", "no digest, same package version"],
 )
 def test_a_change_of_code_is_not_reported_if_the_code_that_decides_verdicts_is_the_same(
     other_fields,

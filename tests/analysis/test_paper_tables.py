@@ -125,23 +125,26 @@ def informative_tables(*results):
 @pytest.mark.parametrize(
     ("results", "tables"),
     [
-        pytest.param([make_result(task="PutInBox")], {"real"}, id="task of the real robot"),
-        pytest.param([make_result(task="Outside")], {"other"}, id="task of another package"),
-        pytest.param(results_of_all_tasks(), {"main"}, id="a policy"),
-        pytest.param(
-            results_of_all_tasks(settings=("explicit", "contextual")), {"main"}, id="a length"
-        ),
-        pytest.param(
-            [make_result(arm="silent"), *results_of_all_tasks()], {"main"}, id="a control arm"
-        ),
-        pytest.param(
+        ([make_result(task="PutInBox")], {"real"}),
+        ([make_result(task="Outside")], {"other"}),
+        (results_of_all_tasks(), {"main"}),
+        (results_of_all_tasks(settings=("explicit", "contextual")), {"main"}),
+        ([make_result(arm="silent"), *results_of_all_tasks()], {"main"}),
+        (
             [
                 *results_of_all_tasks(settings=("contextual",)),
                 *results_of_all_tasks(settings=("contextual",), stages=(1, 5)),
             ],
             {"main", "context"},
-            id="two lengths of the context",
         ),
+    ],
+    ids=[
+        "task of the real robot",
+        "task of another package",
+        "a policy",
+        "a length",
+        "a control arm",
+        "two lengths of the context",
     ],
 )
 def test_tables_without_a_choice_are_those_for_which_a_run_has_something_to_compare(

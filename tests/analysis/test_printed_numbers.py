@@ -212,9 +212,10 @@ def test_no_printed_interval_has_a_width_of_zero(wins):
 @pytest.mark.parametrize(
     ("wins", "ends"),
     [
-        pytest.param("1", "too few episodes", id="one episode"),
-        pytest.param("1" * 20, "−100.0 to −66.4", id="20 episodes"),
+        ("1", "too few episodes"),
+        ("1" * 20, "−100.0 to −66.4"),
     ],
+    ids=["one episode", "20 episodes"],
 )
 def test_a_gap_in_a_breakdown_has_an_interval_or_the_reason_why_there_is_none(wins, ends):
     """All explicit episodes are won, all direct ones lost: a gap of −100 points."""

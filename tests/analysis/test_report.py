@@ -135,10 +135,11 @@ def test_an_episode_shows_where_in_its_instruction_mentions_stand():
 @pytest.mark.parametrize(
     ("changes", "missing"),
     [
-        pytest.param({}, set(), id="this version"),
-        pytest.param({"language_version": "0.1"}, {"resolved"}, id="other language"),
-        pytest.param({"environment_version": 9}, {"resolved", "stages"}, id="other environment"),
+        ({}, set()),
+        ({"language_version": "0.1"}, {"resolved"}),
+        ({"environment_version": 9}, {"resolved", "stages"}),
     ],
+    ids=["this version", "other language", "other environment"],
 )
 def test_records_of_other_versions_are_shown_without_what_cannot_be_derived(changes, missing):
     """Another version of the language may have other words, of the environment other stages."""

@@ -139,20 +139,19 @@ def results_that_ended(letters, setting):
 @pytest.mark.parametrize(
     ("explicit", "direct", "rates", "changes", "shares"),
     [
-        pytest.param(
-            "ssssssssgx", "sssssgggxu", "50 30 10 10", "−30 +20 ±0 +10", "60–80 50", id="each kind"
+        (
+            "ssssssssgx", "sssssgggxu", "50 30 10 10", "−30 +20 ±0 +10", "60–80 50"
         ),
-        pytest.param(
+        (
             "ssssssssgx", "sssssggg-u", "50 30 0 20", "−30 +20 −10 +20", "60–100 50",
-            id="not attributed",
         ),
-        pytest.param(
-            "gg!sssxxss", "x!ssssssss", "89 0 11 0", "+25 −12 −12 ±0", "0 50", id="errors"
+        (
+            "gg!sssxxss", "x!ssssssss", "89 0 11 0", "+25 −12 −12 ±0", "0 50"
         ),
-        pytest.param(
-            "ssssssssss", "sssssssssg", "90 10 0 0", "−10 +10 ±0 ±0", "100 –", id="one failure"
+        (
+            "ssssssssss", "sssssssssg", "90 10 0 0", "−10 +10 ±0 ±0", "100 –"
         ),
-    ],
+    ], ids=["each kind", "not attributed", "errors", "one failure"],
 )  # fmt: skip
 def test_success_and_three_kinds_of_failure_add_up_to_100_and_their_changes_to_0(
     explicit, direct, rates, changes, shares

@@ -51,3 +51,14 @@ def without_landmark(episode):
         for index, item in enumerate(episode.scene.objects)
     )
     return replace(episode, scene=replace(episode.scene, objects=objects))
+
+
+def containers(*places):
+    """Return a scene with container_0, container_1 … at points (x, y) in meters.
+
+    The robot is at smaller x and looks along x; its left is positive y.
+    """
+    objects = []
+    for number, (x, y) in enumerate(places):
+        objects.append(SceneObject(f"container_{number}", "container", Point(x, y, 0.05)))
+    return Scene(tuple(objects))

@@ -28,13 +28,6 @@ def options_by_setting(task):
 
 
 @each_task
-def test_no_combination_of_language_options_is_offered_twice(task):
-    """Options are setting, form, stages, kind of distractor, and frame of reference."""
-    options = list(variants.expressible_options(get_episode(task, "test", 0)))
-    assert len(set(options)) == len(options)
-
-
-@each_task
 def test_a_task_offers_every_combination_of_language_options(task):
     """In two forms each: three settings; eight kinds of contextual dialogues, by stages and kind
     of distractor; spatial in two frames, where the task has it."""

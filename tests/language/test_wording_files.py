@@ -4,7 +4,6 @@ An open file has an identity, ``hand@1a2b3c4d``: its name and a digest of what i
 """
 
 import contextlib
-import itertools
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -241,15 +240,6 @@ def test_the_identity_of_an_open_file_is_its_name_and_a_digest(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text(COMMAND_FILE_OF_THE_PAGE)
     assert re.fullmatch("workshop@[0-9a-f]{8}", open_wordings(file))
-
-
-def test_what_the_example_file_of_the_documentation_says_means_the_goal():
-    """In the settings that its command and scenarios serve, in both forms."""
-    identity = identity_of(COMMAND_FILE_OF_THE_PAGE)
-    for episode in train_episodes("PickXtimes", 0, 100):
-        for setting, form in itertools.product(("explicit", "direct", "contextual"), FORMS):
-            said = instruct(episode, setting, form, wordings=identity)
-            assert understood_goals(said, episode) == (episode.goal,), said.text
 
 
 def test_the_text_that_the_documentation_quotes_is_said_in_a_training_episode():

@@ -117,12 +117,11 @@ FLOATS = np.array([[0, 1, 2], [3, 4, 5]], np.float32)
 @pytest.mark.parametrize(
     ("encoded", "decoded"),
     [
-        pytest.param(
+        (
             {"__ndarray__": True, "dtype": "<f4", "data": FLOATS.tobytes(), "shape": (2, 3)},
             FLOATS.tolist(),
-            id="keys of text",
         ),
-        pytest.param(
+        (
             {
                 b"nd": True,
                 b"type": "<f4",
@@ -131,14 +130,13 @@ FLOATS = np.array([[0, 1, 2], [3, 4, 5]], np.float32)
                 b"shape": (2, 3),
             },
             FLOATS.tolist(),
-            id="array of msgpack-numpy",
         ),
-        pytest.param(
+        (
             {b"nd": False, b"type": "<f4", b"data": b"\0\0\0\x3f"},
             0.5,
-            id="number of msgpack-numpy",
         ),
     ],
+    ids=["keys of text", "array of msgpack-numpy", "number of msgpack-numpy"],
 )
 def test_arrays_encoded_by_other_packages_are_decoded(encoded, decoded):
     found = unpack(msgpack.packb({"x": encoded}))["x"]

@@ -74,28 +74,21 @@ def test_the_schema_for_a_model_s_answer_has_exactly_the_goals_that_occur(task):
         assert slots.read(slots.answers[goal]) == goal
 
 
+COLORS = {"type": "string", "enum": ["blue", "green", "red"]}
+
+
 @pytest.mark.parametrize(
-    ("task", "answer"),
+    ("task", "fields"),
     [
-        ("PickXtimes", {"color": "red", "repeats": 2}),
-        ("VideoUnmask", {"colors": ["red", "blue"]}),
-        ("BinFill", {"red": 1, "blue": 0, "green": 2}),
+        ("PickXtimes", {"color": COLORS, "repeats": {"type": "integer", "enum": [1, 2, 3, 4, 5]}}),
+        (
+            "VideoUnmask",
+            {"colors": {"type": "array", "items": COLORS, "minItems": 1, "maxItems": 2}},
+        ),
     ],
 )
-def test_the_json_schema_allows_the_fields_and_values_of_an_answer(task, answer):
-    """The schema is sent to models: each field is a value of a list, or an array of such values."""
-    schema = goal_schema(task)
-    fields = schema.schema()["properties"]
-
-    assert json.dumps(answer) in schema.answers.values()
-    assert fields.keys() == answer.keys()
-    for name, value in answer.items():
-        field = fields[name]
-        if isinstance(value, list):
-            assert set(value) <= set(field["items"]["enum"])
-            assert field["minItems"] <= len(value) <= field["maxItems"]
-        else:
-            assert value in field["enum"]
+def test_the_json_schema_for_a_model_lists_the_values_of_each_field_of_an_answer(task, fields):
+    assert goal_schema(task).schema()["properties"] == fields
 
 
 @settings(max_examples=25)
