@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from roboirg.core.episode import SPLITS, Point
+from roboirg.core.episode import SPLITS, Point, Scene, SceneObject
 from roboirg.language import instruct_with
 from roboirg.language.generator import find_refusal
 from roboirg.language.settings import plain_settings, settings_of
