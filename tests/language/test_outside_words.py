@@ -172,42 +172,59 @@ def package(tmp_path_factory):
     return InstalledPackage(tmp_path_factory.mktemp("package"))
 
 
-EACH_TASK_AND_POOL = """
+def test_the_setting_of_the_documentation_page_speaks_the_words_of_its_own_file(package):
+    """The page's file has the scenarios "new coat" for training and "loan" for tests."""
+    found = package.run("""
 for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
     episode = get_episode(task, "test", 1)
-    options = InstructionOptions("colored", wordings=pool)
-    said = instruct_with(episode, options)
-"""
-"""Says an episode of both tasks of the setting "colored", in the words of training and of tests."""
+    said = instruct_with(episode, InstructionOptions("colored", wordings=pool))
+    found.append([task, pool, said.metadata["scenario"]])
+""")
+
+    assert found == [
+        ["PickXtimes", "train", "new coat"],
+        ["PickXtimes", "test", "loan"],
+        ["SwingXtimes", "train", "new coat"],
+        ["SwingXtimes", "test", "loan"],
+    ]
 
 
-def test_the_setting_of_the_documentation_page_speaks_the_words_of_its_own_file(package):
-    """The page's file has the scenarios "new coat" for training and "loan" for tests.
+def test_an_instruction_in_the_setting_of_the_documentation_page_names_the_digest_of_its_words(
+    package,
+):
+    (found,) = package.run("""
+said = instruct(get_episode("PickXtimes", "test", 1), "colored")
+found.append([said.metadata["words"], words_of("PickXtimes", "test", "colored")])
+""")
 
-    An instruction names the digest of the words.
-    """
-    found = package.run(
-        EACH_TASK_AND_POOL
-        + """
-    assert said.metadata["words"] == words_of(task, pool, "colored")
-    found.append(said.metadata["scenario"])
-"""
-    )
-    assert found == ["new coat", "loan", "new coat", "loan"]
+    in_metadata, digest = found
+    assert in_metadata == digest
 
 
-def test_the_setting_of_the_documentation_page_means_the_goal_and_states_it_when_resolved(package):
-    """The resolved form has the same introduction, and then the explicit command."""
-    found = package.run(
-        EACH_TASK_AND_POOL
-        + """
+@pytest.mark.parametrize("task", ["PickXtimes", "SwingXtimes"])
+def test_the_setting_of_the_documentation_page_means_the_goal(package, task):
+    found = package.run(f"""
+episode = get_episode("{task}", "test", 1)
+for pool in POOLS:
+    said = instruct(episode, "colored", wordings=pool)
     found.append(understood_goals(said, episode) == (episode.goal,))
-    resolved = instruct_with(episode, replace(options, form="resolved"))
-    explicit = instruct_with(episode, replace(options, setting="explicit"))
-    found.append(resolved.turns == (said.turns[0], explicit.text))
-"""
-    )
-    assert found == [True] * 8
+""")
+
+    assert found == [True, True]
+
+
+def test_the_setting_of_the_documentation_page_ends_with_the_explicit_command_when_resolved(
+    package,
+):
+    """The resolved form has the same introduction."""
+    (turns,) = package.run("""
+episode = get_episode("PickXtimes", "test", 1)
+resolved = instruct(episode, "colored", "resolved").turns
+found.append([resolved, instruct(episode, "colored").turns, instruct(episode).text])
+""")
+
+    resolved, implicit, explicit_command = turns
+    assert resolved == [implicit[0], explicit_command]
 
 
 def test_the_words_of_the_setting_of_the_documentation_page_break_no_rule(package):
@@ -283,25 +300,16 @@ def complete_package(tmp_path_factory):
     return outside
 
 
-EACH_INSTRUCTION = """
-task = get_task("PlaceAndPress")
-for split, index, setting in itertools.product(("train", "test"), range(12), settings_of(task)):
-    episode = get_episode(task.name, split, index)
-    options = InstructionOptions(setting)
-    if find_refusal(episode, options) is not None:
-        continue
-"""
-"""Goes through twelve episodes of each split in every setting that can express them."""
-
-
 def test_a_task_of_another_package_can_be_commanded_in_every_setting(complete_package):
     """In the words of training and of tests."""
-    found = complete_package.run(
-        EACH_INSTRUCTION
-        + """
-    found.append(f"{setting} in {split}")
-"""
-    )
+    found = complete_package.run("""
+for split, setting in itertools.product(("train", "test"), settings_of(get_task("PlaceAndPress"))):
+    for index in range(12):
+        episode = get_episode("PlaceAndPress", split, index)
+        if find_refusal(episode, InstructionOptions(setting)) is None:
+            found.append(f"{setting} in {split}")
+""")
+
     assert sorted(set(found)) == [
         "contextual in test", "contextual in train",
         "direct in test", "direct in train",
@@ -314,15 +322,17 @@ def test_a_task_of_another_package_can_be_commanded_in_every_setting(complete_pa
 
 def test_the_words_of_a_task_of_another_package_mean_the_goal_in_both_forms(complete_package):
     """Collects the texts that mean another goal, or several."""
-    wrong = complete_package.run(
-        EACH_INSTRUCTION
-        + """
-    for form in FORMS:
-        said = instruct_with(episode, replace(options, form=form))
-        if understood_goals(said, episode) != (episode.goal,):
-            found.append(said.text)
-"""
-    )
+    wrong = complete_package.run("""
+for split, index in itertools.product(("train", "test"), range(12)):
+    episode = get_episode("PlaceAndPress", split, index)
+    for setting, form in itertools.product(settings_of(get_task("PlaceAndPress")), FORMS):
+        options = InstructionOptions(setting, form)
+        if find_refusal(episode, options) is None:
+            said = instruct_with(episode, options)
+            if understood_goals(said, episode) != (episode.goal,):
+                found.append(said.text)
+""")
+
     assert wrong == []
 
 
@@ -331,16 +341,19 @@ def test_a_task_of_another_package_has_every_control_run(complete_package):
 
     Only a paraphrase may lack, where a setting has one text for an episode.
     """
-    refusals = complete_package.run(
-        EACH_INSTRUCTION
-        + """
-    for arm in ("paraphrase-1", "other-goal", "silent", "scrambled", "again"):
-        try:
-            said = index < 2 and say_arm(episode, options, arm)
-        except InvalidValueError as error:
-            found.append(str(error))
-"""
-    )
+    refusals = complete_package.run("""
+arms = ("paraphrase-1", "other-goal", "silent", "scrambled", "again")
+for split, setting in itertools.product(("train", "test"), settings_of(get_task("PlaceAndPress"))):
+    episode = get_episode("PlaceAndPress", split, 0)
+    options = InstructionOptions(setting)
+    if find_refusal(episode, options) is None:
+        for arm in arms:
+            try:
+                say_arm(episode, options, arm)
+            except InvalidValueError as error:
+                found.append(str(error))
+""")
+
     for refusal in refusals:
         assert "has no paraphrase" in refusal
 
