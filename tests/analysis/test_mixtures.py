@@ -26,9 +26,6 @@ UNFAIR_DIFFERENCES = [
     ),
 ]
 """Fields of a run that differ from the usual ones, and how the difference is named."""
-OLD_WORDS = "PickXtimes/test@0a"
-NEW_WORDS = "PickXtimes/test@1b"
-"""Words are known by a digest for each task: 0a and 1b."""
 DIFFERENCES_OF_ONE_POLICY = [
     pytest.param(
         {"policy_version": "new"}, "Mixed versions of listener: new, unknown.", id="version"
@@ -155,23 +152,24 @@ def test_a_change_of_code_is_not_reported_if_the_code_that_decides_verdicts_is_t
 
 
 def test_results_of_one_task_in_other_words_are_not_compared():
-    old = frame_of([make_result(words=OLD_WORDS)])
-    new = frame_of([make_result(words=NEW_WORDS)])
+    """Words are known by a digest for each task, here 0a and 1b."""
+    old = frame_of([make_result(words="PickXtimes/test@0a")])
+    new = frame_of([make_result(words="PickXtimes/test@1b")])
 
-    with pytest.raises(InvalidValueError, match=f"{OLD_WORDS}, {NEW_WORDS}"):
+    with pytest.raises(InvalidValueError, match="PickXtimes/test@0a, PickXtimes/test@1b"):
         compare(old, new)
 
 
 def test_results_of_one_task_in_other_words_are_pooled_in_a_table():
-    old = make_result(words=OLD_WORDS)
-    new = make_result(words=NEW_WORDS, episode=1)
+    old = make_result(words="PickXtimes/test@0a")
+    new = make_result(words="PickXtimes/test@1b", episode=1)
 
     assert len(make_frame([("a", [old]), ("b", [new])]).names) == 1
 
 
 def test_words_are_mixed_only_if_they_are_of_the_same_task_and_setting():
     """Another task, or a setting of another package ("lab"), has words of its own anyway."""
-    first = make_result(words=OLD_WORDS)
+    first = make_result(words="PickXtimes/test@0a")
     other_task = make_result(words="StopCube/test@2c", task="StopCube")
     own_words = make_result(words="PickXtimes/test/lab@3d", setting="lab")
 
@@ -188,7 +186,7 @@ def test_two_digests_of_the_words_of_a_setting_are_mixed():
 
 
 def test_words_of_a_file_are_reported_once_although_their_digest_differs_too():
-    first = make_result(words=OLD_WORDS)
-    other_words = make_result(words=NEW_WORDS, wordings="mine@0a")
+    first = make_result(words="PickXtimes/test@0a")
+    other_words = make_result(words="PickXtimes/test@1b", wordings="mine@0a")
 
     assert len(mixtures([first, other_words])) == 1
