@@ -19,7 +19,6 @@ from roboirg.language.arms import say_arm
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction import Described, Meaning, Term
 from roboirg.language.landmarks import candidates_in
-from roboirg.language.request import values_of_goal
 from roboirg.language.scenarios.scenario_file import written_words
 from roboirg.language.settings import settings_of
 from roboirg.shortcuts.command_chance import (
@@ -133,21 +132,6 @@ def test_explicit_and_resolved_commands_mean_the_right_goal_without_their_introd
             assert mean_the_right_goal(goals, episode), said.text
 
 
-def test_an_implicit_command_needs_its_introduction_unless_the_scene_has_one_choice(published):
-    """*Lift it twice* alone leaves the color open, unless all cubes have the same color.
-
-    Left out are commands whose singular agrees with the number one only: *once for that take*.
-    """
-    for episode, options, said in published:
-        is_implicit = options.setting != "explicit" and options.form == "implicit"
-        if not is_implicit or any(said.meaning.agrees.values()):
-            continue
-        if mean_the_right_goal(goals_of_command(said, episode), episode):
-            pointed_at = said.meaning.terms.keys() - said.meaning.settled
-            for field in pointed_at:
-                assert len(values_possible(field, episode)) == 1, said.text
-
-
 def test_where_two_values_are_offered_no_singular_gives_the_number_one_away(published):
     """After *once or twice*, *for that time* would tell that once is meant."""
     for _, options, said in published:
@@ -155,30 +139,17 @@ def test_where_two_values_are_offered_no_singular_gives_the_number_one_away(publ
             assert not any(said.meaning.agrees.values()), said.text
 
 
-@pytest.mark.parametrize("speaks_of_one", [True, False])
-def test_singular_words_leave_the_goals_of_one_and_plural_words_the_others(speaks_of_one):
-    """*Once for that take*, or *for each take*."""
+@pytest.mark.parametrize(
+    ("speaks_of_one", "repeats"), [(True, {1}), (False, {2, 3, 4, 5})], ids=["True", "False"]
+)
+def test_singular_words_leave_the_goals_of_one_and_plural_words_the_others(speaks_of_one, repeats):
+    """*Once for that take*, or *for each take*; the three colors stay open."""
     words = Meaning({}, agrees={"repeats": speaks_of_one})
 
     left = meaning.command_goals(words, THREE_CUBES)
 
-    expected = [goal for goal in goals_of(THREE_CUBES) if (goal["repeats"] == 1) == speaks_of_one]
-    assert list(left) == expected
-
-
-def values_by_field(goal):
-    return {value.field: value.value for value in values_of_goal(goal)}
-
-
-def values_possible(field, episode):
-    """Return the values of a field among the goals that are right in all other fields."""
-    right = values_by_field(episode.goal)
-    found = set()
-    for goal in goals_of(episode):
-        values = values_by_field(goal)
-        if values.keys() == right.keys() and {**values, field: right[field]} == right:
-            found.add(values[field])
-    return found
+    assert {goal["repeats"] for goal in left} == repeats
+    assert {goal["color"] for goal in left} == {"red", "green", "blue"}
 
 
 @pytest.mark.parametrize(

@@ -896,31 +896,32 @@ say.placement = ["<that reference: that one>"]
     assert all(f"go {way} one. " in text for text in report.renderings)
 
 
-@pytest.fixture
-def said_with_gym_reps():
-    """What our VideoRepick scenario "gym reps" says, by the number of repetitions of the goal."""
+def said_with_gym_reps(repeats):
+    """Return what our VideoRepick scenario "gym reps" says where a cube is picked up so often."""
     scenarios = task_scenarios("VideoRepick").scenarios
     (gym_reps,) = [scenario for scenario in scenarios if scenario.fields.frame == "gym reps"]
-    said = {}
-    for episode in scenes_of("VideoRepick", 0)[::9]:
-        said[episode.goal["repeats"]] = said_with(gym_reps, episode)
-    return said
+    for episode in scenes_of("VideoRepick", 0):
+        if episode.goal["repeats"] == repeats:
+            return said_with(gym_reps, episode)
+    raise LookupError(repeats)
 
 
-def test_a_phrase_for_several_repetitions_stands_in_the_command(said_with_gym_reps):
-    """The goal is to pick the cube up twice."""
-    assert "put it back once for each rep, then" in said_with_gym_reps[2].command
+def test_a_phrase_for_several_repetitions_stands_in_the_command():
+    said = said_with_gym_reps(repeats=2)
+
+    assert "put it back once for each rep, then" in said.command
 
 
-def test_a_phrase_that_is_left_out_for_once_leaves_no_gap_in_the_command(said_with_gym_reps):
+def test_a_phrase_that_is_left_out_for_once_leaves_no_gap_in_the_command():
     """*Put it back once for each rep, then …* becomes *put it back, then …*"""
-    said = said_with_gym_reps[1].command
-    assert re.fullmatch("Pick up .* and put it back, then press the button.", said)
+    said = said_with_gym_reps(repeats=1)
+
+    assert re.fullmatch("Pick up .* and put it back, then press the button.", said.command)
 
 
-def test_a_phrase_that_is_left_out_for_once_still_agrees_with_the_number_one(said_with_gym_reps):
+def test_a_phrase_that_is_left_out_for_once_still_agrees_with_the_number_one():
     """Without *for each rep*, who listens knows that it is once."""
-    said = said_with_gym_reps[1]
+    said = said_with_gym_reps(repeats=1)
 
     assert len(said.mentions) == 1
     assert said.meaning.settled == frozenset()

@@ -804,43 +804,44 @@ def test_a_missing_or_binary_wording_file_is_refused(tmp_path, name):
         read_wordings(tmp_path / name)
 
 
-@pytest.fixture
-def changed_file(tmp_path):
-    """A wording file that was changed after it had been opened: its path and both identities."""
+def write_changed(path):
+    """Write a wording file, open it and change it: *lift* becomes *take*. Return its identity."""
+    path.write_text(TWO_SENTENCES)
+    identity = open_wordings(path)
+    path.write_text(TWO_SENTENCES.replace("lift", "take"))
+    return identity
+
+
+def test_a_wording_file_has_another_identity_after_a_change(tmp_path):
+    """Its sentences said *lift*, and now say *take*."""
+    before = write_changed(tmp_path / "words.toml")
+
+    assert open_wordings(tmp_path / "words.toml") != before
+
+
+def test_what_was_open_once_stays_open_in_this_process(tmp_path):
+    """Episodes that need the earlier words can still be said, though the file has changed."""
+    before = write_changed(tmp_path / "words.toml")
+
+    assert open_wordings(tmp_path / "words.toml", before) == before
+
+
+def test_a_wording_file_that_changed_no_longer_serves_episodes_of_its_old_version(tmp_path):
+    """The words "hand@00000000" were never open in this process."""
     path = tmp_path / "words.toml"
     path.write_text(TWO_SENTENCES)
-    before = open_wordings(path)
-    path.write_text(TWO_SENTENCES.replace("lift", "take"))
-    return path, before, open_wordings(path)
 
-
-def test_a_wording_file_has_another_identity_after_a_change(changed_file):
-    """Its sentences said *lift*, and now say *take*."""
-    _, before, after = changed_file
-    assert before != after
-
-
-def test_what_was_open_once_stays_open_in_this_process(changed_file):
-    """Episodes that need the earlier words can still be said, though the file has changed."""
-    path, before, _ = changed_file
-    assert open_wordings(path, before) == before
-
-
-def test_a_wording_file_that_changed_no_longer_serves_episodes_of_its_old_version(changed_file):
-    """The earlier words were never open in this process."""
-    path, _, after = changed_file
-    complaint = f"holds {after}, but the episodes need hand@00000000"
-    with pytest.raises(InvalidValueError, match=complaint):
+    with pytest.raises(InvalidValueError, match="but the episodes need hand@00000000"):
         open_wordings(path, "hand@00000000")
 
 
-def test_open_wordings_may_be_named_by_their_identity(changed_file):
+def test_open_wordings_may_be_named_by_their_identity():
     """Instead of the path of their file. Episodes that need other words are still refused."""
-    _, _, after = changed_file
+    identity = identity_of(TWO_SENTENCES)
 
-    assert open_wordings(after) == after
+    assert open_wordings(identity) == identity
     with pytest.raises(InvalidValueError, match="but the episodes need hand@00000000"):
-        open_wordings(after, "hand@00000000")
+        open_wordings(identity, "hand@00000000")
 
 
 def test_episodes_of_a_user_s_words_need_their_file():

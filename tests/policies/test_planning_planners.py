@@ -372,7 +372,7 @@ def test_a_planner_learns_that_a_subgoal_was_refused_and_not_what_it_meant():
 
 
 @pytest.fixture
-def listener():
+def planner_of_three_stages():
     """A planner that is about to name the first of three stages: 0 hover, 1 pick, 2 drop."""
     planner = make_policy("planner:listener", 3).planner
     planner._index = 0
@@ -384,31 +384,28 @@ def listener():
     return planner
 
 
-def test_a_failed_stage_is_repeated_from_its_pick_and_at_most_three_times(listener):
-    """Stage 3 is past the last one: the fourth failure ends the planning."""
-    ends = [
-        ("done", 1),
-        ("missed", 1),
-        ("done", 2),
-        ("blocked", 1),  # a cube that was lost is picked up again
-        ("done", 2),
-        ("time-out", 1),
-        ("done", 2),
-        ("missed", 3),
-    ]
-    for how, next_stage in ends:
-        listener.learn(SubgoalEnd("", how))
-        assert listener._index == next_stage
+def test_a_failed_stage_is_repeated_from_its_pick_and_at_most_three_times(planner_of_three_stages):
+    """A cube that was lost is picked up again. Stage 3 is past the last one: the fourth failure
+    ends the planning."""
+    next_stages = []
+    for how in ("done", "missed", "done", "blocked", "done", "time-out", "done", "missed"):
+        planner_of_three_stages.learn(SubgoalEnd("", how))
+        next_stages.append(planner_of_three_stages._index)
+
+    assert next_stages == [1, 1, 2, 1, 2, 1, 2, 3]
 
 
-def test_a_refused_stage_ends_the_planning(listener):
-    listener.learn(SubgoalEnd("", "refused"))
+def test_a_refused_stage_ends_the_planning(planner_of_three_stages):
+    """Stage 3 is past the last one."""
+    planner_of_three_stages.learn(SubgoalEnd("", "refused"))
 
-    assert listener._index == 3
+    assert planner_of_three_stages._index == 3
 
 
-def test_a_planner_that_listens_guesses_by_the_seed_of_the_policy(listener):
-    assert listener._decider.seed == 3
+def test_a_planner_that_listens_guesses_by_the_seed_of_the_policy():
+    policy = make_policy("planner:listener", 3)
+
+    assert policy.planner._decider.seed == 3
 
 
 @pytest.mark.parametrize("last", ["all tasks completed", "the task is complete", "it is done"])
