@@ -391,32 +391,35 @@ def test_the_same_policy_with_other_words_is_shown_as_another_with_a_warning():
     assert "in the words of mine@1a" in page.string(details_of_theirs["conditions"])
 
 
-def test_two_policies_are_paired_on_a_scene_only_with_equal_words_seed_and_split():
-    """Two results agree in all, four differ in seed, arm, form or split: one pair, four alone.
+@pytest.mark.parametrize(
+    ("changes", "pairs"),
+    [
+        ({}, [2]),
+        ({"policy_seed": 1}, [1, 1]),
+        ({"arm": "silent"}, [1, 1]),
+        ({"split": "val"}, [1, 1]),
+    ],
+    ids=["nothing", "seed", "arm", "split"],
+)
+def test_two_policies_are_paired_on_a_scene_only_with_equal_words_seed_and_split(changes, pairs):
+    """`pairs` is how many results each group has that is compared."""
+    listener = listener_record("direct", 0)
+    other = replace(listener, policy="forgetful", **changes)
 
-    The one of another split is of another scene.
-    """
-    first, theirs = (
-        record
-        for record in records_with_an_error_last()
-        if (record.setting, record.episode) == ("direct", 0)
-    )
-    others = [
-        replace(first, policy_seed=1),
-        replace(first, arm="silent"),
-        first.with_options(form="resolved"),
-        replace(first, split="val", difficulty="odd"),
-    ]
+    page = Page(render([listener, other]))
 
-    page = Page(render([first, theirs, *others]))
+    assert sorted(Counter(page.data["columns"]["pair"]).values()) == pairs
 
-    sizes_of_pairs = Counter(page.data["columns"]["pair"]).values()
-    sizes_of_scenes = Counter(page.data["columns"]["scene"]).values()
-    assert sorted(sizes_of_pairs) == [1, 1, 1, 1, 2]
-    assert sorted(sizes_of_scenes) == [1, 5]
-    choices = {choice["name"]: choice["values"] for choice in page.data["choices"]}
-    assert choices["difficulty"] == [first.difficulty, "odd"]
-    assert len(page.data["comparisons"]) == 3, "of the three policy runs with instructions"
+
+@pytest.mark.parametrize(
+    ("changes", "scenes"), [({"policy_seed": 1}, [2]), ({"split": "val"}, [1, 1])]
+)
+def test_results_of_the_same_episode_belong_to_one_scene(changes, scenes):
+    record = listener_record("direct", 0)
+
+    page = Page(render([record, replace(record, **changes)]))
+
+    assert sorted(Counter(page.data["columns"]["scene"]).values()) == scenes
 
 
 @pytest.fixture

@@ -212,46 +212,38 @@ class ServerWithoutMemory(MmeVlaServer):
         return super().infer(message)
 
 
+GEMINI_REPLY = '{"description": "x", "subgoal_sequence": [], "subgoal": "put it down"}'
+MEMER_REPLY = '{"current_subtask": "put it down", "keyframe_positions": [1]}'
+
+
 @pytest.mark.sim
 @pytest.mark.parametrize(
-    ("name", "answer", "calls", "subgoal"),
+    ("name", "reply", "questions", "subgoal"),
     [
         ("TTT-Expert", "", 0, "None"),
-        (
-            "GroundSG-Gemini",
-            '{"description": "x", "subgoal_sequence": [], "subgoal": "put it down"}',
-            1,
-            "put it down",
-        ),
+        ("GroundSG-Gemini", GEMINI_REPLY, 1, "put it down"),
         ("GroundSG-oracle", "", 0, r"pick up the \w+ cube at <\d+, \d+> .*"),
-        (
-            "MemER",
-            '{"current_subtask": "put it down", "keyframe_positions": [1]}',
-            3,
-            "put it down",
-        ),
+        ("MemER", MEMER_REPLY, 3, "put it down"),
     ],
 )
-def test_every_system_plays_a_whole_episode(name, answer, calls, subgoal):
-    """Against a policy server and a model's server on real sockets, each by its own protocol."""
-    remembers = name == "TTT-Expert"
-    server = MmeVlaServer() if remembers else ServerWithoutMemory()
-    with server, fake_vlm([answer]) as vlm:
-        overrides = {"server": server.place, "policy.timeout": "300"}
-        if answer:
-            overrides["vlm"] = vlm.url
-        policy = load_system(name, overrides)
-        needs = PolicyNeeds.of(policy).env_options
-        env = roboirg.make("PickXtimes", setting="direct", max_steps=40, **needs)
-
+def test_every_system_plays_a_whole_episode(name, reply, questions, subgoal):
+    """40 steps in three chunks, against a policy server and a model's server on real sockets."""
+    server = MmeVlaServer() if name == "TTT-Expert" else ServerWithoutMemory()
+    with server, fake_vlm([reply]) as vlm:
+        addresses = {"server": server.place, "policy.timeout": "300"}
+        if reply:
+            addresses["vlm"] = vlm.url
+        policy = load_system(name, addresses)
+        env = roboirg.make(
+            "PickXtimes", setting="direct", max_steps=40, **PolicyNeeds.of(policy).env_options
+        )
         info = play(env, policy)
         policy.close()
 
     assert info["status"] == "timeout"
-    messages = [unpack(data) for data in server.messages]
-    prompts = [message for message in messages if "prompt" in message]
-    assert len(prompts) == 3  # 40 steps in chunks of 16
-    for message in prompts:
-        assert re.fullmatch(subgoal, str(message.get("grounded_subgoal")))
-    assert any("add_buffer" in message for message in messages) == remembers
-    assert len(vlm.requests) == calls
+    messages = map(unpack, server.messages)
+    named = [message.get("grounded_subgoal") for message in messages if "prompt" in message]
+    assert len(named) == 3
+    for words in named:
+        assert re.fullmatch(subgoal, str(words))
+    assert len(vlm.requests) == questions

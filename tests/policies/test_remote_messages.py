@@ -105,7 +105,7 @@ def test_the_metadata_of_a_challenge_server_are_kept_with_its_address():
     }
 
 
-class ServerWithoutMemory(MmeVlaServer):
+class ServerThatIgnoresFrames(MmeVlaServer):
     """Answers without looking at what was buffered."""
 
     def infer(self, message):
@@ -114,7 +114,7 @@ class ServerWithoutMemory(MmeVlaServer):
 
 def test_with_history_no_mme_vla_gets_the_current_frame_only():
     with (
-        ServerWithoutMemory() as server,
+        ServerThatIgnoresFrames() as server,
         client_of(server, "mme-vla", "?history=no") as policy,
     ):
         policy.reset(INSTRUCTION, {})

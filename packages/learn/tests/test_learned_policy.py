@@ -180,7 +180,10 @@ def trainer(recorded, out):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_moved_and_mirrored_pictures_keep_their_labels(seed):
-    """The one white pixel of the picture is the labeled object."""
+    """The one white pixel of the picture is the labeled object, turned by 0.2 rad.
+
+    It stands on the left, so that a mirrored picture has it on the right.
+    """
     pytest.importorskip("torch")
     from roboirg_learn.policy.object_detector import LabeledPicture, augmented
 
@@ -188,29 +191,35 @@ def test_moved_and_mirrored_pictures_keep_their_labels(seed):
     picture[100, 50] = 255
     yaw_codes = encode_yaws(np.array([0.2]))
     view = LabeledPicture(picture, np.array([0]), np.array([[50.5, 100.5]]), yaw_codes)
+
     found = augmented(view, np.random.default_rng(seed))
+
     ((row, column),) = np.argwhere(found.picture[..., 0] == 255)
+    yaw = -0.2 if column > 128 else 0.2
     assert found.points.tolist() == [[column + 0.5, row + 0.5]]
-    is_mirrored = column > 128
-    assert np.allclose(found.yaw_codes, encode_yaws(np.array([-0.2 if is_mirrored else 0.2])))
+    assert np.allclose(found.yaw_codes, encode_yaws(np.array([yaw])))
 
 
 @pytest.mark.sim
-def test_a_recording_notes_which_objects_are_visible_and_how_many_stages_are_done(recorded):
-    """The containers cover the cubes by step 40."""
+def test_a_recording_notes_how_many_stages_are_done(recorded):
     stages = len(get_episode("ButtonUnmask", "random", 0).stages)
+
     assert recorded.done[0] == 0
     assert (np.diff(recorded.done) >= 0).all()
-    assert stages - 1 <= recorded.done[-1] <= stages
+    assert recorded.done[-1] in (stages - 1, stages)
 
-    classes = np.array(recorded.classes)
-    cubes = np.char.startswith(classes, "cube")
-    assert recorded.visible[0, cubes].all()
-    assert not recorded.visible[0, classes == "container"].any()
 
+@pytest.mark.sim
+def test_a_recording_notes_which_objects_are_visible(recorded):
+    """At first only the cubes, and from step 40 on only the containers that cover them."""
+    cubes = np.array([name.startswith("cube") for name in recorded.classes])
+    containers = np.array([name == "container" for name in recorded.classes])
     covered = int(np.flatnonzero(recorded.steps >= 40)[0])
+
+    assert recorded.visible[0, cubes].all()
+    assert not recorded.visible[0, containers].any()
     assert not recorded.visible[covered, cubes].any()
-    assert recorded.visible[covered, classes == "container"].all()
+    assert recorded.visible[covered, containers].all()
 
 
 @pytest.mark.sim
@@ -458,34 +467,52 @@ def test_learning_again_reuses_files_and_refuses_those_of_another_plan(folder_of
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
 
-@pytest.mark.sim
-def test_a_reader_is_trained_for_an_existing_body_without_new_recordings(tmp_path):
-    """A reader turns words into a goal, a body acts on it.
-
-    No expert plays, and a command that was killed trains only the passes that are left.
-    """
+@pytest.fixture(scope="module")
+def trained_reader_file(tmp_path_factory):
+    """A reader that hardly learned, for the shipped body: its file and the command that made it."""
     pytest.importorskip("torch")
-    from roboirg_learn.policy.trained_body import load_body
+    out = tmp_path_factory.mktemp("reader") / "new.reader"
+    plan = plan_file(training={"scenes": 2, "reader_epochs": 2})
+    call = ["learn", "reader", "--body", str(SHIPPED.body), "--out", str(out), "--plan", plan]
+    call += ["--tasks", "StopCube", "--settings", "explicit,direct", "--workers", "0"]
+    done = CliRunner().invoke(app, call)
+    assert done.exit_code == 0, done.output
+    assert PolicyFiles(SHIPPED.body, out).spec in done.output
+    return out, call
+
+
+@pytest.mark.sim
+def test_a_reader_is_trained_for_an_existing_body_without_new_recordings(
+    trained_reader_file, shipped_body
+):
+    """A reader turns words into a goal, a body acts on it; no expert has to play."""
     from roboirg_learn.policy.trained_reader import load_reader
 
-    out = tmp_path / "new.reader"
-    few = plan_file(training={"scenes": 2, "reader_epochs": 2})
-    call = ["learn", "reader", "--body", str(SHIPPED.body), "--out", str(out), "--plan", few]
-    call += ["--tasks", "StopCube", "--settings", "explicit,direct", "--workers", "0"]
-    whole = CliRunner().invoke(app, call)
-    assert whole.exit_code == 0, whole.output
-    assert PolicyFiles(SHIPPED.body, out).spec in whole.output
+    out, _ = trained_reader_file
     reader = load_reader(out)
-    body = load_body(SHIPPED.body)
-    assert (reader.plan["tasks"], reader.plan["body"]) == (["StopCube"], body.version)
-    assert reader.vocabulary.classes == body.object_classes.names
-    assert reader.vocabulary[2:] == (body.goals.tasks, body.goals.parts)
-    assert not list(tmp_path.rglob("recordings"))
+
+    assert reader.plan["tasks"] == ["StopCube"]
+    assert reader.plan["body"] == shipped_body.version
+    assert reader.vocabulary.classes == shipped_body.object_classes.names
+    assert reader.vocabulary.tasks == shipped_body.goals.tasks
+    assert reader.vocabulary.parts == shipped_body.goals.parts
+    assert not list(out.parent.rglob("recordings"))
+
+
+@pytest.mark.sim
+def test_a_reader_whose_file_is_lost_is_made_again_without_training(trained_reader_file):
+    """The command trains only the passes that are left, here none."""
+    from roboirg_learn.policy.trained_reader import load_reader
+
+    out, call = trained_reader_file
+    version = load_reader(out).version
     out.unlink()
+
     again = CliRunner().invoke(app, call)
+
     assert again.exit_code == 0, again.output
     assert "reader: 1 of 2" not in again.output
-    assert load_reader(out).version == reader.version
+    assert load_reader(out).version == version
 
 
 def test_the_command_printed_after_training_is_a_valid_run(capsys):

@@ -276,87 +276,173 @@ def observation_of(seed=0):
 NO_VIDEO = {"joint_positions": np.zeros((0, 7))}
 
 
-@pytest.mark.sim
-def test_learned_hands_follow_given_subgoals_or_name_their_own(saved_policy):
-    """A subgoal that they cannot read, *sing*, changes nothing."""
-    from roboirg.policies.contract.base import SubgoalFollower
+@pytest.fixture
+def learned_hands(saved_policy):
+    """The saved policy at the beginning of an episode."""
     from roboirg_learn.kinds import make_learned
 
     hands = make_learned(saved_policy)
-    assert isinstance(hands, SubgoalFollower)
     hands.reset("pick the cube", NO_VIDEO)
-    assert hands.act(observation_of()).shape == (1, 7)
-    words = split_point(hands.subgoal)[0]
-    assert words in {
-        SubgoalTemplate(template.words).at(None) for template in hands.model.body.templates
-    }
-    hands.follow("press the button at <100, 90>")
-    hands.act(observation_of())
-    assert hands.subgoal == "press the button at <100, 90>"
-    hands.follow("sing")
-    assert hands.subgoal == "press the button at <100, 90>"
-    hands.reset("pick the cube", NO_VIDEO)
-    assert hands.subgoal is None
-    hands.follow("sing")
-    still = hands.act(observation_of())
-    assert np.allclose(still[0], [*observation_of()["end_effector"], 0.0])
+    return hands
 
 
 @pytest.mark.sim
-def test_learned_planners_and_hands_can_be_combined_with_others(saved_policy):
-    from roboirg.core.errors import InvalidValueError
-    from roboirg.policies.by_name.finding import make_policy, read_policy
-    from roboirg_learn.policy.subgoal_following import LearnedHands, LearnedPlanner
+def test_learned_hands_name_their_own_subgoal_if_none_is_given(learned_hands):
+    action = learned_hands.act(observation_of())
 
-    own = saved_policy.spec
-    scripted = f"{saved_policy.spec}&hands=scripted"
-    assert read_policy(own).is_hosted
-    assert not read_policy(own).is_privileged
-    assert read_policy(scripted).is_privileged
-    assert not read_policy(scripted).is_hosted
-    policy = make_policy(scripted, 0)
+    words, _ = split_point(learned_hands.subgoal)
+    known = {
+        SubgoalTemplate(template.words).at(None) for template in learned_hands.model.body.templates
+    }
+    assert words in known
+    assert action.shape == (1, 7)
+
+
+@pytest.mark.sim
+def test_learned_hands_follow_a_given_subgoal_and_ignore_words_that_are_none(learned_hands):
+    learned_hands.follow("press the button at <100, 90>")
+    learned_hands.act(observation_of())
+    learned_hands.follow("sing")
+
+    assert learned_hands.subgoal == "press the button at <100, 90>"
+
+
+@pytest.mark.sim
+def test_learned_hands_that_were_given_nothing_but_nonsense_stand_still(learned_hands):
+    """A waypoint is a pose, here that of the tool, and a command to the gripper."""
+    learned_hands.follow("sing")
+
+    (waypoint,) = learned_hands.act(observation_of())
+
+    assert waypoint == pytest.approx([0.0, 0.0, 0.2, np.pi, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.sim
+def test_a_new_episode_forgets_the_subgoal(learned_hands):
+    learned_hands.follow("press the button at <100, 90>")
+
+    learned_hands.reset("pick the cube", NO_VIDEO)
+
+    assert learned_hands.subgoal is None
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize(("options", "is_privileged"), [("", False), ("&hands=scripted", True)])
+def test_a_learned_policy_is_hosted_unless_hands_read_the_simulator(
+    saved_policy, options, is_privileged
+):
+    from roboirg.policies.by_name.finding import read_policy
+
+    ref = read_policy(saved_policy.spec + options)
+
+    assert ref.is_privileged == is_privileged
+    assert ref.is_hosted != is_privileged
+
+
+@pytest.mark.sim
+def test_a_learned_planner_can_ask_scripted_hands(saved_policy):
+    from roboirg.policies.by_name.finding import make_policy
+    from roboirg_learn.policy.subgoal_following import LearnedPlanner
+
+    policy = make_policy(f"{saved_policy.spec}&hands=scripted", 0)
+
     assert isinstance(policy.planner, LearnedPlanner)
     assert "front" in policy.cameras
-    policy = make_policy(f"planner:oracle?hands={own}", 0)
-    assert isinstance(policy.policy, LearnedHands)
-    assert policy.actions == "waypoint"
-    joints = f"planner:oracle?hands={own}%26actions=joint_angle"
-    assert make_policy(joints, 0).actions == "joint_angle"
-    with pytest.raises(InvalidValueError, match="other hands"):
-        make_policy(f"{scripted}&actions=joint_angle", 0)
-    with pytest.raises(InvalidValueError, match="when-done"):
-        make_policy(f"planner:stateless?model=none&hands={own}", 0)
 
 
 @pytest.mark.sim
-def test_a_learned_planner_may_point_at_an_object_that_is_out_of_sight(saved_policy):
-    """Object 1 is out of sight from look 4 on; the decision is made at look 5."""
-    torch = pytest.importorskip("torch")
+@pytest.mark.parametrize(
+    ("options", "actions"), [("", "waypoint"), ("%26actions=joint_angle", "joint_angle")]
+)
+def test_the_oracle_can_ask_learned_hands(saved_policy, options, actions):
+    from roboirg.policies.by_name.finding import make_policy
+    from roboirg_learn.policy.subgoal_following import LearnedHands
+
+    policy = make_policy(f"planner:oracle?hands={saved_policy.spec}{options}", 0)
+
+    assert isinstance(policy.policy, LearnedHands) == (actions == "waypoint")
+    assert policy.actions == actions
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize(
+    ("spec", "reason"),
+    [
+        ("{own}&hands=scripted&actions=joint_angle", "other hands"),
+        ("planner:stateless?model=none&hands={own}", "when-done"),
+    ],
+    ids=["joint angles of scripted hands", "a planner that waits for reports"],
+)
+def test_a_combination_that_cannot_act_is_refused(saved_policy, spec, reason):
+    from roboirg.core.errors import InvalidValueError
+    from roboirg.policies.by_name.finding import make_policy
+
+    with pytest.raises(InvalidValueError, match=reason):
+        make_policy(spec.format(own=saved_policy.spec), 0)
+
+
+@pytest.fixture
+def planner_and_episode(saved_policy):
+    """A planner, and numbers of an episode with three objects and six looks.
+
+    It decides at looks 2 and 5; object 1 is out of sight from look 4 on.
+    """
     from roboirg_learn.policy.body_net import TOOL_NUMBERS
-    from roboirg_learn.policy.policy_data import EpisodeArrays, LookArrays, to_batch
+    from roboirg_learn.policy.policy_data import EpisodeArrays, LookArrays
     from roboirg_learn.policy.trained_body import load_body
 
-    model = load_body(saved_policy.body)
-    size = len(model.templates)
-    looks = 6
-    things = 3
+    body = load_body(saved_policy.body)
     rng = np.random.default_rng(0)
-    seen = np.ones((looks, things), bool)
-    seen[4:, 1] = False
-    shown = LookArrays(
-        rng.integers(0, 5, (looks, things)),
-        *(rng.normal(0, 0.1, (looks, things, 2)).astype(np.float32) for _ in range(2)),
-        seen, np.ones_like(seen), rng.normal(0, 1, (looks, TOOL_NUMBERS)).astype(np.float32),
-    )  # fmt: skip
-    subgoal_inputs = ideal_planner_inputs(
-        KeyframeHistory(size), np.array([0, 1]), np.array([2, 5]), 0
+    in_sight = np.ones((6, 3), bool)
+    in_sight[4:, 1] = False
+    looks = LookArrays(
+        classes=rng.integers(0, 5, (6, 3)),
+        positions=rng.normal(0, 0.1, (6, 3, 2)).astype(np.float32),
+        yaw_codes=rng.normal(0, 0.1, (6, 3, 2)).astype(np.float32),
+        visible=in_sight,
+        confirmed=np.ones((6, 3), bool),
+        tool=rng.normal(0, 1, (6, TOOL_NUMBERS)).astype(np.float32),
     )
-    goal = np.zeros(model.goals.size, np.float32)
-    nothing = np.array([-1, -1])
-    numbers = EpisodeArrays(shown, goal, np.array([2, 5]), *[nothing] * 3, subgoal_inputs)
-    answer = model.planner(to_batch([numbers]))
+    decisions = np.array([2, 5])
+    inputs = ideal_planner_inputs(
+        KeyframeHistory(len(body.templates)), np.array([0, 1]), decisions, 0
+    )
+    none = np.array([-1, -1])
+    goal = np.zeros(body.goals.size, np.float32)
+    return body, EpisodeArrays(looks, goal, decisions, none, none, none, inputs)
+
+
+def answer_of_planner(body, episode):
+    from roboirg_learn.policy.policy_data import to_batch
+
+    return body.planner(to_batch([episode]))
+
+
+@pytest.mark.sim
+def test_a_learned_planner_may_point_at_an_object_that_is_out_of_sight(planner_and_episode):
+    """A score far below zero would exclude it."""
+    answer = answer_of_planner(*planner_and_episode)
+
     assert (answer.tracks[0, 1, :, 1] > -1e3).all()
-    assert (answer.keep_scores is None) == (model.plan["memory"] == "subgoal")
-    context = subgoal_inputs._replace(context=subgoal_inputs.context + 1)
-    other = model.planner(to_batch([numbers._replace(subgoal_inputs=context)]))
-    assert not torch.equal(answer.moves, other.moves)
+
+
+@pytest.mark.sim
+def test_only_a_planner_with_key_frames_scores_the_frames_to_keep(planner_and_episode):
+    body, episode = planner_and_episode
+
+    has_scores = answer_of_planner(body, episode).keep_scores is not None
+
+    assert has_scores == (body.plan["memory"] == "keyframes")
+
+
+@pytest.mark.sim
+def test_what_was_done_before_changes_the_answer_of_a_learned_planner(planner_and_episode):
+    torch = pytest.importorskip("torch")
+    body, episode = planner_and_episode
+    inputs = episode.subgoal_inputs
+    later = episode._replace(subgoal_inputs=inputs._replace(context=inputs.context + 1))
+
+    before = answer_of_planner(body, episode).moves
+    after = answer_of_planner(body, later).moves
+
+    assert not torch.equal(before, after)
