@@ -141,7 +141,10 @@ def test_without_explicit_results_a_label_has_a_rate_and_no_gap():
 
 
 def test_two_policies_are_compared_on_the_episodes_of_each_label():
-    """The better one wins all 12, so it gains 4 of 6, 5 of 6 and again 4 of 6 episodes."""
+    """Even episodes have the labels "9" and "zebra", odd ones "10 b".
+
+    The better policy wins all 12, so it gains 4 of 6, 5 of 6 and again 4 of 6 episodes.
+    """
     better = labeled_by_letters(make_results("1" * 12, "direct", policy="better"))
     direct = labeled_by_letters(make_results("111000000000", "direct"))
 

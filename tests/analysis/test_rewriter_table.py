@@ -29,6 +29,10 @@ def rows_of(*made):
 
 
 def test_half_of_a_gap_is_closed_if_half_of_the_lost_episodes_are_won_back():
+    """The policy alone wins 20 % of direct, behind a rewriter 60 %, and 100 % of explicit.
+
+    Cells: episodes, these three rates, and the share of the gap that is closed, 40 of 80 points.
+    """
     found = rows_of(
         results(ALONE, "1" * 20, "explicit"),
         results(ALONE, "1" * 4 + "0" * 16, "direct"),
@@ -41,6 +45,7 @@ def test_half_of_a_gap_is_closed_if_half_of_the_lost_episodes_are_won_back():
 
 
 def test_only_episodes_count_that_all_three_have():
+    """18 of 20 and of 30; of them the policy alone wins none, and behind a rewriter all."""
     found = rows_of(
         results(ALONE, "1" * 20, "explicit"),
         results(ALONE, "0" * 18, "direct"),
@@ -51,6 +56,7 @@ def test_only_episodes_count_that_all_three_have():
 
 
 def test_rates_are_means_over_the_tasks_that_all_three_have():
+    """Behind a rewriter 100 % of PickXtimes and 0 % of BinFill; StopCube was not played alone."""
     found = rows_of(
         results(ALONE, "1" * 20, "explicit"),
         results(ALONE, "0" * 20, "direct"),
@@ -65,6 +71,7 @@ def test_rates_are_means_over_the_tasks_that_all_three_have():
 
 
 def test_without_a_clear_gap_there_is_no_share():
+    """95 % against 100 % of 20 episodes could be chance."""
     found = rows_of(
         results(ALONE, "1" * 20, "explicit"),
         results(ALONE, "1" * 19 + "0", "direct"),
