@@ -173,44 +173,34 @@ def package(tmp_path_factory):
 
 
 def test_the_setting_of_the_documentation_page_speaks_the_words_of_its_own_file(package):
-    """The page's file has the scenarios "new coat" for training and "loan" for tests."""
+    """The page's file has the scenarios "new coat" for training and "loan" for tests.
+
+    An instruction names the digest of the words.
+    """
     found = package.run("""
 for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
-    episode = get_episode(task, "test", 1)
-    said = instruct_with(episode, InstructionOptions("colored", wordings=pool))
-    found.append([task, pool, said.metadata["scenario"]])
+    said = instruct(get_episode(task, "test", 1), "colored", wordings=pool)
+    names_its_words = said.metadata["words"] == words_of(task, pool, "colored")
+    found.append([task, pool, said.metadata["scenario"], names_its_words])
 """)
 
     assert found == [
-        ["PickXtimes", "train", "new coat"],
-        ["PickXtimes", "test", "loan"],
-        ["SwingXtimes", "train", "new coat"],
-        ["SwingXtimes", "test", "loan"],
+        ["PickXtimes", "train", "new coat", True],
+        ["PickXtimes", "test", "loan", True],
+        ["SwingXtimes", "train", "new coat", True],
+        ["SwingXtimes", "test", "loan", True],
     ]
 
 
-def test_an_instruction_in_the_setting_of_the_documentation_page_names_the_digest_of_its_words(
-    package,
-):
-    (found,) = package.run("""
-said = instruct(get_episode("PickXtimes", "test", 1), "colored")
-found.append([said.metadata["words"], words_of("PickXtimes", "test", "colored")])
-""")
-
-    in_metadata, digest = found
-    assert in_metadata == digest
-
-
-@pytest.mark.parametrize("task", ["PickXtimes", "SwingXtimes"])
-def test_the_setting_of_the_documentation_page_means_the_goal(package, task):
-    found = package.run(f"""
-episode = get_episode("{task}", "test", 1)
-for pool in POOLS:
+def test_the_setting_of_the_documentation_page_means_the_goal(package):
+    found = package.run("""
+for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
+    episode = get_episode(task, "test", 1)
     said = instruct(episode, "colored", wordings=pool)
     found.append(understood_goals(said, episode) == (episode.goal,))
 """)
 
-    assert found == [True, True]
+    assert found == [True, True, True, True]
 
 
 def test_the_setting_of_the_documentation_page_ends_with_the_explicit_command_when_resolved(
