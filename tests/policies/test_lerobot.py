@@ -81,12 +81,10 @@ def make_model(torch, config):
             super().__init__()
             self.weight = torch.nn.Parameter(torch.zeros(1, dtype=torch.bfloat16))
             self.batches = []
-            self.resets = []
             self.averages = Averages()
             self.config = config
 
         def reset(self):
-            self.resets.append(self)
             self.averages.reset()
             self._queues = {STATE: deque(maxlen=self.config.n_obs_steps), "action": deque()}
 

@@ -27,7 +27,6 @@ from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.planners import make_planner as make_by_kind
 from roboirg.policies.planners import model_planners
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
-from roboirg.policies.planners.model_planners import GeminiOptions
 from roboirg.policies.planners.oracle_planner import OraclePlanner
 from roboirg.policies.planners.points import to_pixel
 from roboirg.policies.vlm.models import ModelOptions
@@ -181,21 +180,16 @@ def test_the_qwen_planner_does_not_ask_while_it_holds_a_button_s_subgoal(subgoal
 
 
 @pytest.mark.parametrize(
-    ("first_pause", "steps"),
+    ("options", "steps"),
     [
-        (0, [0, 48, 96, 144, 192, 240, 288]),
-        (75, [0, 96, 144, 192, 240, 288]),
-        (144, [0, 144, 192, 240, 288]),
+        ({"first_pause": 0}, [0, 48, 96, 144, 192, 240, 288]),
+        ({}, [0, 96, 144, 192, 240, 288]),
+        ({"first_pause": 144}, [0, 144, 192, 240, 288]),
     ],
+    ids=["no pause", "the usual one of 75 steps", "144 steps"],
 )
-def test_the_gemini_planner_asks_every_48_steps_after_its_first_pause(first_pause, steps):
-    asked = steps_asked("gemini", REPLY_OF["gemini"], first_pause=first_pause)
-
-    assert asked == steps
-
-
-def test_the_first_pause_of_the_gemini_planner_is_75_steps():
-    assert GeminiOptions.model_fields["first_pause"].default == 75
+def test_the_gemini_planner_asks_every_48_steps_after_its_first_pause(options, steps):
+    assert steps_asked("gemini", REPLY_OF["gemini"], **options) == steps
 
 
 @pytest.mark.parametrize("kind", KINDS)
