@@ -18,10 +18,6 @@ def job_in(task, setting, episode, **fields):
     return job_of(task=task, setting=setting, episode=episode, **usual)
 
 
-def language_version_of(job):
-    return str(instruct_job(job).metadata["language_version"])
-
-
 @pytest.mark.parametrize(
     ("task", "setting", "episode", "chance"),
     [
@@ -91,7 +87,7 @@ def test_a_learned_floor_is_known_for_the_usual_options_in_the_version_of_the_la
     """
     usual = job_in("PickXtimes", "contextual", 2)
     short = job_in("PickXtimes", "contextual", 2, stages=(1, 5))
-    version = language_version_of(usual)
+    version = str(instruct_job(usual).metadata["language_version"])
 
     assert floor_level("text-only", [usual], version) is not None
     assert floor_level("text-only", [short], version) is None
