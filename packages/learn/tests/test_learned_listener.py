@@ -216,12 +216,14 @@ def test_a_loaded_listener_knows_its_words_and_what_it_was_trained_on(trained_li
     from roboirg_learn.listener.learned_model import load_model
 
     model, path = trained_listener
+    picture = views_at_start(get_episode("BinFill", "train", 0))[0].picture
+
     loaded = load_model(path)
 
     assert loaded.vocabulary == model.vocabulary
     assert loaded.about["settings"] == ["explicit", "direct"]
     with pytest.raises(InvalidValueError, match="was not trained on BinFill, but on StopCube"):
-        loaded.understand("BinFill", "Do it.", [])
+        loaded.understand("BinFill", "Do it.", [picture])
 
 
 def test_training_sentences_by_place_cover_several_goals_of_a_scene(torch):
