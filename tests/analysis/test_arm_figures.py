@@ -31,13 +31,15 @@ def goals(arm, done):
         done: the goal that the policy reached: `own`, `other` or `none`.
     """
     stated = "other" if arm == "other-goal" else "own"
-    won = done == stated
-    return ("success" if won else "failure"), GoalOutcomes(
-        stated=stated,
-        reached=(done,) if won or arm == "other-goal" else (),
-        agrees=() if won else (done,),
-        original=("success" if done == "own" else "failure") if arm == "other-goal" else None,
-    )
+    if done == stated:
+        outcome = "success"
+        outcomes = {"reached": (done,), "agrees": ()}
+    else:
+        outcome = "failure"
+        outcomes = {"reached": (done,) if arm == "other-goal" else (), "agrees": (done,)}
+    if arm == "other-goal":
+        outcomes["original"] = "success" if done == "own" else "failure"
+    return outcome, GoalOutcomes(stated=stated, **outcomes)
 
 
 def results_of_policy(policy, acts, scenes=SCENES, **fields):
@@ -52,11 +54,9 @@ def results_of_policy(policy, acts, scenes=SCENES, **fields):
     found = []
     for arm, done in acts.items():
         outcome, outcomes = goals(arm, done)
-        found += [
-            make_result(outcome, scene, policy=policy, task=task, arm=arm, goals=outcomes, **fields)
-            for task in TASKS
-            for scene in scenes
-        ]
+        usual = {"policy": policy, "arm": arm, "goals": outcomes, **fields}
+        for task in TASKS:
+            found += [make_result(outcome, scene, task=task, **usual) for scene in scenes]
     return found
 
 
@@ -85,10 +85,11 @@ def figure_named(data, name):
 @pytest.mark.parametrize(
     ("acts", "use", "habit"),
     [
-        pytest.param(DOES_WHAT_IT_HEARS, 1.0, 0.0, id="does what it hears"),
-        pytest.param(SAME_GOAL_IN_EVERY_ARM, 0.0, 1.0, id="always its own goal"),
-        pytest.param(ALWAYS_THE_OTHER_GOAL, 0.0, 1.0, id="always the other goal"),
+        (DOES_WHAT_IT_HEARS, 1.0, 0.0),
+        (SAME_GOAL_IN_EVERY_ARM, 0.0, 1.0),
+        (ALWAYS_THE_OTHER_GOAL, 0.0, 1.0),
     ],
+    ids=["does what it hears", "always its own goal", "always the other goal"],
 )
 def test_who_follows_the_words_is_told_from_who_does_the_same_whatever_it_hears(acts, use, habit):
     """*Language use* is a difference of two rates in the arm *other-goal*.
@@ -113,9 +114,10 @@ def test_who_follows_the_words_is_told_from_who_does_the_same_whatever_it_hears(
 @pytest.mark.parametrize(
     ("acts", "worth"),
     [
-        pytest.param(DOES_WHAT_IT_HEARS, 1.0, id="does what it hears"),
-        pytest.param(SAME_GOAL_IN_EVERY_ARM, 0.0, id="always its own goal"),
+        (DOES_WHAT_IT_HEARS, 1.0),
+        (SAME_GOAL_IN_EVERY_ARM, 0.0),
     ],
+    ids=["does what it hears", "always its own goal"],
 )
 def test_words_are_worth_what_success_loses_in_silence_and_their_order_when_scrambled(
     contrast, acts, worth
@@ -199,13 +201,15 @@ def test_a_run_without_control_arms_has_neither_their_table_nor_a_sentence_about
     assert not [*language_use_sentences(mine.frame, told.frame, ("", ""))]
 
 
-@pytest.mark.parametrize("episode", range(12))
-def test_the_chance_to_guess_a_goal_in_silence_counts_goals_that_begin_alike(episode):
+@pytest.mark.parametrize(
+    ("episode", "chance"), [(0, 3 / 9), (3, 1 / 9)], ids=["one container", "two containers"]
+)
+def test_the_chance_to_guess_a_goal_in_silence_counts_goals_that_begin_alike(episode, chance):
     """Lifting one of three things is a goal; lifting two in order is another: 3 + 6 goals.
 
     Who lifts the first thing of a pair is right about two pairs, too: 1 of 9 goals, or 3 of 9.
     """
-    assert silent_chance("VideoUnmask", "test", episode) in {1 / 9, 3 / 9}
+    assert silent_chance("VideoUnmask", "test", episode) == pytest.approx(chance)
 
 
 def test_the_chance_to_guess_one_of_four_visits_is_a_quarter():

@@ -17,14 +17,14 @@ from roboirg.analysis.measures.breakdowns import (
 )
 from roboirg.analysis.measures.comparison import compare
 from roboirg.analysis.measures.comparison_text import sentences
-from roboirg.analysis.results.frame import Frame, as_column
+from roboirg.analysis.results.frame import as_column
 from roboirg.analysis.results.reading import (
     record_columns,
     with_columns,
 )
 from roboirg.analysis.tables.diagnostic_tables import make_breakdown_table
 from roboirg.core.errors import InvalidValueError
-from roboirg.records.record import Record, Summary
+from roboirg.records.record import Record
 from roboirg.records.store import RECORDS_FILE, iterate_records
 from roboirg.runs.plan.plan import Plan
 
@@ -101,7 +101,7 @@ def test_an_instruction_with_references_spelled_out_has_no_expression():
 # Numbers
 
 
-def labeled_by_letters(results: list[Summary]) -> Frame:
+def labeled_by_letters(results):
     """Return results of which even episodes have the labels "9" and "zebra", odd ones "10 b"."""
     frame = frame_of(results)
     labels = [("10 b",) if episode % 2 else ("9", "zebra") for episode in frame["episode"]]
@@ -141,7 +141,10 @@ def test_without_explicit_results_a_label_has_a_rate_and_no_gap():
 
 
 def test_two_policies_are_compared_on_the_episodes_of_each_label():
-    """The better one wins all 12, so it gains 4 of 6, 5 of 6 and again 4 of 6 episodes."""
+    """Even episodes have the labels "9" and "zebra", odd ones "10 b".
+
+    The better policy wins all 12, so it gains 4 of 6, 5 of 6 and again 4 of 6 episodes.
+    """
     better = labeled_by_letters(make_results("1" * 12, "direct", policy="better"))
     direct = labeled_by_letters(make_results("111000000000", "direct"))
 

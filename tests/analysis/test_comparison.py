@@ -10,66 +10,140 @@ from roboirg.analysis.measures.comparison_text import sentences
 from roboirg.analysis.results.frame import make_frame
 from roboirg.core.errors import InvalidValueError
 
-GOOD = "listener"
-POOR = "forgetful"
+HEAD = "listener against forgetful, on the same episodes."
+KIND_OF_TEST = "p-values are from the exact paired test, after Holm's correction over the settings."
 
 
-def comparison_of(first: list, second: list):
+def results(outcomes, setting="explicit", **fields):
+    """Return results of the forgetful policy, one for each letter: 1 won, 0 lost, ! an error."""
+    return make_results(outcomes, setting, policy="forgetful", **fields)
+
+
+def comparison_of(first, second):
     return compare(make_frame([("a", first)]), make_frame([("b", second)]))
 
 
-def sentences_of(first: list, second: list) -> str:
-    return "\n".join(sentences(comparison_of(first, second), GOOD, POOR))
+def sentences_of(listener, forgetful):
+    """Return the lines of a comparison that are not blank."""
+    lines = sentences(comparison_of(listener, forgetful), "listener", "forgetful")
+    return [line for line in lines if line]
 
 
-def results_of_policy(policy: str, outcomes_and_fields: list) -> list:
-    found = []
-    for outcomes, fields in outcomes_and_fields:
-        found += make_results(outcomes, policy=policy, **fields)
-    return found
+def test_a_comparison_names_the_better_policy_of_a_setting_or_says_that_there_is_none():
+    """Both win all 20 explicit episodes; of the direct ones the forgetful policy wins 5."""
+    listener = [*make_results("1" * 20), *make_results("1" * 20, "direct")]
+    forgetful = [*results("1" * 20), *results("1" * 5 + "0" * 15, "direct")]
+
+    assert sentences_of(listener, forgetful) == [
+        HEAD,
+        (
+            "explicit: no clear difference, ±0.0 points (95 % interval −16.8 to +16.8), p = 1.000, "
+            "20 episodes. With so few episodes, no gap can be detected with 80 % power; the two "
+            "did "
+            "equally well."
+        ),
+        (
+            "direct: listener is better, +75.0 points (95 % interval +45.6 to +90.3), p < 0.001, "
+            "20 episodes."
+        ),
+        KIND_OF_TEST,
+    ]
 
 
-SETTINGS = ("explicit", "direct", "reasoning", "contextual")
+def test_a_comparison_without_a_winner_says_how_many_episodes_would_show_such_a_gap():
+    """3 of 20 against 6 of 20, different in 5: a gap of 15 points with a discordance of 25 %.
 
-
-@pytest.mark.parametrize(
-    ("good", "poor"),
-    [
-        # Settings in which they differ, and do not.
-        pytest.param([("1" * 20, {}), ("1" * 20, {"setting": "direct"})],
-                     [("1" * 20, {}), ("1" * 5 + "0" * 15, {"setting": "direct"})], id="better"),
-        # 3 of 20 against 6 of 20, differing on 5: a gap of 15 points with a discordance of 25.
-        # By the normal approximation it takes 7.85 * 0.25 / 0.15**2 = 87 episodes.
-        pytest.param([("111" + "0" * 17, {})], [("11" + "0" * 14 + "1111", {})], id="open"),
-        pytest.param([("1" * 15 + "0" * 5, {}), ("0" * 20, {"task": "BinFill"})],
-                     [("0" * 20, {}), ("1" * 20, {"task": "BinFill"})], id="tasks"),
-        # Trials without a counterpart, and one without a verdict.
-        pytest.param([("1111!1", {}), ("11", {"setting": "direct"})], [("0000-", {})],
-                     id="left out"),
-        # 6 of 20 episodes differ, all to one side: p = 0.031 alone, 0.125 among four settings.
-        pytest.param([("1" * 20, {"setting": setting}) for setting in SETTINGS],
-                     [("1" * 14 + ("0" if setting == "direct" else "1") * 6, {"setting": setting})
-                      for setting in SETTINGS], id="interval and p"),
-    ],
-)  # fmt: skip
-def test_the_sentences_of_a_comparison_are_as_stored(snapshot, good, poor):
-    """Which is better, what stays open and what it would take, and what is left out.
-
-    A letter is an episode: 1 won, 0 lost, ! an error, - not played.
+    By the normal approximation it takes 7.85 * 0.25 / 0.15**2 = 87 episodes.
     """
-    good_results = results_of_policy("listener", good)
-    poor_results = results_of_policy("forgetful", poor)
+    listener = make_results("11100000000000000000")
+    forgetful = results("11000000000000001111")
 
-    assert sentences_of(good_results, poor_results) == snapshot
+    assert sentences_of(listener, forgetful) == [
+        HEAD,
+        (
+            "explicit: no clear difference, −15.0 points (95 % interval −39.0 to +9.4), p = 0.375, "
+            "20 episodes. With so few episodes, no gap can be detected with 80 % power; showing a "
+            "gap "
+            "of this size needs about 92."
+        ),
+        KIND_OF_TEST,
+    ]
+
+
+def test_a_comparison_lists_single_tasks_that_show_a_difference():
+    """One policy is better in a task, the other one in another task."""
+    listener = [*make_results("1" * 15 + "0" * 5), *make_results("0" * 20, task="BinFill")]
+    forgetful = [*results("0" * 20), *results("1" * 20, task="BinFill")]
+
+    assert sentences_of(listener, forgetful) == [
+        HEAD,
+        (
+            "explicit: no clear difference, −12.5 points (95 % interval −27.2 to +5.0), p = 0.500, "
+            "40 episodes of 2 tasks. These episodes can show gaps of 42.3 points or more with 80 % "
+            "power; showing a gap of this size needs about 452."
+        ),
+        "2 of 2 single cells (one task in one setting) show a difference:",
+        (
+            "  BinFill, explicit: forgetful is better, −100.0 points (95 % interval −100.0 to "
+            "−66.4), "
+            "p < 0.001, 20 episodes."
+        ),
+        (
+            "  PickXtimes, explicit: listener is better, +75.0 points (95 % interval +45.6 to "
+            "+90.3), "
+            "p < 0.001, 20 episodes."
+        ),
+        (
+            "p-values are from the exact paired test, after Holm's correction: over the averages, "
+            "and "
+            "over the single cells. An average is the unweighted mean over tasks."
+        ),
+    ]
+
+
+def test_a_comparison_says_which_trials_it_leaves_out():
+    """An error, and trials that the other policy did not play."""
+    listener = [*make_results("1111!1"), *make_results("11", "direct")]
+    forgetful = results("0000-")
+
+    *_, unpaired, incomplete = sentences_of(listener, forgetful)
+
+    assert unpaired == "1 trial without a counterpart is left out."
+    assert incomplete == (
+        "Incomplete: 1 trial without a verdict (an error, or still to be played) is left out."
+    )
+
+
+def test_a_comparison_explains_an_interval_that_excludes_0_although_the_gap_is_not_significant():
+    """6 of 20 episodes differ, all to one side: p = 0.031 alone, 0.125 among four settings."""
+    listener = []
+    forgetful = results("1" * 14 + "0" * 6, "direct")
+    for setting in ("explicit", "direct", "reasoning", "contextual"):
+        listener += make_results("1" * 20, setting)
+        if setting != "direct":
+            forgetful += results("1" * 20, setting)
+
+    found = sentences_of(listener, forgetful)
+
+    assert found[2].startswith(
+        "direct: no clear difference, +30.0 points (95 % interval +7.8 to +52.6), "
+        "p = 0.125 (uncorrected 0.031), 20 episodes."
+    )
+    assert found[-1] == (
+        "An interval belongs to one gap alone, so it may exclude 0 although p is above 0.05; p is "
+        "corrected for all gaps that are tested together, and p decides."
+    )
 
 
 def test_episodes_without_instruction_do_not_count_in_a_comparison():
     """The arm *silent* is a control: it would drag down the policy that played it."""
-    first = make_results("11")
-    second = make_results("01", policy="forgetful")
+    listener = make_results("11")
     silent = make_results("00", arm="silent")
+    forgetful = results("01")
 
-    assert repr(comparison_of([*first, *silent], second)) == repr(comparison_of(first, second))
+    with_silent = comparison_of([*listener, *silent], forgetful)
+
+    assert repr(with_silent) == repr(comparison_of(listener, forgetful))
 
 
 def test_episodes_without_instruction_are_compared_if_there_is_nothing_else():
@@ -80,25 +154,23 @@ def test_episodes_without_instruction_are_compared_if_there_is_nothing_else():
 
 @pytest.mark.parametrize("changes", [{"task": "BinFill"}, {"setting": "direct"}])
 def test_policies_without_a_common_episode_are_refused(changes):
-    first = make_results("11")
-    second = make_results("11", policy=POOR, **changes)
-
     with pytest.raises(InvalidValueError, match="no episode in common"):
-        comparison_of(first, second)
+        comparison_of(make_results("11"), results("11", **changes))
 
 
 @pytest.mark.parametrize(
     ("added", "reason"),
     [
-        (make_results("11", policy=POOR), "name one as RUN:forgetful"),
+        (results("11"), "name one as RUN:forgetful"),
         (make_results("--1", policy_version="2"), "in several versions"),
     ],
+    ids=["two policies", "two versions"],
 )
 def test_each_side_of_a_comparison_must_be_one_policy_of_one_version(added, reason):
-    results = make_results("11")
+    listener = make_results("11")
 
     with pytest.raises(InvalidValueError, match=reason):
-        comparison_of([*results, *added], results)
+        comparison_of([*listener, *added], listener)
 
 
 def test_a_side_without_results_is_refused():

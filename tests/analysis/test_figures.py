@@ -14,21 +14,15 @@ from published_results import like_published
 from roboirg.analysis.figures import draw_figure, failures, write_figures
 from roboirg.analysis.figures.gaps import WORDS
 from roboirg.analysis.figures.rates import Rate, RateRow, draw_rates
-from roboirg.analysis.measures.measure import ALL_TASKS
 from roboirg.analysis.measures.run_data import RunData
-from roboirg.analysis.published import published_rows
 from roboirg.analysis.results.frame import make_frame
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.records.record import Summary
 from roboirg.runs.plan.plan import Plan
 from roboirg.stats.intervals import Interval
 
 pytest.importorskip("matplotlib")
 
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
@@ -41,19 +35,19 @@ PLAN = Plan(
 
 
 @functools.cache
-def results_of_two_policies() -> list[Summary]:
+def results_of_two_policies():
     """Return results of which the forgetful policy loses all implicit ones, the listener none."""
     return [*played(PLAN)]
 
 
-def run_data(found: list[Summary] | None = None, **options: object) -> RunData:
+def run_data(found=None, **options):
     """Return what figures are drawn from: these results, or those of the two policies."""
     if found is None:
         found = results_of_two_policies()
     return RunData(make_frame([("run", found)], **options))
 
 
-def drawn_texts(figure: Figure) -> list[Text]:
+def drawn_texts(figure):
     """The texts of a figure that are seen, after it was laid out."""
     FigureCanvasAgg(figure).draw()
     owners = [*(panel for panel in figure.axes if panel.get_visible()), *figure.legends]
@@ -61,18 +55,18 @@ def drawn_texts(figure: Figure) -> list[Text]:
     return [text for text in found if text.get_visible() and text.get_text()]
 
 
-def text_without_line_breaks(text: Text) -> str:
+def text_without_line_breaks(text):
     return " ".join(text.get_text().split())
 
 
-def drawn_figure(name: str, found: RunData, *, published: bool = False) -> Figure:
+def drawn_figure(name, found, *, published=False):
     """Return a figure that has something to show, next to the published rates or without them."""
     figure = draw_figure(name, found, published=published)
     assert figure is not None
     return figure
 
 
-def dot_positions(figure: Figure) -> dict[tuple[str, str], list[float]]:
+def dot_positions(figure):
     """Return where the dots of each row stand, in percent, by panel and label of the row.
 
     A row has two dots, the reference and the rate, or the rate alone, as in
@@ -139,7 +133,7 @@ def test_a_figure_has_its_labels_its_counts_and_the_conditions_of_its_runs(name,
     assert CONDITIONS_BELOW_A_FIGURE in texts[0]
 
 
-def bar_widths_by_color(panel: Axes) -> dict[str, float]:
+def bar_widths_by_color(panel):
     """The length of a panel's bars by color; each part of a bar begins where the last one ends."""
     found: dict[str, float] = {}
     ends: defaultdict[float, float] = defaultdict(float)
@@ -175,18 +169,14 @@ def test_each_part_of_a_bar_is_as_long_as_its_share_of_the_played_episodes(monke
         assert forgetful.get(color, 0) == pytest.approx(share), color
 
 
-def test_drawn_gaps_are_those_of_the_tables():
-    """A dot for explicit, one for the implicit setting: their distance is the gap, in points."""
-    found = run_data()
+def test_the_dots_of_a_policy_are_its_explicit_and_its_implicit_rate():
+    """The listener wins everything, the forgetful policy nothing but explicit episodes."""
+    shown = dot_positions(drawn_figure("gaps", run_data()))
 
-    shown = dot_positions(drawn_figure("gaps", found))
-
-    assert {setting for setting, _ in shown} == {"direct", "reasoning", "contextual", "spatial"}
-    for policy_run, name in found.frame.names.items():
-        for (setting, label), (explicit, implicit) in shown.items():
-            if label.startswith(name):
-                gap = found.summaries[policy_run, ALL_TASKS, InstructionOptions(setting)].gap
-                assert implicit - explicit == pytest.approx(100 * gap.value), (setting, label)
+    assert len(shown) == 2 * 4, "two policies and four settings"
+    for setting in ("direct", "reasoning", "contextual", "spatial"):
+        assert shown[setting, "listener (privileged), n = 3"] == [100.0, 100.0]
+        assert shown[setting, "forgetful (privileged), n = 3"] == [100.0, 0.0]
 
 
 def test_a_policy_that_lacks_a_planned_trial_is_marked_as_incomplete():
@@ -202,9 +192,10 @@ def test_a_policy_that_lacks_a_planned_trial_is_marked_as_incomplete():
 @pytest.mark.parametrize(
     ("rate", "ends"),
     [
-        pytest.param(Rate(0.5, None, Interval(0.25, 0.625)), [25, 62.5], id="rate"),
-        pytest.param(Rate(0.5, 0.75, Interval(-0.375, -0.125)), [37.5, 62.5], id="difference"),
+        (Rate(0.5, None, Interval(0.25, 0.625)), [25, 62.5]),
+        (Rate(0.5, 0.75, Interval(-0.375, -0.125)), [37.5, 62.5]),
     ],
+    ids=["rate", "difference"],
 )
 def test_an_interval_is_drawn_around_its_rate(rate, ends):
     """Of a difference to a reference, 0.75, it is added to the reference: 0.75 - 0.375 = 37.5 %."""
@@ -214,44 +205,46 @@ def test_an_interval_is_drawn_around_its_rate(rate, ends):
 
 
 def test_a_published_gap_is_over_the_tasks_that_have_its_setting():
-    """Would find the explicit average of all tasks next to that of fewer tasks in a setting."""
-    rows = {(row.model, row.options.setting): row for row in published_rows("main")}
-
+    """All 11 tasks have direct; with the 4 that lack places, MemER's explicit rate is lower."""
     shown = dot_positions(drawn_figure("gaps", run_data([]), published=True))
 
-    assert len(shown) == 4 * len({model for model, _ in rows})
-    for (setting, model), (explicit, implicit) in shown.items():
-        row = rows[model, setting]
-        played = [task for task, rate in row.rates.items() if rate is not None]
-        average = rows[model, "explicit"].average_over(played)
-        assert implicit == pytest.approx(float(row.average))
-        assert explicit == pytest.approx(float(average or 0))
+    assert len(shown) == 4 * 5, "four settings and five policies"
+    assert shown["direct", "MemER"] == pytest.approx([42.91, 32.67])
+    assert shown["spatial", "MemER"] == pytest.approx([55.33, 26.29])
 
 
 def test_there_is_no_figure_of_gaps_without_results():
     assert draw_figure("gaps", run_data([])) is None
 
 
-def test_published_rows_stand_below_a_line_and_own_rates_that_differ_have_a_sign():
-    """One episode of ours stands next to 50 times 3 of the paper's: marked ≠, with its n = 1."""
-    first = next(
-        result
-        for result in like_published("main", "MemER")
-        if (result.task, result.setting, result.episode) == ("PickXtimes", "direct", 0)
-    )
+@pytest.fixture
+def figure_of_one_episode_next_to_the_paper():
+    """One won or lost episode of MemER, next to the paper's rates of 50 episodes and 3 seeds."""
+    for result in like_published("main", "MemER"):
+        if (result.task, result.setting) == ("PickXtimes", "direct"):
+            return drawn_figure("gaps", run_data([result]), published=True)
+    raise LookupError("direct")
 
-    figure = drawn_figure("gaps", run_data([first]), published=True)
 
-    panel = figure.axes[0]
+def test_published_rows_stand_below_a_line(figure_of_one_episode_next_to_the_paper):
+    """The line is between our only row and the heading *published*."""
+    panel = figure_of_one_episode_next_to_the_paper.axes[0]
+
     labels = [text_without_line_breaks(label) for label in panel.get_yticklabels()]
-    assert labels[:2] == ["MemER, n = 1 ≠", "published, n = 50 × 3"]
-    assert len(labels) == 2 + len({row.model for row in published_rows("main")})
-
     (line,) = (line for line in panel.lines if [*line.get_xdata()] == [0, 1])
     own, heading = panel.get_yticks()[:2]
+    assert labels[1] == "published, n = 50 × 3"
+    assert len(labels) == 2 + 5, "and five policies of the paper"
     assert own < line.get_ydata()[0] < heading
 
+
+def test_own_rates_that_cannot_be_compared_with_the_papers_have_a_sign(
+    figure_of_one_episode_next_to_the_paper,
+):
+    figure = figure_of_one_episode_next_to_the_paper
+
     texts = [text_without_line_breaks(text) for text in drawn_texts(figure)]
+    assert "MemER, n = 1 ≠" in texts
     assert "≠ Implicit settings are not comparable with the published rates" in texts[0]
     assert "PickXtimes" in texts
 
@@ -265,23 +258,19 @@ def test_a_figure_without_published_rates_does_not_mention_them():
 
 
 def test_rates_of_each_context_length_are_drawn_from_those_of_the_shortest():
-    """A context has up to five stages; the shortest has the first and the last, (1, 5).
+    """A context has up to five stages; the shortest, (1, 5), has the rate 29.11 in the paper.
 
-    Rows of our results, which have the rates of the paper but for rounding, have a count in their
-    labels, as in "MemER, n = 50".
+    Our results have the same rate without rounding: 131 of 450 trials are 29.111….
     """
-    rates = {(row.model, row.options.stages): row.average for row in published_rows("context")}
-
     figure = drawn_figure("context", run_data(like_published("context")), published=True)
 
     shown = dot_positions(figure)
     assert {title for title, _ in shown} == {"stages 1,2,5", "stages 1,2,3,5", "stages 1,2,3,4,5"}
-    for (title, label), (shortest, rate) in shown.items():
-        model, _, own_count = label.partition(",")
-        stages = tuple(map(int, title.removeprefix("stages ").split(",")))
-        near = 0.01 if own_count else 1e-9
-        assert shortest == pytest.approx(float(rates[model, (1, 5)]), abs=near)
-        assert rate == pytest.approx(float(rates[model, stages]), abs=near)
+    assert shown["stages 1,2,5", "FrameS-Modul"] == pytest.approx([29.11, 30.22])
+    assert shown["stages 1,2,5", "FrameS-Modul, n = 50 × 3 ≠"] == pytest.approx(
+        [29.1111, 30.2222], abs=1e-4
+    )
+    assert shown["stages 1,2,3,5", "FrameS-Modul"] == pytest.approx([29.11, 26.45])
 
 
 def test_there_is_no_figure_of_the_shortest_context_alone():

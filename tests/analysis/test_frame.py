@@ -5,9 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from flat_jobs import frame_of, make_result
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from flat_jobs import frame_of, make_result, make_results
 from made_records import make_record
 from page_text import store
 
@@ -136,38 +134,22 @@ def test_a_planned_episode_without_result_is_missing_for_the_first_version_that_
     assert missing == {"a": 0, "b": 1}
 
 
-OUTCOMES_BY_TRIAL = st.dictionaries(
-    st.tuples(
-        st.sampled_from(["explicit", "direct"]),
-        st.sampled_from(["PickXtimes", "BinFill"]),
-        st.integers(0, 5),
-        st.integers(0, 1),
-    ),
-    st.sampled_from([*OUTCOMES, "missing"]),
-)
-"""Outcomes by setting, task, episode and policy seed."""
+def test_results_in_two_runs_in_any_order_are_the_same_table_as_one_run_in_order():
+    """Two runs of one plan complete each other; the episode that neither played is missing."""
+    in_order = [
+        *make_results("10!1"),
+        *make_results("0011", "direct"),
+        *make_results("11", task="BinFill"),
+    ]
+    planned = [result.identity for result in [*in_order, make_result(episode=9)]]
 
-
-@settings(max_examples=25)
-@given(OUTCOMES_BY_TRIAL, st.randoms(use_true_random=False))
-def test_shuffled_results_in_two_runs_are_the_same_table_as_one_run_in_order(plays, random):
-    """Two runs of one plan complete each other; what neither played is missing."""
-    found = []
-    for (setting, task, episode, seed), outcome in plays.items():
-        result = make_result(outcome, episode, setting=setting, task=task, policy_seed=seed)
-        found.append(result)
-    planned = [result.identity for result in found]
-    played = [result for result in found if result.outcome != "missing"]
-    mixed = random.sample(played, len(played))
-    cut = random.randint(0, len(mixed))
-
-    whole = make_frame([("whole", played)], planned)
-    parts = make_frame([("a", mixed[:cut]), ("b", mixed[cut:])], planned)
+    whole = make_frame([("whole", in_order)], planned)
+    parts = make_frame([("a", in_order[:2:-1]), ("b", in_order[2::-1])], planned)
 
     for name in ("run", "outcome", "options", "task", "episode"):
-        assert list(parts[name]) == list(whole[name])
-    assert sorted(whole["outcome"]) == sorted(plays.values())
+        assert list(parts[name]) == list(whole[name]), name
     assert repr(cells_of(parts)) == repr(cells_of(whole))
+    assert sum(cell.missing for cell in cells_of(parts).values()) == 1
 
 
 def test_an_episode_played_in_two_runs_counts_in_each_under_a_name_of_its_own():

@@ -16,7 +16,6 @@ from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.run_cells import cells_of
 from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.analysis.tables.run_tables import make_run_tables
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.word_sampler import LANGUAGE_VERSION
@@ -25,148 +24,197 @@ from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
 SETTINGS = ("reasoning", "spatial")
+"""Settings of the headline in these tests; *explicit* is what they are compared with."""
 
 
-def random_policy_floors(excess):
+def random_policy_floors(points_over_chance):
+    """Return floors of the random episodes, as of ``{"direct": 0.7}``: 70 points over chance.
+
+    A floor is what shortcuts reach without understanding the instruction.
+    """
     found = {}
-    for name, value in excess.items():
-        key = FloorKey(RANDOM, name)
-        found[key] = ShortcutRow(key, 9, {}, Excess(value, 0.01))
+    for setting, excess in points_over_chance.items():
+        key = FloorKey(RANDOM, setting)
+        found[key] = ShortcutRow(key, 9, {}, Excess(excess, 0.01))
     return found
 
 
 @pytest.fixture
 def floors_with_two_settings_near_chance(monkeypatch):
-    """Floors of version 1 of the language, which made-up results have."""
-    found = random_policy_floors({"direct": 0.7, "reasoning": 0.05, "spatial": -0.1})
-    others = random_policy_floors({"direct": 0.7, "reasoning": 0.7, "spatial": -0.1})
-    stored = {"1": found, LANGUAGE_VERSION: others}
+    """Floors by which the headline has the settings reasoning and spatial, in language version 1.
+
+    The current version has others, so that it shows if its floors are taken for version 1.
+    """
+    stored = {
+        "1": random_policy_floors({"direct": 0.7, "reasoning": 0.05, "spatial": -0.1}),
+        LANGUAGE_VERSION: random_policy_floors({"direct": 0.7, "reasoning": 0.7, "spatial": -0.1}),
+    }
     monkeypatch.setattr(headline, "measured_floors", stored.get)
 
 
 def results_of_20_episodes_half_won():
-    """As many episodes as an interval needs, the outcomes by turns."""
-    wins = "01" * 10
-    explicit = make_results("1" * 20)
-    return [*explicit, *make_results(wins, "reasoning"), *make_results(wins, "spatial")]
-
-
-def results_of_two_tasks(**fields):
-    """Return results in two settings of PickXtimes and in one of StopCube.
-
-    The gap of a setting is its rate minus that of explicit on the same episodes.
-    """
+    """Return 20 explicit successes; in reasoning and spatial every second episode is lost."""
+    half = "01" * 10
     return [
-        *make_results("1110", "explicit", **fields),
-        *make_results("1100", "reasoning", **fields),  # 2 of 4: -1/4
-        *make_results("00", "spatial", **fields),  # 0 of 2, explicit 2 of 2: -1
-        *make_results("11", "explicit", task="StopCube", **fields),
-        *make_results("01", "reasoning", task="StopCube", **fields),  # 1 of 2: -1/2
-        *make_results("11", "direct", task="StopCube", **fields),
+        *make_results("1" * 20, "explicit"),
+        *make_results(half, "reasoning"),
+        *make_results(half, "spatial"),
     ]
 
 
-def results_of_one_episode():
-    return [*make_results("1"), *make_results("0", "reasoning"), *make_results("0", "spatial")]
-
-
 def headline_of(results, settings=SETTINGS):
+    """Return the headline of the only policy; None if it has none."""
     frame = frame_of(results)
     (policy_run,) = frame.names
     return measure_headline(cells_of(frame), policy_run, settings)
 
 
 def notes_of(results):
+    """Return the notes that stand below tables, one for each policy."""
     frame = frame_of(results)
     return list(headline_notes(cells_of(frame), frame.names))
 
 
 def test_the_headline_number_is_the_mean_gap_of_the_settings_each_a_mean_over_its_tasks():
-    """Gaps to explicit: reasoning -1/4 and -1/2 in two tasks, spatial -1 in one."""
-    found = headline_of(results_of_two_tasks())
-    assert found.gap == pytest.approx(((-1 / 4 - 1 / 2) / 2 + -1) / 2)
-    assert (found.episodes, found.is_complete) == (6, True)
-    low, high = found.interval
-    assert -1 < low < found.gap < high
+    """A letter is an episode: 1 won, 0 lost. The setting direct does not count.
 
-    lost = [*make_results("00"), *make_results("10", "reasoning"), *make_results("00", "spatial")]
-    assert headline_of(lost).gap == 0.25  # though nothing was won without implicit reference
+    Gaps to explicit on the same episodes: reasoning -1/4 and -1/2, a mean of -3/8; spatial -1.
+    The mean of both is -11/16.
+    """
+    results = [
+        *make_results("1110", "explicit", task="PickXtimes"),
+        *make_results("1100", "reasoning", task="PickXtimes"),
+        *make_results("00", "spatial", task="PickXtimes"),
+        *make_results("11", "explicit", task="StopCube"),
+        *make_results("01", "reasoning", task="StopCube"),
+        *make_results("11", "direct", task="StopCube"),
+    ]
+
+    found = headline_of(results)
+
+    assert found.gap == pytest.approx(-11 / 16)
+    assert found.episodes == 6
+    assert found.is_complete
+    assert -1 < found.interval.low < -11 / 16 < found.interval.high
+
+
+def test_the_headline_number_is_positive_if_implicit_instructions_are_won_more_often():
+    """Reasoning wins one of two more than explicit, spatial none: a mean of 1/4."""
+    results = [
+        *make_results("00", "explicit"),
+        *make_results("10", "reasoning"),
+        *make_results("00", "spatial"),
+    ]
+
+    assert headline_of(results).gap == 0.25
 
 
 def test_the_headline_has_an_interval_although_all_episodes_ended_alike():
-    """All are lost, and spatial has 5 of 20. A width of 0 would look like certainty."""
-    lost = [
-        *make_results("1" * 20),
+    """Explicit wins all 20, the others none. A width of 0 would look like certainty."""
+    results = [
+        *make_results("1" * 20, "explicit"),
         *make_results("0" * 20, "reasoning"),
         *make_results("0" * 5, "spatial"),
     ]
-    found = headline_of(lost)
+
+    found = headline_of(results)
+
     assert found.gap == pytest.approx(-1)
     assert found.interval.high > -0.8
 
 
 def test_a_second_setting_on_the_same_episodes_does_not_narrow_the_interval():
-    """Half of explicit's wins are lost in each setting. Would find episodes drawn independently."""
-    both, alone = (
-        headline_of(results_of_20_episodes_half_won(), settings)
-        for settings in (SETTINGS, SETTINGS[1:])
-    )
+    """Would find settings that are counted as if their episodes were drawn independently."""
+    results = results_of_20_episodes_half_won()
+
+    both = headline_of(results, ("reasoning", "spatial"))
+    alone = headline_of(results, ("spatial",))
+
+    assert both.gap == alone.gap == pytest.approx(-0.5)
     assert both.interval == pytest.approx(alone.interval)
-    assert (both.gap, alone.gap) == pytest.approx((-0.5, -0.5))
 
 
-def test_there_is_no_headline_without_explicit_or_without_one_of_its_settings():
-    results = results_of_two_tasks()
-    for setting in ("spatial", "explicit"):
-        assert (
-            headline_of([result for result in results if result.options.setting != setting]) is None
-        )
-    assert headline_of(results, ()) is None
+@pytest.mark.parametrize(
+    ("played", "settings"),
+    [
+        (("reasoning", "spatial"), SETTINGS),
+        (("explicit", "reasoning"), SETTINGS),
+        (("explicit", "reasoning"), ()),
+    ],
+    ids=["no explicit results", "a setting was not played", "no setting counts"],
+)
+def test_there_is_no_headline_without_explicit_or_without_one_of_its_settings(played, settings):
+    results = []
+    for setting in played:
+        results += make_results("11", setting)
+
+    assert headline_of(results, settings) is None
 
 
-def test_every_table_has_the_headline_below_it_or_the_reason_why_there_is_none(
-    floors_with_two_settings_near_chance,
-):
-    (note,) = notes_of(results_of_20_episodes_half_won())
+@pytest.mark.usefixtures("floors_with_two_settings_near_chance")
+def test_every_table_has_the_headline_below_it():
+    """Half of the explicit successes are lost in each setting: −50 points."""
+    frame = frame_of(results_of_20_episodes_half_won())
+
+    main_table = make_table("main", RunData(frame))
+    (run_table,) = make_run_tables(frame)
+
+    (note,) = headline_notes(cells_of(frame), frame.names)
     assert note.startswith("Headline of listener: −50.0 points to explicit (95 % interval ")
     assert note.endswith("reasoning, spatial; 20 episodes.")
-    assert notes_of(results_of_20_episodes_half_won()) == [note], "to explicit of the same language"
-
-    frame = frame_of(results_of_20_episodes_half_won())
-    (run_table,) = make_run_tables(frame)
-    assert note in make_table("main", RunData(frame)).notes
+    assert note in main_table.notes
     assert note in run_table.notes
-    for setting in ("spatial", "explicit"):
-        error = make_result("error", 20, options=InstructionOptions(setting))
-        assert notes_of([*results_of_20_episodes_half_won(), error])[0].endswith(
-            "20 episodes, incomplete."
-        )
-    for results, reason in (
-        (results_of_one_episode(), "1 episode cannot give it an interval; play more."),
+
+
+@pytest.mark.usefixtures("floors_with_two_settings_near_chance")
+@pytest.mark.parametrize("setting", ["spatial", "explicit"])
+def test_a_headline_is_called_incomplete_if_an_episode_behind_it_ended_in_an_error(setting):
+    error = make_result("error", episode=20, setting=setting)
+
+    (note,) = notes_of([*results_of_20_episodes_half_won(), error])
+
+    assert note.endswith("20 episodes, incomplete.")
+
+
+@pytest.mark.usefixtures("floors_with_two_settings_near_chance")
+@pytest.mark.parametrize(
+    ("wins", "fields", "reason"),
+    [
+        ("1", {}, "1 episode cannot give it an interval; play more."),
         (
-            results_of_two_tasks(language_version="0.9"),
+            "1111",
+            {"language_version": "0.9"},
             "no floors were measured for its language",
         ),
         (
-            results_of_two_tasks(wordings="robomme@1a2b3c4d"),
+            "1111",
+            {"wordings": "robomme@1a2b3c4d"},
             "the floors are those of our own words of",
         ),
-    ):
-        (note,) = notes_of(results)
-        assert note.startswith(f"listener has no headline number: {reason}")
+    ],
+    ids=["one episode", "a language without floors", "words of a file"],
+)
+def test_a_policy_without_a_headline_has_the_reason_below_its_table(wins, fields, reason):
+    results = []
+    for setting in ("explicit", "reasoning", "spatial"):
+        results += make_results(wins, setting, **fields)
+
+    (note,) = notes_of(results)
+
+    assert note.startswith(f"listener has no headline number: {reason}")
 
 
 def test_the_headline_counts_settings_in_which_shortcuts_win_at_most_5_points_over_chance():
-    """Measured here: direct 5.01 points above, reasoning 5, spatial below.
+    """Shortcuts win 5.01 points more than chance in direct, 5 in reasoning, fewer in spatial.
 
-    Parts (another pool of episodes, a single task) do not let direct in.
+    That they win less in a part of direct (the test split, one task) does not let it in.
     """
-    found = random_policy_floors({"direct": 0.0501, "reasoning": 0.05, "spatial": -0.3})
-    parts = [FloorKey(TEST, "direct"), FloorKey(RANDOM, "direct", "StopCube")]
+    floors = random_policy_floors({"direct": 0.0501, "reasoning": 0.05, "spatial": -0.3})
+    low = floors[FloorKey(RANDOM, "spatial")]
+    floors[FloorKey(TEST, "direct")] = low
+    floors[FloorKey(RANDOM, "direct", "StopCube")] = low
 
-    found |= dict.fromkeys(parts, found[RANDOM, "spatial", "", ""])
-
-    assert settings_at_chance(found) == ("reasoning", "spatial")
+    assert settings_at_chance(floors) == ("reasoning", "spatial")
 
 
 def test_rates_of_shortcuts_are_stored_for_every_implicit_setting_and_task():
@@ -174,12 +222,13 @@ def test_rates_of_shortcuts_are_stored_for_every_implicit_setting_and_task():
 
     Such a rate, a *floor*, is what a policy reaches without understanding.
     """
-    implicit = {name for name, setting in all_settings().items() if setting.implicit}
-    wanted = {FloorKey(RANDOM, name) for name in implicit}
-    for task in all_tasks().values():
-        wanted |= {FloorKey(RANDOM, name, task.name) for name in implicit & {*settings_of(task)}}
+    instruction = instruct(get_episode("PickXtimes", "test", 0))
 
-    language = instruct(get_episode("PickXtimes", "test", 0)).metadata["language_version"]
-    measured = measured_floors(str(language)) or {}
+    measured = measured_floors(str(instruction.metadata["language_version"])) or {}
 
-    assert wanted <= measured.keys()
+    for name, setting in all_settings().items():
+        if setting.implicit:
+            assert FloorKey(RANDOM, name) in measured
+            for task in all_tasks().values():
+                if name in settings_of(task):
+                    assert FloorKey(RANDOM, name, task.name) in measured

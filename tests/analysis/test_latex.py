@@ -30,7 +30,7 @@ LONG_POLICY_NAME = (
 )
 
 
-def table_with_full_entries(policies: int, tasks: int) -> Table:
+def table_with_full_entries(policies, tasks):
     """A table of which every entry has all that an entry can have."""
     entry = Entry(
         Decimal("100.00"), change=Decimal("-100.00"), best=True, marks="!…", differences=("split",)

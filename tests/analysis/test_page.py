@@ -7,7 +7,6 @@ import itertools
 import os
 import re
 import threading
-from contextlib import ExitStack
 from pathlib import Path
 from time import monotonic
 from types import SimpleNamespace
@@ -20,7 +19,6 @@ from page_text import PLAN, broken, played, store, words
 from roboirg.analysis.page.page_server import run_server
 from roboirg.analysis.page.report import write_report
 from roboirg.records.episode_log import EpisodeLog, log_path
-from roboirg.records.record import Record
 from roboirg.runs.play.video_writer import VideoWriter
 
 pytest.importorskip("jinja2")
@@ -35,7 +33,7 @@ PRINTED = Path(__file__).with_name("printed_page.txt")
 
 
 @functools.cache
-def records_of_page() -> tuple[Record, ...]:
+def records_of_page():
     """Return the records of the plan: the forgetful policy fails where it must remember.
 
     The last is an error, and episode 0 of PickXtimes was filmed.
@@ -325,38 +323,58 @@ def wait_until(element, predicate):
         element.page.wait_for_timeout(20)
 
 
-def test_a_served_page_plays_the_film_from_a_chosen_moment_and_links_what_was_printed(
-    open_page, run_with_a_film
-):
-    """Needs a server that answers parts of a file; would find a film that starts at its begin."""
-    with ExitStack() as stack:
-        written = write_report(run_with_a_film, served=True)
-        server = stack.enter_context(run_server(run_with_a_film.folder))
-        address = f"http://127.0.0.1:{server.port}/"
+@pytest.fixture
+def served_page(open_page, run_with_a_film):
+    """The page of the run behind a server, with the first two episodes opened."""
+    written = write_report(run_with_a_film, served=True)
+    with run_server(run_with_a_film.folder) as server:
         threading.Thread(target=server.serve_forever).start()
-        stack.callback(server.shutdown)
-        page = stack.enter_context(open_page(address + written.name))
-        for number in (0, 1):
-            page.locator("#rows h3 button").nth(number).click()
-        (link,) = page.get_by_text("what was printed").all()
-        answer = page.request.get(address + link.get_attribute("href"))
+        with open_page(f"http://127.0.0.1:{server.port}/{written.name}") as page:
+            page.locator("#rows h3 button").nth(0).click()
+            page.locator("#rows h3 button").nth(1).click()
+            yield page
+        server.shutdown()
 
-        assert answer.body() == LOG
-        assert answer.headers["content-type"] == "text/plain; charset=utf-8"
 
-        row = page.locator("#rows > li").first
-        row.locator(".moments button", has_text="lowered").click()
-        film = row.locator("video")
-        wait_until(film, "one => one.currentTime > 0 && !one.seeking")
-        time, length = film.evaluate("one => [one.currentTime, one.duration]")
+def test_a_served_page_links_what_was_printed_as_plain_text(served_page):
+    """Only one episode printed something: words with markup, which must stay text."""
+    (link,) = served_page.get_by_text("what was printed").all()
 
-        # The turn ends where the last picture begins to be repeated; step 60 is 20 steps before.
-        assert time == pytest.approx(length - 0.8 - 20 / 80, abs=0.06)
+    answer = served_page.request.get(link.evaluate("one => one.href"))
 
-        row.locator(".track button.done, .track button.event").first.click()
-        wait_until(film, f"one => one.currentTime < {time} - 0.1")
-        assert row.locator(".head").is_visible()
-        assert film.get_attribute("src") == FILM
+    assert answer.body() == LOG
+    assert answer.headers["content-type"] == "text/plain; charset=utf-8"
+
+
+def test_a_served_page_plays_the_film_from_a_chosen_moment(served_page):
+    """Needs a server that answers parts of a file; would find a film that starts at its begin.
+
+    The cube is lowered at step 60, 20 steps before the end at 80 steps a second. The last picture
+    is repeated for 0.8 s.
+    """
+    row = served_page.locator("#rows > li").first
+    film = row.locator("video")
+
+    row.locator(".moments button", has_text="lowered").click()
+    wait_until(film, "one => one.currentTime > 0 && !one.seeking")
+
+    time, length = film.evaluate("one => [one.currentTime, one.duration]")
+    assert time == pytest.approx(length - 0.8 - 20 / 80, abs=0.06)
+    assert film.get_attribute("src") == FILM
+
+
+def test_a_click_on_the_track_below_a_film_goes_to_its_moment(served_page):
+    """The first event comes before that at which the cube is lowered."""
+    row = served_page.locator("#rows > li").first
+    film = row.locator("video")
+    row.locator(".moments button", has_text="lowered").click()
+    wait_until(film, "one => one.currentTime > 0 && !one.seeking")
+    lowered_at = film.evaluate("one => one.currentTime")
+
+    row.locator(".track button.done, .track button.event").first.click()
+
+    wait_until(film, f"one => one.currentTime < {lowered_at} - 0.1")
+    assert row.locator(".head").is_visible()
 
 
 def test_two_policies_are_compared_on_the_page_episode_by_episode(page):

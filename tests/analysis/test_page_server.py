@@ -17,7 +17,6 @@ from page_text import store
 
 from roboirg.analysis.page.page_server import run_server
 from roboirg.runs.plan.plan_maker import make_plan
-from roboirg.util.web.app_server import AppServer
 
 pytestmark = pytest.mark.usefixtures("patient_sockets")
 
@@ -49,9 +48,7 @@ def server(run_with_a_film_and_a_link):
         thread.join()
 
 
-def response_and_body(
-    server: AppServer, path: str, method: str = "GET", **headers: str
-) -> tuple[http.client.HTTPResponse, bytes]:
+def response_and_body(server, path, method="GET", **headers):
     """Request a path of the server, and return its answer and the content of that."""
     connection = http.client.HTTPConnection("127.0.0.1", server.port)
     connection.request(method, path, headers=headers)

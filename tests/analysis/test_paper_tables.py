@@ -21,7 +21,6 @@ from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
 from roboirg.analysis.tables.rendering import get_format
 from roboirg.analysis.tables.rendering.terminal import renderable
-from roboirg.analysis.tables.table import Table
 from roboirg.language.settings import settings_of
 from roboirg.stats.rates import mean_percent, percent
 from roboirg.tasks import all_tasks
@@ -45,7 +44,7 @@ def test_the_mean_of_printed_rates_is_rounded_half_up_too():
 STORED_TABLE = Path(__file__).with_name("printed_main_table.md")
 
 
-def entries_of_row(table: Table, group: str, name: str | None = None, source: str = "ours"):
+def entries_of_row(table, group, name=None, source="ours"):
     """Return the entries of the only such row by column; without a name, that of any policy."""
     (row,) = [
         row
@@ -55,7 +54,7 @@ def entries_of_row(table: Table, group: str, name: str | None = None, source: st
     return dict(zip((column.name for column in table.columns), row.entries, strict=True))
 
 
-def results_of_all_tasks(policy: str = "a", settings=("explicit", "direct"), **fields) -> list:
+def results_of_all_tasks(policy="a", settings=("explicit", "direct"), **fields):
     """Return two episodes of every task that has the setting, the first won, the second lost."""
     found = []
     for name, task in all_tasks().items():
@@ -67,7 +66,7 @@ def results_of_all_tasks(policy: str = "a", settings=("explicit", "direct"), **f
     return found
 
 
-def table_of(which: str, *results: list, planned=(), **options) -> Table:
+def table_of(which, *results, planned=(), **options):
     return make_table(which, RunData(frame_of(*results, planned=planned)), **options)
 
 
@@ -110,17 +109,14 @@ def test_each_split_has_its_own_row_of_chance():
 
     both = table_of("main", test, val, floors=(CHANCE,))
 
-    rates = []
-    for split, results in (("test", test), ("val", val)):
-        alone = table_of("main", results, floors=(CHANCE,))
-        row = entries_of_row(both, "direct", f"{CHANCE}, split {split}", "chance")
-        row_alone = entries_of_row(alone, "direct", CHANCE, "chance")
-        assert row["BinFill"].percent == row_alone["BinFill"].percent
-        rates.append(row["BinFill"].percent)
-    assert rates[0] != rates[1]
+    of_test = entries_of_row(both, "direct", f"{CHANCE}, split test", "chance")["BinFill"]
+    of_val = entries_of_row(both, "direct", f"{CHANCE}, split val", "chance")["BinFill"]
+    alone = entries_of_row(table_of("main", test, floors=(CHANCE,)), "direct", CHANCE, "chance")
+    assert of_test.percent == alone["BinFill"].percent
+    assert of_val.percent != of_test.percent
 
 
-def informative_tables(*results: list) -> set[str]:
+def informative_tables(*results):
     """Return the names of the tables that are shown if none is asked for."""
     data = RunData(frame_of(*results))
     return {name for name in WHICH if is_informative(name, data)}
@@ -129,23 +125,26 @@ def informative_tables(*results: list) -> set[str]:
 @pytest.mark.parametrize(
     ("results", "tables"),
     [
-        pytest.param([make_result(task="PutInBox")], {"real"}, id="task of the real robot"),
-        pytest.param([make_result(task="Outside")], {"other"}, id="task of another package"),
-        pytest.param(results_of_all_tasks(), {"main"}, id="a policy"),
-        pytest.param(
-            results_of_all_tasks(settings=("explicit", "contextual")), {"main"}, id="a length"
-        ),
-        pytest.param(
-            [make_result(arm="silent"), *results_of_all_tasks()], {"main"}, id="a control arm"
-        ),
-        pytest.param(
+        ([make_result(task="PutInBox")], {"real"}),
+        ([make_result(task="Outside")], {"other"}),
+        (results_of_all_tasks(), {"main"}),
+        (results_of_all_tasks(settings=("explicit", "contextual")), {"main"}),
+        ([make_result(arm="silent"), *results_of_all_tasks()], {"main"}),
+        (
             [
                 *results_of_all_tasks(settings=("contextual",)),
                 *results_of_all_tasks(settings=("contextual",), stages=(1, 5)),
             ],
             {"main", "context"},
-            id="two lengths of the context",
         ),
+    ],
+    ids=[
+        "task of the real robot",
+        "task of another package",
+        "a policy",
+        "a length",
+        "a control arm",
+        "two lengths of the context",
     ],
 )
 def test_tables_without_a_choice_are_those_for_which_a_run_has_something_to_compare(
@@ -169,7 +168,7 @@ def test_the_table_of_planners_is_shown_if_a_planner_stands_next_to_another_poli
 LONG_POLICY_NAME = "a_package.with_a_long_name.policies:" + "Net" * 40
 
 
-def drawn_table(table: Table, width: int, *, in_terminal: bool) -> str:
+def drawn_table(table, width, *, in_terminal):
     """Return a table as it is drawn in so many characters, in a terminal or into a file."""
     console = Console(
         file=io.StringIO(), width=width, force_terminal=in_terminal, color_system=None
@@ -264,12 +263,13 @@ def test_results_in_simulation_are_marked_and_kept_apart_from_those_of_a_real_ro
 
 def test_the_note_on_averages_counts_the_tasks_of_the_run_next_to_published_rows():
     """Two tasks were played, and one of them has no spatial setting; the paper has 7 of 11."""
-    results = []
-    for task, settings in (("StopCube", ["explicit"]), ("PickXtimes", ["explicit", "spatial"])):
-        for setting in settings:
-            results += make_results("10", setting, task=task)
+    results = [
+        *make_results("10", "explicit", task="StopCube"),
+        *make_results("10", "explicit", task="PickXtimes"),
+        *make_results("10", "spatial", task="PickXtimes"),
+    ]
 
-    notes = make_table("main", RunData(frame_of(results)), published=True).notes
+    notes = table_of("main", results, published=True).notes
 
     (note,) = [note for note in notes if note.startswith("Averages of spatial")]
     assert "over the 1 of 2 tasks that have it" in note
@@ -278,15 +278,17 @@ def test_the_note_on_averages_counts_the_tasks_of_the_run_next_to_published_rows
 @pytest.mark.parametrize(
     "difference",
     [{"split": "val"}, {"max_steps": 900}, {"language_version": "2"}, {"episode": 5}],
-    ids=lambda difference: next(iter(difference)),
+    ids=["split", "step limit", "language", "episodes"],
 )
 def test_no_rate_is_bold_against_one_of_another_split_limit_version_or_other_episodes(difference):
-    good = [make_result("success", policy="good"), make_result("success", 1, policy="good")]
-    poor = [make_result("failure", policy="poor"), make_result("failure", 1, policy="poor")]
-    others = [make_result(**{"outcome": "failure", "policy": "poor", **difference})]
+    good = make_results("11", policy="good")
+    other = [make_result("failure", policy="poor", **difference)]
 
-    alike = table_of("main", good, poor)
-    apart = table_of("main", good, others)
+    assert "**" not in get_format("markdown").draw(table_of("main", good, other))
 
-    assert "**100.00**" in get_format("markdown").draw(alike)
-    assert "**" not in get_format("markdown").draw(apart)
+
+def test_the_best_rate_of_the_same_episodes_is_bold():
+    good = make_results("11", policy="good")
+    poor = make_results("00", policy="poor")
+
+    assert "**100.00**" in get_format("markdown").draw(table_of("main", good, poor))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import re
@@ -23,7 +24,6 @@ from roboirg.records.episode_log import EpisodeLog, log_path
 from roboirg.records.record import (
     EventRecord,
     MentionSpan,
-    Record,
     SubgoalRecord,
     UtteranceRecord,
 )
@@ -59,13 +59,14 @@ class Page:
         return str(self.data["strings"][place])
 
 
-def records_with_an_error_last() -> list[Record]:
+@functools.cache
+def records_with_an_error_last():
     """Return the records of one task: the forgetful policy fails where it must remember.
 
     The last one is an error, with markup in its texts.
     """
     *found, last = played(PLAN_OF_ONE_TASK)
-    return [*found, broken(last)]
+    return (*found, broken(last))
 
 
 def written_film(folder, name="x"):
@@ -138,41 +139,39 @@ def test_an_episode_shows_where_in_its_instruction_mentions_stand():
         ({"language_version": "0.1"}, {"resolved"}),
         ({"environment_version": 9}, {"resolved", "stages"}),
     ],
+    ids=["this version", "other language", "other environment"],
 )
 def test_records_of_other_versions_are_shown_without_what_cannot_be_derived(changes, missing):
     """Another version of the language may have other words, of the environment other stages."""
-    record = next(record for record in records_with_an_error_last() if record.setting == "direct")
-
-    page = Page(render([replace(record, **changes)]))
+    page = Page(render([replace(listener_record("direct", 0), **changes)]))
 
     assert {"resolved", "stages"} - page.details[0].keys() == missing
 
 
 def test_a_record_of_an_unknown_task_is_shown_with_its_events():
-    record = next(record for record in records_with_an_error_last() if record.setting == "direct")
     turn = UtteranceRecord(stage="command", text="Do it.")
     mention = MentionSpan(
         utterance=0, start=3, end=5, role="anaphor", expression="it", slot="x", value=1
     )
-
-    page = Page(
-        render([replace(record, task="Homemade", instruction=(turn,), mentions=(mention,))])
+    record = replace(
+        listener_record("direct", 0), task="Homemade", instruction=(turn,), mentions=(mention,)
     )
 
+    page = Page(render([record]))
+
+    assert texts_with_steps(page, "events")[-1] == (70, "took cube green off target")
     assert not {"resolved", "stages"} & page.details[0].keys()
-    assert page.string(page.details[0]["events"][-1][1]) == "took cube green off target"
 
 
 def test_events_tell_equal_cubes_apart_by_number_and_leave_out_what_ends_by_itself():
     """A cube is picked up; that it is then no longer *over the bin* is no event of its own."""
     first, *_ = played(PLAN_OF_ONE_TASK.model_copy(update={"tasks": ("BinFill",)}))
-    event = EventRecord(step=1, kind="picked", subject="cube_red_1")
-    over = replace(event, kind="over", place="bin", holds=False)
-    page = Page(render([replace(first, events=(event, over))]))
+    picked = EventRecord(step=1, kind="picked", subject="cube_red_1")
+    not_over = EventRecord(step=1, kind="over", subject="cube_red_1", place="bin", holds=False)
 
-    acts = [page.string(act) for _, act, _ in page.details[0]["events"]]
+    page = Page(render([replace(first, events=(picked, not_over))]))
 
-    assert acts == ["picked up the red cube (1)"]
+    assert texts_with_steps(page, "events") == [(1, "picked up the red cube (1)")]
 
 
 def test_missing_episodes_and_errors_are_named_at_the_top_of_the_page():
@@ -189,66 +188,144 @@ def test_missing_episodes_and_errors_are_named_at_the_top_of_the_page():
 
 
 def test_a_complete_run_of_two_policies_has_no_note():
-    without_error = records_with_an_error_last()[:-1]
+    *without_error, _ = records_with_an_error_last()
 
     assert Page(render(without_error)).notes == ""
 
 
-def test_a_run_of_a_single_policy_that_fails_everywhere_is_named_at_the_top_of_the_page():
-    lost = [
-        replace(record, outcome="failure")
-        for record in records_with_an_error_last()
-        if record.policy == "listener"
-    ]
-
-    assert "Only one policy" in Page(render(lost)).notes
+def test_a_run_of_a_single_policy_is_named_at_the_top_of_the_page():
+    assert "Only one policy" in Page(render([listener_record("explicit", 0)])).notes
 
 
-def what_a_reader_sees(page: Page) -> str:
-    """The notes of all cells; what can be chosen, of each episode; and the details of each."""
-    lines: list[str] = []
-    for level in page.data["matrix"]["levels"]:
-        for cell in level["cells"]:
-            lines += cell["note"]
-    for choice in page.data["choices"]:
-        values = [*choice["values"], "none"]  # whose place is -1
-        chosen = [values[place] for place in page.data["columns"][choice["name"]]]
-        lines.append(f"{choice['label']}: {chosen}")
-    for details in page.details:
-        lines += [f"{name}: {details[name]}" for name in details]
-    return "\n".join([*lines, page.notes])
-
-
-def test_cells_choices_and_details_are_as_stored(snapshot, monkeypatch):
-    """Of three scenes with other cubes, seeds and outcomes, with everything a record may hold."""
-    monkeypatch.setattr(EpisodeDetails, "_index", lambda _, text: text)  # texts, not their numbers
-    settings = ("explicit", "contextual")
-    own = [
+def listener_record(setting, episode):
+    """Return the record of an episode of PickXtimes that the listener won."""
+    return next(
         record
         for record in records_with_an_error_last()
-        if record.policy == "listener" and record.setting in settings
+        if (record.policy, record.setting, record.episode) == ("listener", setting, episode)
+    )
+
+
+def texts_with_steps(page, name):
+    """Return the entries of a list in the details of the only episode, each as step and text."""
+    return [(step, page.string(text)) for step, text, *_ in page.details[0][name]]
+
+
+def test_an_episode_shows_what_happened_in_each_step():
+    """Step -10 is in the video before the policy's turn."""
+    page = Page(render([listener_record("explicit", 1)]))
+
+    assert texts_with_steps(page, "events") == [
+        (-10, "moved the green cube over the target"),
+        (40, "picked up the green cube"),
+        (60, "lowered the green cube or let it go"),
+        (60, "placed the green cube on the target"),
+        (70, "took the green cube off the target"),
     ]
-    *others, cut = sorted(own, key=lambda record: (record.episode, record.setting == "contextual"))
-    audit_record(cut, PreparedJob(cut.identity), PromptLimit(24, 0, most_tokens, "some.model"))
-    said = [
+
+
+def test_an_episode_shows_when_each_stage_of_its_task_was_completed():
+    page = Page(render([listener_record("explicit", 1)]))
+
+    assert [(page.string(text), step) for text, step in page.details[0]["stages"]] == [
+        ("pick up the green cube for the first time", 40),
+        ("place the green cube onto the target", 60),
+        ("press the button to stop", None),
+    ]
+
+
+def test_an_episode_shows_the_subgoals_of_a_planner_and_what_was_wrong_with_them():
+    subgoals = (
         SubgoalRecord(step=0, text="pick it up", due="pick it up", verdict="right", ended="done"),
-        SubgoalRecord(step=8, text="dance", due="put it down", verdict="lost", ended="refused",
-                      why="it fits nothing"),
+        SubgoalRecord(
+            step=8, text="dance", due="put it down", verdict="lost", ended="refused", why="no"
+        ),
         SubgoalRecord(step=9, text="sing", verdict="wrong_count", ended="failed"),
-    ]  # fmt: skip
-    cut = replace(cut, subgoals=tuple(said), started_at="2026-01-02T05:06:07", video_error="full")
-    lost = {("contextual", 0), ("explicit", 1), ("contextual", 2)}
-    found = [
-        replace(record, policy_seed=8 + record.episode, server_version="9",
-                outcome="failure" if (record.setting, record.episode) in lost else "success")
-        for record in (*others, cut)
-    ]  # fmt: skip
-    page = Page(render(found))
+    )
 
-    assert "2026-01-02 03:04 to 05:06 UTC" in page.text
+    page = Page(render([replace(listener_record("explicit", 1), subgoals=subgoals)]))
 
-    shown = what_a_reader_sees(page)
-    assert re.sub(r"language \S+, environment \d+", "", shown) == snapshot
+    assert texts_with_steps(page, "subgoals") == [
+        (0, "pick it up"),
+        (8, "dance (lost; due: put it down; refused: no)"),
+        (9, "sing (wrong count; due: nothing; failed)"),
+    ]
+
+
+def test_an_episode_shows_how_much_of_each_turn_the_model_read():
+    """The prompt has room for 24 tokens: the command is cut, which is the fifth turn."""
+    record = replace(listener_record("contextual", 2))
+    audit_record(record, PreparedJob(record.identity), PromptLimit(24, 0, most_tokens, "a.model"))
+
+    page = Page(render([record]))
+
+    (details,) = page.details
+    assert details["reached"] == [35, 17, 17, 8, 0]
+    assert page.string(details["prompt"]) == (
+        "cut: needs 50 tokens, the model reads 24 (counted with a.model); 2 mentions lost, 1 of "
+        "them referring back"
+    )
+
+
+def test_an_episode_shows_the_conditions_under_which_it_was_played():
+    page = Page(render([replace(listener_record("explicit", 1), server_version="9")]))
+
+    shown = page.string(page.details[0]["conditions"])
+    assert shown.startswith(
+        "test split, at most 1300 steps, in our own words; policy built-in (server 9), language "
+    )
+    assert "2026-01-02 03:04 UTC" in page.text
+
+
+def test_a_cell_of_the_table_has_a_note_with_its_rate_its_interval_and_its_gap_to_explicit():
+    """The listener wins 2 of 3 explicit episodes and 1 of the same 3 with a context."""
+    won = [("explicit", 0), ("explicit", 2), ("contextual", 1)]
+    records = []
+    for setting in ("explicit", "contextual"):
+        for episode in range(3):
+            outcome = "success" if (setting, episode) in won else "failure"
+            records.append(replace(listener_record(setting, episode), outcome=outcome))
+
+    page = Page(render(records))
+
+    explicit, contextual = page.data["matrix"]["levels"][0]["cells"]
+    assert explicit["note"] == [
+        "listener (privileged), PickXtimes, explicit",
+        "67 % success: 2 of 3 trials, 3 episodes",
+        "95 % interval 10 to 99 %",
+    ]
+    assert contextual["note"] == [
+        "listener (privileged), PickXtimes, contextual",
+        "33 % success: 1 of 3 trials, 3 episodes",
+        "95 % interval 1 to 90 %",
+        (
+            "−33 points to explicit on the same 3 episodes (95 % interval −98.1 to +80.3), "
+            "p = 1.000 (Holm)"
+        ),
+    ]
+
+
+def test_episodes_can_be_chosen_by_what_differs_between_them():
+    """Of two episodes, one is lost and played with another policy seed."""
+    won = replace(listener_record("explicit", 0), policy_seed=8)
+    lost = replace(listener_record("contextual", 2), policy_seed=9, outcome="failure")
+
+    page = Page(render([won, lost]))
+
+    chosen = {}
+    for choice in page.data["choices"]:
+        places = page.data["columns"][choice["name"]]
+        chosen[choice["label"]] = [choice["values"][place] for place in places if place >= 0]
+    assert chosen == {
+        "policy": ["listener (privileged)", "listener (privileged)"],
+        "task": ["PickXtimes", "PickXtimes"],
+        "setting": ["explicit", "contextual"],
+        "form": ["implicit", "implicit"],
+        "difficulty": ["easy", "medium"],
+        "outcome": ["success", "failure"],
+        "why it failed": ["not attributed"],
+        "policy seed": ["8", "9"],
+    }
 
 
 def texts_of_goals(**fields):
@@ -298,7 +375,7 @@ def test_a_failed_episode_of_a_planner_shows_its_last_subgoal_up_to_the_failure(
 
 def test_the_same_policy_with_other_words_is_shown_as_another_with_a_warning():
     """ "mine@1a" are words of another file; spelled-out references exist in our own words only."""
-    ours = next(record for record in records_with_an_error_last() if record.setting == "direct")
+    ours = listener_record("direct", 0)
     theirs = ours.with_options(wordings="mine@1a")
 
     page = Page(render([ours, theirs]))
@@ -314,32 +391,35 @@ def test_the_same_policy_with_other_words_is_shown_as_another_with_a_warning():
     assert "in the words of mine@1a" in page.string(details_of_theirs["conditions"])
 
 
-def test_two_policies_are_paired_on_a_scene_only_with_equal_words_seed_and_split():
-    """Two results agree in all, four differ in seed, arm, form or split: one pair, four alone.
+@pytest.mark.parametrize(
+    ("changes", "pairs"),
+    [
+        ({}, [2]),
+        ({"policy_seed": 1}, [1, 1]),
+        ({"arm": "silent"}, [1, 1]),
+        ({"split": "val"}, [1, 1]),
+    ],
+    ids=["nothing", "seed", "arm", "split"],
+)
+def test_two_policies_are_paired_on_a_scene_only_with_equal_words_seed_and_split(changes, pairs):
+    """`pairs` is how many results each group has that is compared."""
+    listener = listener_record("direct", 0)
+    other = replace(listener, policy="forgetful", **changes)
 
-    The one of another split is of another scene.
-    """
-    first, theirs = (
-        record
-        for record in records_with_an_error_last()
-        if (record.setting, record.episode) == ("direct", 0)
-    )
-    others = [
-        replace(first, policy_seed=1),
-        replace(first, arm="silent"),
-        first.with_options(form="resolved"),
-        replace(first, split="val", difficulty="odd"),
-    ]
+    page = Page(render([listener, other]))
 
-    page = Page(render([first, theirs, *others]))
+    assert sorted(Counter(page.data["columns"]["pair"]).values()) == pairs
 
-    sizes_of_pairs = Counter(page.data["columns"]["pair"]).values()
-    sizes_of_scenes = Counter(page.data["columns"]["scene"]).values()
-    assert sorted(sizes_of_pairs) == [1, 1, 1, 1, 2]
-    assert sorted(sizes_of_scenes) == [1, 5]
-    choices = {choice["name"]: choice["values"] for choice in page.data["choices"]}
-    assert choices["difficulty"] == [first.difficulty, "odd"]
-    assert len(page.data["comparisons"]) == 3, "of the three policy runs with instructions"
+
+@pytest.mark.parametrize(
+    ("changes", "scenes"), [({"policy_seed": 1}, [2]), ({"split": "val"}, [1, 1])]
+)
+def test_results_of_the_same_episode_belong_to_one_scene(changes, scenes):
+    record = listener_record("direct", 0)
+
+    page = Page(render([record, replace(record, **changes)]))
+
+    assert sorted(Counter(page.data["columns"]["scene"]).values()) == scenes
 
 
 @pytest.fixture
@@ -401,42 +481,60 @@ def test_videos_of_a_pack_that_do_not_fit_are_not_linked(filmed_run, monkeypatch
     assert "plays them from the folder" not in page.text
 
 
-def test_a_page_of_two_runs_compares_their_policies_and_finds_the_videos_of_both(tmp_path):
+@pytest.fixture
+def two_runs(tmp_path):
+    """The same episodes in the folders `ours` and `our theirs`, of which theirs lacks four.
+
+    The first episode of theirs was filmed, by another state of the package, and printed something.
+    """
+    records = records_with_an_error_last()
     theirs = tmp_path / "our theirs"
-    found = records_with_an_error_last()
-    runs = (
-        store(tmp_path / "ours", found, PLAN_OF_ONE_TASK),
-        store(
-            theirs,
-            [replace(found[0], video=written_film(theirs), code="0"), *found[1:-4]],
-            PLAN_OF_ONE_TASK,
-        ),
-    )
-    with EpisodeLog(log_path(theirs, found[0].slug)) as log:
+    filmed = replace(records[0], video=written_film(theirs), code="0")
+    with EpisodeLog(log_path(theirs, filmed.slug)) as log:
         os.write(log.descriptor, b"words")
-    text = write_report(runs[0], against=runs[1]).read_text()
-    page = Page(text)
+    return (
+        store(tmp_path / "ours", records, PLAN_OF_ONE_TASK),
+        store(theirs, [filmed, *records[1:-4]], PLAN_OF_ONE_TASK),
+    )
+
+
+def test_a_page_of_two_runs_compares_each_policy_with_itself(two_runs):
+    ours, theirs = two_runs
+
+    page = Page(write_report(ours, against=theirs).read_text())
 
     assert page.data["matrix"]["policies"] == [
-        "listener, ours (privileged)", "forgetful, ours (privileged)",
-        "listener, our theirs (privileged)", "forgetful, our theirs (privileged)",
-    ]  # fmt: skip
+        "listener, ours (privileged)",
+        "forgetful, ours (privileged)",
+        "listener, our theirs (privileged)",
+        "forgetful, our theirs (privileged)",
+    ]
     assert page.data["sides"] == [0, 2]
+    sentences = {}
+    for comparison in page.data["comparisons"]:
+        sentences[comparison["left"], comparison["right"]] = comparison["sentences"][0]
+    assert "listener, ours (privileged) against listener, our theirs" in sentences[0, 2]
 
-    # Videos and logs of the other run carry a key of their own, and are found from the page.
-    key = f"{found[0].slug.rpartition('-')[2]}-2"
-    assert page.scripts[f"film-{key}"].startswith("data:video")
 
+def test_a_page_of_two_runs_finds_videos_and_what_was_printed_in_the_other_run(two_runs):
+    """They carry a key of their own, as both runs have the same episodes."""
+    ours, theirs = two_runs
+    slug = records_with_an_error_last()[0].slug
+
+    page = Page(write_report(ours, against=theirs).read_text())
+
+    key = slug.rpartition("-")[2]
+    assert page.scripts[f"film-{key}-2"].startswith("data:video")
     (link,) = [details["log"] for details in page.details if "log" in details]
-    assert link == f"../our%20theirs/{log_path(Path(), found[0].slug)}"
-    assert "Incomplete: 4 of" in page.notes
-    # Other code that decides verdicts in the same way is a fact.
-    assert f"<dd>0, {found[0].code}</dd>" in text
-    assert "Mixed" not in page.notes
+    assert link == f"../our%20theirs/{log_path(Path(), slug)}"
 
-    words = next(
-        comparison
-        for comparison in page.data["comparisons"]
-        if (comparison["left"], comparison["right"]) == (0, 2)
-    )
-    assert "listener, ours (privileged) against listener, our theirs" in words["sentences"][0]
+
+def test_a_page_of_two_runs_says_what_each_lacks_and_which_code_made_them(two_runs):
+    """Other code that decides verdicts in the same way is a fact, and nothing to warn of."""
+    ours, theirs = two_runs
+
+    text = write_report(ours, against=theirs).read_text()
+
+    assert "Incomplete: 4 of" in Page(text).notes
+    assert "Mixed" not in Page(text).notes
+    assert f"<dd>0, {records_with_an_error_last()[0].code}</dd>" in text

@@ -11,7 +11,6 @@ from rich.console import Console
 
 from roboirg.analysis.measures.breakdowns import BREAKDOWNS
 from roboirg.analysis.measures.run_data import RunData
-from roboirg.analysis.results.frame import Frame
 from roboirg.analysis.tables.diagnostic_tables import (
     diagnostic_tables,
     make_breakdown_table,
@@ -24,15 +23,14 @@ from roboirg.analysis.tables.run_tables import (
     make_run_tables,
     print_failures,
 )
-from roboirg.records.record import Attribution, Summary
-from roboirg.stats.rates import points
+from roboirg.records.record import Attribution
 
 
-def printed(frame: Frame, width: int = 100) -> str:
+def printed(frame, width=100):
     console = Console(file=io.StringIO(), width=width)
     print_tables(make_run_tables(frame), console)
     print_failures(frame, console)
-    return console.file.getvalue()  # type: ignore[attr-defined,no-any-return]
+    return console.file.getvalue()
 
 
 STORED_OUTPUT = """\
@@ -80,44 +78,21 @@ def test_a_finished_run_prints_its_rates_gaps_missing_episodes_and_failures():
     assert printed(frame) == STORED_OUTPUT.replace("LONG", LONG_CAUSE)
 
 
-ONE_FAILURE_OF_EACH_KIND = [
-    Attribution(kind=kind, failure=failure, step=1, sentence="So.")
-    for kind, failure in (
-        ("grounding", "wrong_count"),
-        ("execution", "dropped"),
-        ("undecided", "stopped"),
-    )
-]
-"""A failure of each kind."""
+GROUNDING = Attribution(kind="grounding", failure="wrong_count", step=1, sentence="So.")
+EXECUTION = Attribution(kind="execution", failure="dropped", step=1, sentence="So.")
+UNDECIDED = Attribution(kind="undecided", failure="stopped", step=1, sentence="So.")
+
 FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL = frame_of(
     play("110100!111", prompt_verdict="heard", difficulty="hard"),
-    play(
-        "10001!1001",
-        "direct",
-        prompt_verdict="cut",
-        attribution=ONE_FAILURE_OF_EACH_KIND[0],
-        difficulty="hard",
-    ),
+    play("10001!1001", "direct", prompt_verdict="cut", attribution=GROUNDING, difficulty="hard"),
     play("0110111111", "direct", form="resolved", prompt_verdict="heard"),
     play("1011", task="BinFill", prompt_verdict="heard"),
-    play(
-        "0010",
-        "direct",
-        task="BinFill",
-        prompt_verdict="unknown",
-        attribution=ONE_FAILURE_OF_EACH_KIND[1],
-    ),
+    play("0010", "direct", task="BinFill", prompt_verdict="unknown", attribution=EXECUTION),
     play("0110", "direct", task="BinFill", form="resolved", prompt_verdict="cut"),
-    play(
-        "0001",
-        "direct",
-        task="VideoUnmask",
-        prompt_verdict="heard",
-        attribution=ONE_FAILURE_OF_EACH_KIND[1],
-    ),
+    play("0001", "direct", task="VideoUnmask", prompt_verdict="heard", attribution=EXECUTION),
     play("0111", "direct", task="VideoUnmask", form="resolved", prompt_verdict="heard"),
-    play("0", policy="other", attribution=ONE_FAILURE_OF_EACH_KIND[1]),
-    play("0", "direct", policy="other", attribution=ONE_FAILURE_OF_EACH_KIND[1]),
+    play("0", policy="other", attribution=EXECUTION),
+    play("0", "direct", policy="other", attribution=EXECUTION),
 )
 """Other numbers of everything in every cell."""
 
@@ -125,58 +100,77 @@ FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL = frame_of(
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
-        *((name, "markdown") for name in ("forms", "failures", "failure-names", "heard")),
+        ("forms", "markdown"),
+        ("failures", "markdown"),
+        ("failure-names", "markdown"),
+        ("heard", "markdown"),
         ("heard", "csv"),
     ],
 )
 def test_other_tables_are_as_stored(snapshot, name, kind):
-    """Numbers of one row, column, form or outcome in place of another."""
-    assert (
-        get_format(kind).draw(
-            diagnostic_tables()[name].make(RunData(FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL))
-        )
-        == snapshot
-    )
+    """Would find numbers of one row, column, form or outcome in place of another."""
+    data = RunData(FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL)
+
+    table = diagnostic_tables()[name].make(data)
+
+    assert get_format(kind).draw(table) == snapshot
 
 
-def results_that_ended(kinds: str, setting: str) -> list[Summary]:
-    """Return a success, a failure of a kind, or one without attribution for each letter."""
-    wrong: dict[str, Attribution] = dict(zip("gxu", ONE_FAILURE_OF_EACH_KIND, strict=True))
-    return [
-        make_result(
-            "success" if letter == "s" else "error" if letter == "!" else "failure", episode,
-            setting=setting, attribution=wrong.get(letter),
-        )
-        for episode, letter in enumerate(kinds)
-    ]  # fmt: skip
+END_OF_LETTER = {
+    "s": ("success", None),
+    "g": ("failure", GROUNDING),
+    "x": ("failure", EXECUTION),
+    "u": ("failure", UNDECIDED),
+    "-": ("failure", None),
+    "!": ("error", None),
+}
+
+
+def results_that_ended(letters, setting):
+    """Return an episode for each letter, which ended as `END_OF_LETTER` says."""
+    found = []
+    for episode, letter in enumerate(letters):
+        outcome, attribution = END_OF_LETTER[letter]
+        result = make_result(outcome, episode, setting=setting, attribution=attribution)
+        found.append(result)
+    return found
 
 
 @pytest.mark.parametrize(
     ("explicit", "direct", "rates", "changes", "shares"),
     [
-        ("ssssssssgx", "sssssgggxu", "50 30 10 10", "−30 +20 ±0 +10", "60–80 50"),
-        ("ssssssssgx", "sssssggg-u", "50 30 0 20", "−30 +20 −10 +20", "60–100 50"),
-        ("ggggggxxuu", "ssssssssxx", "80 0 20 0", "+80 −60 ±0 −20", "0 60–80"),
-        ("gg!sssxxss", "x!ssssssss", "89 0 11 0", "+25 −12 −12 ±0", "0 50"),
-        ("ssssssssss", "sssssssssg", "90 10 0 0", "−10 +10 ±0 ±0", "100 –"),
-    ],
-)
+        (
+            "ssssssssgx", "sssssgggxu", "50 30 10 10", "−30 +20 ±0 +10", "60–80 50"
+        ),
+        (
+            "ssssssssgx", "sssssggg-u", "50 30 0 20", "−30 +20 −10 +20", "60–100 50",
+        ),
+        (
+            "gg!sssxxss", "x!ssssssss", "89 0 11 0", "+25 −12 −12 ±0", "0 50"
+        ),
+        (
+            "ssssssssss", "sssssssssg", "90 10 0 0", "−10 +10 ±0 ±0", "100 –"
+        ),
+    ], ids=["each kind", "not attributed", "errors", "one failure"],
+)  # fmt: skip
 def test_success_and_three_kinds_of_failure_add_up_to_100_and_their_changes_to_0(
     explicit, direct, rates, changes, shares
 ):
     """A letter is how an episode ended: s success, g grounding, x execution, u or - undecided.
 
-    Changes are over the same episodes: in the fourth case, errors (!) leave eight of ten.
+    Rates are percentages of success, grounding, execution and undecided. Changes are over the same
+    episodes: in the third case, errors (!) leave eight of ten.
     """
     data = RunData(
         frame_of(results_that_ended(explicit, "explicit"), results_that_ended(direct, "direct"))
     )
-    entries = make_failure_table(data).rows[1].entries
-    assert [f"{entry.percent:.0f}" for entry in entries[2:6]] == rates.split()
 
-    found = [entry.text.split(".")[0] for entry in entries[6:10]]
-    assert found == changes.split()
-    assert [entry.text for entry in entries[10:]] == shares.split()
+    _, row = make_failure_table(data).rows
+
+    texts = [entry.text.split(".")[0] for entry in row.entries]
+    assert [f"{entry.percent:.0f}" for entry in row.entries[2:6]] == rates.split()
+    assert texts[6:10] == changes.split()
+    assert texts[10:] == shares.split()
 
 
 def test_a_failure_whose_name_this_version_does_not_know_counts_as_not_attributed():
@@ -191,62 +185,91 @@ def test_a_failure_whose_name_this_version_does_not_know_counts_as_not_attribute
 
 def test_the_breakdown_by_difficulty_is_as_stored(snapshot):
     table = make_breakdown_table(BREAKDOWNS["difficulty"], FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL)
+
     assert get_format("markdown").draw(table) == snapshot
 
 
 def test_the_first_ten_failures_are_listed_and_the_others_counted():
-    """And the legend explains only what the table has: here, privileged policies."""
-    text = printed(frame_of(play("0" * 13, privileged=True, cause="late")))
-    assert "success rate in %; privileged policies and scripted hands use the simulator's" in text
+    """Of 13 failures, in episodes 0 to 12."""
+    lines = printed(frame_of(play("0000000000000", cause="late"))).splitlines()
 
-    lines = text.splitlines()
-    assert [line.split()[1] for line in lines[-11:-1]] == [f"test/{index}" for index in range(10)]
+    assert [line.split()[1] for line in lines[-11:-1]] == [
+        "test/0", "test/1", "test/2", "test/3", "test/4",
+        "test/5", "test/6", "test/7", "test/8", "test/9",
+    ]  # fmt: skip
     assert lines[-1] == "  and 3 more"
+
+
+def test_a_run_without_failures_has_no_list_of_them():
     assert "without success" not in printed(frame_of(play("1")))
 
+
+def test_the_legend_explains_privileged_policies_if_there_are_any():
+    legend = "success rate in %; privileged policies and scripted hands use the simulator's"
+
+    assert legend in printed(frame_of(play("0", privileged=True)))
+    assert "privileged" not in printed(frame_of(play("0")))
+
+
+def test_a_failure_of_a_control_arm_is_listed_with_its_arm():
     (silent,) = play("0", arm="silent", cause="late", wordings="mine@1a")
+
     assert failure_text(silent) == "PickXtimes test/0 explicit (silent): late"
 
 
-def test_what_a_model_named_instead_of_the_goal_follows_the_cause_of_the_failure():
+@pytest.mark.parametrize(
+    ("failure", "text"),
+    [
+        ("misunderstood", "late. Understood red, twice; meant green, once."),
+        ("dropped", "late"),
+    ],
+)
+def test_what_a_model_named_instead_of_the_goal_follows_the_cause_of_the_failure(failure, text):
     """Of a model that never answers, *not done after 1300 steps* is not the reason."""
     named = "Understood red, twice; meant green, once."
-    for failure, end in (("misunderstood", f". {named}"), ("dropped", "")):
-        found = Attribution(kind="grounding", failure=failure, sentence=named)
-        (result,) = play("0", cause="late", attribution=found)
-        assert failure_text(result) == f"PickXtimes test/0 explicit: late{end}"
+    attribution = Attribution(kind="grounding", failure=failure, sentence=named)
+    (result,) = play("0", cause="late", attribution=attribution)
+
+    assert failure_text(result) == f"PickXtimes test/0 explicit: {text}"
 
 
-def test_a_rate_is_green_from_75_percent_and_red_below_50():
+@pytest.mark.parametrize(
+    ("outcomes", "color"), [("1110", "green"), ("110", "yellow"), ("100", "red")]
+)
+def test_a_rate_is_green_from_75_percent_and_red_below_50(outcomes, color):
     """3 of 4, 2 of 3 and 1 of 3 are won."""
-    tables = [make_run_tables(frame_of(play(outcomes)))[0] for outcomes in ("1110", "110", "100")]
-    assert [table.rows[0].entries[0].style for table in tables] == ["green", "yellow", "red"]
+    (table,) = make_run_tables(frame_of(play(outcomes)))
+
+    assert table.rows[0].entries[0].style == color
 
 
-def test_each_policy_split_step_limit_and_robot_has_a_table_in_the_order_of_the_plan():
+def test_each_split_step_limit_and_robot_has_a_table_of_its_own():
     results = [
-        *play("1"), *play("1", split="val"), *play("1", max_steps=200),
-        *play("1", policy="random", privileged=True), *play("1", robot="Panda"),
-    ]  # fmt: skip
-    for names in (["listener", "random"], ["random", "listener"]):
-        planned = [make_result(policy=name).identity for name in names]
-        tables = make_run_tables(frame_of(results, planned=planned))
-        assert "privileged policies" in tables[-1].notes[-1], "whichever table is the last"
-        found = [table.title for table in tables]
-        assert sorted(found, key=lambda title: names.index(title.split(",")[0])) == found
-        assert sorted(found) == [
-            "listener, split test, max steps 1300",
-            "listener, split test, max steps 1300, on Panda",
-            "listener, split test, max steps 200",
-            "listener, split val, max steps 1300",
-            "random, split test, max steps 1300 (privileged)",
-        ]
+        *play("1"),
+        *play("1", split="val"),
+        *play("1", max_steps=200),
+        *play("1", robot="Panda"),
+    ]
+
+    titles = [table.title for table in make_run_tables(frame_of(results))]
+
+    assert sorted(titles) == [
+        "listener, split test, max steps 1300",
+        "listener, split test, max steps 1300, on Panda",
+        "listener, split test, max steps 200",
+        "listener, split val, max steps 1300",
+    ]
 
 
-def test_a_gap_is_printed_in_points_with_its_sign():
-    """-0.5 is −50 points. What rounds to zero is ±0, with no sign of its own."""
-    assert [points(gap) for gap in (-0.5, 0.25, 0.0, -0.001)] == ["−50", "+25", "±0", "±0"]
-    assert [points(gap, 1) for gap in (-0.5, 0.0004, 0.0006)] == ["−50.0", "±0.0", "+0.1"]
+@pytest.mark.parametrize("order", [["listener", "random"], ["random", "listener"]])
+def test_tables_of_policies_stand_in_the_order_of_the_plan_and_the_legend_below_the_last(order):
+    results = [*play("1"), *play("1", policy="random", privileged=True)]
+    planned = [make_result(policy=name).identity for name in order]
+
+    tables = make_run_tables(frame_of(results, planned=planned))
+
+    assert [table.title.split()[0] for table in tables] == order
+    assert "privileged policies" in tables[-1].notes[-1]
 
 
 def test_a_suite_that_was_played_in_part_is_marked_in_the_table_of_forms():

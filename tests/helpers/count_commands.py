@@ -1,7 +1,4 @@
-"""Print the commands with their options and arguments, and how many there are of each.
-
-python tests/helpers/count_commands.py
-"""
+"""The commands with their options and arguments, and the most that there may be."""
 
 from __future__ import annotations
 
@@ -36,7 +33,7 @@ def entries() -> int:
     return len(getattr(typer.main.get_command(app), "commands", {}))
 
 
-def _walk(command: Any, words: tuple[str, ...]) -> Iterator[CommandCount]:  # noqa: ANN401
+def _walk(command: Any, words: tuple[str, ...]) -> Iterator[CommandCount]:
     group = getattr(command, "commands", {})
     if not group or not words:
         parameters = [parameter for parameter in command.params if parameter.name != "help"]
@@ -44,14 +41,3 @@ def _walk(command: Any, words: tuple[str, ...]) -> Iterator[CommandCount]:  # no
         yield CommandCount(" ".join(words), names)
     for name, inner in sorted(group.items()):
         yield from _walk(inner, (*words, name))
-
-
-if __name__ == "__main__":
-    found = commands()
-    total = 0
-    for words, parameters in found:
-        print(f"{len(parameters):3} {words or 'roboirg'}: {' '.join(parameters)}")
-        total += len(parameters)
-    print(f"{entries()} entries at the top (at most {MOST_ENTRIES})")
-    print(f"{len(found) - 1} commands (at most {MOST_COMMANDS})")
-    print(f"{total} options and arguments (at most {MOST_PARAMETERS})")

@@ -1,13 +1,13 @@
 """Episodes for the language tests."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
-from roboirg.core.episode import SPLITS, Episode, Point
+from roboirg.core.episode import SPLITS, Episode, Point, Scene, SceneObject
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct_with
 from roboirg.language.generator import find_refusal
-from roboirg.language.instruction import FORMS, Instruction
+from roboirg.language.instruction import FORMS
 from roboirg.language.settings import all_settings, plain_settings, settings_of
 from roboirg.tasks import every_task, get_task
 from roboirg.tasks.splits import splits
@@ -23,33 +23,31 @@ PAIRS = [
 SPATIAL_TASKS = tuple(name for name, task in every_task().items() if "spatial" in settings_of(task))
 
 
-def split_episodes(task: str) -> Iterator[Episode]:
+def split_episodes(task):
     """All episodes of all splits."""
     return splits.split_episodes([task], SPLITS)
 
 
-def first_episodes(task: str, split: str, count: int) -> Iterator[Episode]:
+def first_episodes(task, split, count):
     """The first episodes of a split."""
     for index in range(count):
         yield get_episode(task, split, index)
 
 
-def random_episodes(task: str, count: int) -> Iterator[Episode]:
+def random_episodes(task, count):
     """Episodes of seeds that no split uses, with all patterns and difficulties."""
     for index in range(count):
         yield get_episode(task, "random", 700_000 + index)
 
 
-def said_where_possible(
-    episodes: Iterable[Episode], options: InstructionOptions
-) -> Iterator[tuple[Episode, Instruction]]:
+def said_where_possible(episodes, options):
     """Yield (episode, instruction) for the episodes that these options can express."""
     for episode in episodes:
         if find_refusal(episode, options) is None:
             yield episode, instruct_with(episode, options)
 
 
-def without_landmark(episode: Episode) -> Episode:
+def without_landmark(episode):
     """The episode with all cubes at almost the same place, which no words can tell apart."""
     objects = tuple(
         replace(item, position=Point(0.0, index / 1000, 0.02)) if item.kind == "cube" else item
@@ -76,3 +74,14 @@ def expressible_options(
         possible = [options for options in variants if find_refusal(episode, options) is None]
         for form in FORMS:
             yield from (replace(options, form=form) for options in possible)
+
+
+def containers(*places):
+    """Return a scene with container_0, container_1 … at points (x, y) in meters.
+
+    The robot is at smaller x and looks along x; its left is positive y.
+    """
+    objects = []
+    for number, (x, y) in enumerate(places):
+        objects.append(SceneObject(f"container_{number}", "container", Point(x, y, 0.05)))
+    return Scene(tuple(objects))

@@ -11,7 +11,6 @@ import seed_selection
 from rich.console import Console
 from seed_selection import EpisodeSlot, check_words
 
-from roboirg.apps.language_lab import statistics_tables
 from roboirg.apps.show.episode_text import instructions_table
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
@@ -161,12 +160,6 @@ def test_exported_rows_include_a_registered_setting_in_both_forms(register):
     assert forms == ["implicit", "resolved"]
 
 
-def test_statistics_include_a_registered_setting(register):
-    register(DUMMY)
-    said = [said for _, said in instructions([HARD_EPISODE], setting_names(), ["implicit"])]
-    assert "dummy" in printed(*statistics_tables.overview_tables(said))
-
-
 EACH_SETTING_WITH_SCENARIOS = pytest.mark.parametrize(
     "name", ["direct", "reasoning", "spatial", "grounded", "direct-rival"]
 )
@@ -209,14 +202,6 @@ def test_a_setting_modeled_on_ours_speaks_the_scenarios_of_its_own_file(name, ad
         said = instruct(episode, f"lab-{name}", form)
         assert understood_goals(said, episode) == (episode.goal,), said.text
         assert said.metadata["scenario"] in for_tests, said.text
-
-
-@pytest.mark.parametrize("name", ["direct", "direct-rival"])
-def test_a_resolved_command_of_a_copied_setting_names_the_color(name, add_copy):
-    """Its goal is a green cube."""
-    add_copy(name)
-    said = instruct(get_episode("PickXtimes", "test", 6), f"lab-{name}", "resolved")
-    assert "green" in said.command
 
 
 @pytest.mark.parametrize("name", ["explicit", "contextual"])
@@ -328,13 +313,3 @@ def test_a_cached_choice_of_one_setting_does_not_answer_for_another(register, fi
 
     assert find_refusal(HARD_EPISODE, InstructionOptions("calm")) == "never calm"
     assert find_refusal(HARD_EPISODE, InstructionOptions("direct")) is None
-
-
-def test_direct_and_contextual_share_one_cached_choice_of_scenario():
-    """The private cache is looked into, since only time would show a second choice."""
-    spoken._CHOICES.clear()
-
-    instruct(HARD_EPISODE, "direct")
-    instruct(HARD_EPISODE, "contextual")
-
-    assert len(spoken._CHOICES) == 1

@@ -69,14 +69,14 @@ say.color = ["<it clue: it>"]
 """Of every setting of the page's task; NOUN is another word for each pool of wordings."""
 
 
-def blocks(page: str, heading: str) -> list[str]:
+def blocks(page, heading):
     """Return the blocks of a section of a page, and of its smaller ones, as they stand there."""
     _, _, section = (DOCS / page).read_text().partition(f"\n## {heading}\n")
     section = re.split(r"^## ", section, flags=re.MULTILINE)[0]
     return re.findall(r"```(?:python|toml)\n(.*?)```", section, re.DOTALL)
 
 
-def words_for_every_setting() -> str:
+def words_for_every_setting():
     """Return the page's file of words with scenarios of every setting instead of its own."""
     head, _, _ = TASK_WORDS.partition("[[scenario]]")
     train = SCENARIO_OF_EACH_SETTING.replace("POOL", "train").replace("NOUN", "painting")
@@ -100,7 +100,7 @@ class InstalledPackage:
         folder: where it lies.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder):
         self.folder = folder
         self.files = folder / "my_package"
         info = folder / "my_package-1.0.dist-info"
@@ -123,7 +123,7 @@ class InstalledPackage:
                 entries += f"[{group}]\n{name} = {place}\n"
         (info / "entry_points.txt").write_text(entries)
 
-    def run(self, code: str) -> list:
+    def run(self, code):
         """Run a program in a process where the package is installed.
 
         It may use the names that PROGRAM_HEAD imports. Returns what it adds to the list `found`.
@@ -172,42 +172,49 @@ def package(tmp_path_factory):
     return InstalledPackage(tmp_path_factory.mktemp("package"))
 
 
-EACH_TASK_AND_POOL = """
-for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
-    episode = get_episode(task, "test", 1)
-    options = InstructionOptions("colored", wordings=pool)
-    said = instruct_with(episode, options)
-"""
-"""Says an episode of both tasks of the setting "colored", in the words of training and of tests."""
-
-
 def test_the_setting_of_the_documentation_page_speaks_the_words_of_its_own_file(package):
     """The page's file has the scenarios "new coat" for training and "loan" for tests.
 
     An instruction names the digest of the words.
     """
-    found = package.run(
-        EACH_TASK_AND_POOL
-        + """
-    assert said.metadata["words"] == words_of(task, pool, "colored")
-    found.append(said.metadata["scenario"])
-"""
-    )
-    assert found == ["new coat", "loan", "new coat", "loan"]
+    found = package.run("""
+for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
+    said = instruct(get_episode(task, "test", 1), "colored", wordings=pool)
+    names_its_words = said.metadata["words"] == words_of(task, pool, "colored")
+    found.append([task, pool, said.metadata["scenario"], names_its_words])
+""")
+
+    assert found == [
+        ["PickXtimes", "train", "new coat", True],
+        ["PickXtimes", "test", "loan", True],
+        ["SwingXtimes", "train", "new coat", True],
+        ["SwingXtimes", "test", "loan", True],
+    ]
 
 
-def test_the_setting_of_the_documentation_page_means_the_goal_and_states_it_when_resolved(package):
-    """The resolved form has the same introduction, and then the explicit command."""
-    found = package.run(
-        EACH_TASK_AND_POOL
-        + """
+def test_the_setting_of_the_documentation_page_means_the_goal(package):
+    found = package.run("""
+for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
+    episode = get_episode(task, "test", 1)
+    said = instruct(episode, "colored", wordings=pool)
     found.append(understood_goals(said, episode) == (episode.goal,))
-    resolved = instruct_with(episode, replace(options, form="resolved"))
-    explicit = instruct_with(episode, replace(options, setting="explicit"))
-    found.append(resolved.turns == (said.turns[0], explicit.text))
-"""
-    )
-    assert found == [True] * 8
+""")
+
+    assert found == [True, True, True, True]
+
+
+def test_the_setting_of_the_documentation_page_ends_with_the_explicit_command_when_resolved(
+    package,
+):
+    """The resolved form has the same introduction."""
+    (turns,) = package.run("""
+episode = get_episode("PickXtimes", "test", 1)
+resolved = instruct(episode, "colored", "resolved").turns
+found.append([resolved, instruct(episode, "colored").turns, instruct(episode).text])
+""")
+
+    resolved, implicit, explicit_command = turns
+    assert resolved == [implicit[0], explicit_command]
 
 
 def test_the_words_of_the_setting_of_the_documentation_page_break_no_rule(package):
@@ -283,25 +290,16 @@ def complete_package(tmp_path_factory):
     return outside
 
 
-EACH_INSTRUCTION = """
-task = get_task("PlaceAndPress")
-for split, index, setting in itertools.product(("train", "test"), range(12), settings_of(task)):
-    episode = get_episode(task.name, split, index)
-    options = InstructionOptions(setting)
-    if find_refusal(episode, options) is not None:
-        continue
-"""
-"""Goes through twelve episodes of each split in every setting that can express them."""
-
-
 def test_a_task_of_another_package_can_be_commanded_in_every_setting(complete_package):
     """In the words of training and of tests."""
-    found = complete_package.run(
-        EACH_INSTRUCTION
-        + """
-    found.append(f"{setting} in {split}")
-"""
-    )
+    found = complete_package.run("""
+for split, setting in itertools.product(("train", "test"), settings_of(get_task("PlaceAndPress"))):
+    for index in range(12):
+        episode = get_episode("PlaceAndPress", split, index)
+        if find_refusal(episode, InstructionOptions(setting)) is None:
+            found.append(f"{setting} in {split}")
+""")
+
     assert sorted(set(found)) == [
         "contextual in test", "contextual in train",
         "direct in test", "direct in train",
@@ -312,39 +310,19 @@ def test_a_task_of_another_package_can_be_commanded_in_every_setting(complete_pa
     ]  # fmt: skip
 
 
-def test_the_words_of_a_task_of_another_package_break_no_rule(complete_package):
-    found = complete_package.run("""
-words = task_scenarios("PlaceAndPress")
-for report in check_scenarios(words, None, scenes_of("PlaceAndPress", 0)[::10]):
-    found += report.broken
-""")
-    assert found == []
-
-
 def test_the_words_of_a_task_of_another_package_mean_the_goal_in_both_forms(complete_package):
     """Collects the texts that mean another goal, or several."""
-    wrong = complete_package.run(
-        EACH_INSTRUCTION
-        + """
-    for form in FORMS:
-        said = instruct_with(episode, replace(options, form=form))
-        if understood_goals(said, episode) != (episode.goal,):
-            found.append(said.text)
-"""
-    )
-    assert wrong == []
+    wrong = complete_package.run("""
+for split, index in itertools.product(("train", "test"), range(12)):
+    episode = get_episode("PlaceAndPress", split, index)
+    for setting, form in itertools.product(settings_of(get_task("PlaceAndPress")), FORMS):
+        options = InstructionOptions(setting, form)
+        if find_refusal(episode, options) is None:
+            said = instruct_with(episode, options)
+            if understood_goals(said, episode) != (episode.goal,):
+                found.append(said.text)
+""")
 
-
-def test_a_resolved_command_of_another_package_s_task_names_the_color(complete_package):
-    """Collects the commands of two settings that do not."""
-    wrong = complete_package.run(
-        EACH_INSTRUCTION
-        + """
-    said = instruct_with(episode, replace(options, form="resolved"))
-    if setting in ("direct", "direct-rival") and episode.goal.text("color") not in said.command:
-        found.append(said.text)
-"""
-    )
     assert wrong == []
 
 
@@ -353,16 +331,19 @@ def test_a_task_of_another_package_has_every_control_run(complete_package):
 
     Only a paraphrase may lack, where a setting has one text for an episode.
     """
-    refusals = complete_package.run(
-        EACH_INSTRUCTION
-        + """
-    for arm in ("paraphrase-1", "other-goal", "silent", "scrambled", "again"):
-        try:
-            said = index < 2 and say_arm(episode, options, arm)
-        except InvalidValueError as error:
-            found.append(str(error))
-"""
-    )
+    refusals = complete_package.run("""
+arms = ("paraphrase-1", "other-goal", "silent", "scrambled", "again")
+for split, setting in itertools.product(("train", "test"), settings_of(get_task("PlaceAndPress"))):
+    episode = get_episode("PlaceAndPress", split, 0)
+    options = InstructionOptions(setting)
+    if find_refusal(episode, options) is None:
+        for arm in arms:
+            try:
+                say_arm(episode, options, arm)
+            except InvalidValueError as error:
+                found.append(str(error))
+""")
+
     for refusal in refusals:
         assert "has no paraphrase" in refusal
 
@@ -370,46 +351,31 @@ def test_a_task_of_another_package_has_every_control_run(complete_package):
 @pytest.mark.parametrize(
     ("file", "before", "after", "task", "setting", "sentence"),
     [
-        (
+        pytest.param(
             "colored.py", '"colored.toml"', '"gone.toml"', "PickXtimes", "colored",
             "The words of colored are '{}/gone.toml', which is no file; name it by its whole path.",
+            id="file of a setting that does not exist",
         ),
-        (
-            "place_and_press.py", '"words.toml"', '"gone.toml"', "PlaceAndPress", "explicit",
-            "The words of PlaceAndPress are '{}/gone.toml', which is no file; name it by its wh",
-        ),
-        (
+        pytest.param(
             "colored.toml", '"PickXtimes", ', "", "PickXtimes", "colored",
             ": {}/colored.toml has no colored scenario for it in the pool test.",
+            id="task left out of the file of a setting",
         ),
-        (
+        pytest.param(
             "words.toml", "PlaceAndPress", "PickXtimes", "PlaceAndPress", "explicit",
             ": PlaceAndPress is not among the tasks of {}/words.toml.",
+            id="file of another task",
         ),
-        (
+        pytest.param(
             "colored.toml", 'setting = "colored"', 'setting = "colorful"', "PickXtimes", "colored",
             " 'new coat': There is no setting 'colorful'; known: colored, direct, direct-rival, ",
+            id="misspelled setting",
         ),
-        (
+        pytest.param(
             "colored.py", "content_plans=content_plans", 'content_plans="drect"', "PickXtimes",
             "colored",
             "There is no setting for the content_plans of colored, named 'drect'; known: direct, ",
-        ),
-        (
-            "colored.toml", 'say.color = ["<it color: it>"]', "", "PickXtimes", "colored",
-            "colored.toml, scenario 'new coat' has no say; write say.color or say.repeats.",
-        ),
-        (
-            "words.toml", 'color = "the', 'colour = "the', "PlaceAndPress", "explicit",
-            "words.toml, stated colour has other marks than those of {{colour}}.",
-        ),
-        (
-            "words.toml", "train = [", "train = [] # [", "PlaceAndPress", "explicit",
-            "words.toml has no commands of PlaceAndPress in the pool train.",
-        ),
-        (
-            "words.toml", "Place {color} on", "Place it on", "PlaceAndPress", "explicit",
-            "words.toml has no command of PlaceAndPress with {{color}} in the pool test.",
+            id="misspelled plan of contents",
         ),
     ],
 )  # fmt: skip
@@ -423,7 +389,8 @@ def test_a_mistake_in_the_words_of_a_package_is_reported_with_file_and_cure(
     outside = InstalledPackage(tmp_path)
     text = (outside.files / file).read_text()
     assert before in text
-
     (outside.files / file).write_text(text.replace(before, after))
+
     (printed,) = outside.run(f"found.append(said_or_refused({task!r}, {setting!r}))")
+
     assert sentence.format(outside.files).rstrip(".") in printed

@@ -17,14 +17,13 @@ from hypothesis import strategies as st
 from language_variants import random_episodes, split_episodes
 from selection import slow_but
 
-from roboirg.core.episode import COLORS, ROBOT_BASE, Point, Scene, SceneObject
+from roboirg.core.episode import COLORS, Point, Scene, SceneObject
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.motions import Away
-from roboirg.core.object_sizes import BESIDE
 from roboirg.language import instruct
 from roboirg.language.clues import thing_clues
 from roboirg.language.generator import find_refusal, request_of
-from roboirg.language.landmarks import FRAMES, MARGIN, candidates_in, selectors
+from roboirg.language.landmarks import FRAMES, selectors
 from roboirg.language.places import PlaceClass, spoken_places, things_at
 from roboirg.language.scenarios.choice import choose
 from roboirg.language.scenarios.scenario_file import read_task_scenarios
@@ -201,36 +200,6 @@ def test_closest_is_said_where_depth_and_distance_from_the_robot_agree(frame, ph
     assert names_by_phrase(scene, frame=frame)[phrase] == "container_0"
 
 
-def distance_to_robot(item):
-    return math.dist(item.position[:2], ROBOT_BASE[:2])
-
-
-@pytest.mark.parametrize(
-    "measure", [lambda item: item.position.x, distance_to_robot], ids=["depth", "distance"]
-)
-@each_task_with_places
-def test_closest_to_you_is_closest_both_in_depth_and_by_distance(task, measure):
-    """The same holds for *second closest*, *in the front* and *in the back*: `ranks` counts
-    from the near end."""
-    ranks = {
-        "closest to you": 0,
-        "all the way in the front": 0,
-        "second closest to you": 1,
-        "all the way in the back": -1,
-    }
-    kind = get_task(task).things.pointed
-    said = 0
-
-    for scene in scenes_of(task):
-        from_near_to_far = sorted(candidates_in(scene, kind), key=measure)
-        names = names_by_phrase(scene, kind)
-        for words in names.keys() & ranks.keys():
-            assert names[words] == from_near_to_far[ranks[words]].name, words
-            said += 1
-
-    assert said
-
-
 @pytest.mark.parametrize(
     ("other", "words"),
     [
@@ -251,99 +220,55 @@ def test_nothing_is_in_a_corner_if_another_thing_is_near_that_corner(other, word
     assert phrases_after_a_noun(scene, "container_1").isdisjoint(of_the_corner)
 
 
-def gap(thing, fixture):
-    """Return the distance of two outlines, in meters."""
-    distance = math.dist(thing.position[:2], fixture.position[:2])
-    return distance - thing.half_width - fixture.half_width
-
-
-def is_there(spot, thing, scene, middle):
-    """Return whether a spot is true of a thing, by measures that are written for this test alone.
-
-    ``on the left``: y is 3 cm at least; ``in the back``: x is 3 cm more than `middle`, the depth
-    halfway between the nearest and the farthest thing.
-    """
-    x, y, _ = thing.position
-    by = re.fullmatch(r"right by the (\w+)", spot)
-    if by:
-        return gap(thing, *scene.of_kind(by[1])) <= BESIDE
-    between = re.fullmatch(r"between the (\w+) and the (\w+)", spot)
-    if between:
-        ends = [scene.of_kind(kind)[0].position[:2] for kind in between.groups()]
-        return sum(math.dist((x, y), end) for end in ends) <= math.dist(*ends) + 0.04
-    truths = {
-        "left": y >= 0.03,
-        "right": y <= -0.03,
-        "back": x >= middle + 0.03,
-        "front": x <= middle - 0.03,
-        "close": x <= middle - 0.06,
-        "middle": math.dist((x, y), (middle, 0.0)) <= 0.09,
-    }
-    named = [word for word in truths if word in spot.split()]
-    assert named, spot
-    return all(truths[word] for word in named)
-
-
-def spots_with_fitting_things(task):
-    """Yield each spot of the task's scenes, its thing, and all things of which it is true."""
-    kind = get_task(task).things.pointed
-    for scene in scenes_of(task):
-        things = candidates_in(scene, kind)
-        depths = [thing.position.x for thing in things]
-        middle = (min(depths) + max(depths)) / 2 if len(things) > 1 else -0.05
-        for spot, thing in things_by_spot(scene, kind).items():
-            fitting = [other for other in things if is_there(spot, other, scene, middle)]
-            yield spot, thing, fitting
-
-
-@each_task_with_places
-def test_a_spot_such_as_on_the_left_is_true_of_one_object_only(task):
-    """Others may be *on the left*, too, if *on the far left* is said of one that stands at least
-    6 cm, twice the margin, from them."""
-    for spot, thing, fitting in spots_with_fitting_things(task):
-        assert thing in fitting, spot
-        fitting.remove(thing)
-        leads_others = "far" in spot or "all the way" in spot
-        for other in fitting:
-            distance = math.dist(thing.position[:2], other.position[:2])
-            assert leads_others, spot
-            assert distance >= 2 * MARGIN, spot
-
-
-def places_of_goal_objects(task):
-    """Return for each published episode that the spatial setting can express the places of the
-    objects at which its words may point."""
-    kind = get_task(task).things.pointed
-    options = InstructionOptions("spatial")
-    found = []
-    for episode in split_episodes(task):
-        if find_refusal(episode, options):
-            continue
-        request = request_of(episode, options)
-        things = []
-        for color in request.color_values:
-            things += request.objects_to_point_at(color)
-        every = spoken_places(episode.scene, kind, "robot")
-        found.append([place for place in every if place.thing in things])
+def spots_of(scene):
+    """Return the spots of a scene with containers, each with the number of its container."""
+    found = {}
+    for spot, thing in things_by_spot(scene).items():
+        found[spot] = int(thing.name.removeprefix("container_"))
     return found
 
 
-@each_task_with_places
-def test_three_of_five_published_scenes_have_a_spot_for_a_goal_object(task):
-    """A spot can be said without a noun: *The table wobbles on the left*."""
-    has_spot = [any(place.spot for place in places) for places in places_of_goal_objects(task)]
-    assert sum(has_spot) >= 0.6 * len(has_spot)
+def test_in_a_row_only_the_first_and_the_last_thing_have_a_spot():
+    """A spot says where something happens: *There's a stain on the far right.*"""
+    assert spots_of(ROW_OF_FIVE) == {"on the far left": 4, "on the far right": 0}
 
 
-@each_task_with_places
-def test_nearly_all_published_scenes_have_everyday_words_for_a_goal_object(task):
-    """In at most 4 % of them there are only words that no one says."""
-    unusual = 0
-    scenes = places_of_goal_objects(task)
-    for places in scenes:
-        assert places
-        unusual += all(place.kind == PlaceClass.UNUSUAL for place in places)
-    assert unusual <= 0.04 * len(scenes)
+def test_the_things_of_a_square_have_spots_in_its_corners():
+    """Containers 0 and 1 stand in front, 0 and 2 on the left. *On the left* would mean two."""
+    square = containers([(-0.15, 0.15), (-0.15, -0.15), (0.15, 0.15), (0.15, -0.15)])
+
+    assert spots_of(square) == {
+        "at the front left": 0,
+        "in the front left corner": 0,
+        "at the front right": 1,
+        "in the front right corner": 1,
+        "at the back left": 2,
+        "in the back left corner": 2,
+        "at the back right": 3,
+        "in the back right corner": 3,
+    }
+
+
+def test_things_that_stand_apart_have_spots_in_every_direction():
+    """Container 0 stands between button and target, 1 next to the button, 2 in the back."""
+    scene = containers([(-0.05, -0.03), (-0.19, 0.09), (0.1, -0.2)], BUTTON, TARGET)
+
+    assert spots_of(scene) == {
+        "on the far left": 1,
+        "on the left": 1,
+        "on the far right": 2,
+        "on the right": 2,
+        "all the way in the front": 1,
+        "in the front": 1,
+        "all the way in the back": 2,
+        "in the back": 2,
+        "right by the button": 1,
+        "between the button and the target": 0,
+        "in the middle": 0,
+        "at the front left": 1,
+        "at the back right": 2,
+        "in the back right corner": 2,
+    }
 
 
 UNUSUAL_EPISODES = pytest.mark.parametrize(
@@ -393,11 +318,6 @@ def test_everyday_words_for_a_row_of_five(name, phrase):
     assert phrase in phrases_after_a_noun(ROW_OF_FIVE, name)
 
 
-def test_the_last_of_a_row_is_on_the_far_right():
-    """A spot, for where something happens: *There's a stain on the far right.*"""
-    assert things_by_spot(ROW_OF_FIVE)["on the far right"].name == "container_0"
-
-
 def test_the_camera_sees_the_robot_s_leftmost_thing_on_the_right_of_the_picture():
     phrases = phrases_after_a_noun(ROW_OF_FIVE, "container_4", frame="camera")
     assert phrases == {"all the way on the right of the picture"}
@@ -426,12 +346,6 @@ def test_everyday_words_for_things_near_a_button_or_a_target(name, phrase):
     """The button stands at (-0.2, 0), the target at (0.1, 0)."""
     scene = containers([(-0.05, -0.03), (-0.19, 0.09), (0.1, -0.2)], BUTTON, TARGET)
     assert phrase in phrases_after_a_noun(scene, name)
-
-
-def test_something_happens_right_by_the_button_if_a_thing_is_next_to_it():
-    """container_1 stands 9 cm to the left of the button."""
-    scene = containers([(-0.05, -0.03), (-0.19, 0.09), (0.1, -0.2)], BUTTON, TARGET)
-    assert things_by_spot(scene)["right by the button"].name == "container_1"
 
 
 def test_what_is_more_behind_the_button_than_beside_it_is_not_to_its_left():
@@ -527,22 +441,6 @@ def test_a_story_that_needs_a_spot_is_chosen_only_for_a_cube_with_a_spot():
             spots_said += 1
 
     assert spots_said
-
-
-def test_a_story_that_takes_any_place_prefers_a_spot():
-    """`{place:any}` says the spot that `{place:spot}` would say. Where the cube has none, it says
-    the words after a noun."""
-    spot_only = only_scenario("The table wobbles {place:spot}.")
-    any_place = only_scenario("Sand the cube {place:any}.")
-    forms = set()
-
-    for request in spatial_requests():
-        by_spot = choose(request, "spatial", [spot_only])
-        chosen = choose(request, "spatial", [any_place])
-        assert by_spot is None or by_spot.plan == chosen.plan
-        forms.add(chosen.fillers.values["place"][0].form)
-
-    assert forms == {"spot", None}
 
 
 @pytest.mark.parametrize(

@@ -28,12 +28,10 @@ from roboirg.apps.language_lab.scenarios.sentence_rules import broken_sentences,
 from roboirg.core.episode import SPLITS, Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.motions import Swap
 from roboirg.core.word_pools import POOLS
 from roboirg.language import LANGUAGE_VERSION, instruct, instruct_with
 from roboirg.language.generator import find_refusal, request_of, spoken_instruction
 from roboirg.language.instruction import Instruction, Mention, Utterance
-from roboirg.language.number_words import cardinal
 from roboirg.language.scenarios.choice import choose
 from roboirg.language.scenarios.scenario_file import (
     FOLDER,
@@ -91,75 +89,68 @@ def read_scenario_file(text, task="PickXtimes"):
     return read_task_scenarios(text, "mine.toml")[task]
 
 
-def report_on_ours(task, frame, scenes):
-    """Return the checker's report on one of our own scenarios."""
-    (report,) = check_scenarios(task_scenarios(task), frame, scenes)
-    return report
-
-
 @pytest.mark.parametrize(
     ("before", "after", "complaint"),
     [
-        ("{repeats} today", "{repeat} today", "introduction: There is no slot 'repeat'; known: "),
-        (
+        pytest.param(
+            "{repeats} today",
+            "{repeat} today",
+            "introduction: There is no slot 'repeat'; known: ",
+            id="misspelled slot",
+        ),
+        pytest.param(
             "<it color: it>.",
             "<it color: that thing>.",
             "<it color: that thing>, which does not exist; the nearest for a color: <that",
+            id="unknown pointer",
         ),
-        (
+        pytest.param(
             "<it color: it>.",
             "<them color: it>.",
             "<them color: it>; in pointers.toml these words have the class 'it' for a color.",
+            id="class of another color pointer",
         ),
-        (
+        pytest.param(
             "<each repeats:",
             "<it repeats:",
             "|once for each year]>; in pointers.toml these words have the class 'each' for a nu",
+            id="class of another number pointer",
         ),
-        ("<it color: it>.", "<it color it>.", "has a bracket that is no mark"),
-        ("{rival color}", "{rival visit}", "known: aside.0"),
-        ("\ncue = ", "\nclue = ", "'birthday': There is no field 'clue'; known: competing, cue,"),
-        (
+        pytest.param(
+            "<it color: it>.", "<it color it>.", "has a bracket that is no mark", id="no colon"
+        ),
+        pytest.param("{rival color}", "{rival visit}", "known: aside.0", id="no such rival"),
+        pytest.param(
+            "\ncue = ",
+            "\nclue = ",
+            "'birthday': There is no field 'clue'; known: competing, cue,",
+            id="misspelled field",
+        ),
+        pytest.param(
             '\ncue = "Let\'s surprise {him} with the cube."',
             "",
             "'birthday' has no cue; direct needs introduction, reinf",
+            id="missing field",
         ),
-        (
-            "say.color",
-            "say.colour",
-            "'birthday': There is no field 'say.colour'; known: competing, cue, ",
+        pytest.param(
+            'pool = "train"',
+            'pool = "dev"',
+            "'birthday', pool is 'dev'; it must be train or test.",
+            id="unknown pool",
         ),
-        ('pool = "train"', 'pool = "dev"', "'birthday', pool is 'dev'; it must be train or test."),
-        ('pool = "train"\n', "", "'birthday' has no pool."),
-        ('pool = "train"\n', 'pool = "train"\npeople.he = [5]\n', "people: Expected a text, got"),
-        (
-            'introduction = "',
-            'introduction = 5\nlead = "',
-            "introduction has the words 5; they must",
-        ),
-        ('"{he}', '"\u2019{he}', "must be printable ASCII"),
-        ("[[scenario]]", "[[scenario", "(at line 3, column 11)"),
-        ('["PickXtimes"]', "[]", "has no tasks; add a line such as tasks = "),
-        ('["PickXtimes"]', '["Juggle"]', "There is no task 'Juggle'; known: "),
-        (
+        pytest.param('pool = "train"\n', "", "'birthday' has no pool.", id="no pool"),
+        pytest.param("[[scenario]]", "[[scenario", "(at line 3, column 11)", id="no TOML"),
+        pytest.param(
             "[[scenario]]",
             '[commands.StopCube]\ntrain = ["Go."]\n[[scenario]]',
             "'StopCube'; known: PickXtimes, all.",
+            id="commands of another task",
         ),
-        (
-            "[[scenario]]",
-            '[commands.all]\ntrain = ["Go."]\n[[scenario]]',
-            "has no commands of PickXtimes in the pool test.",
-        ),
-        (
-            "[[scenario]]",
-            '[commands.all]\ntrain = ["Put {colour} {repeats}."]\n[[scenario]]',
-            "commands of PickXtimes has other marks than {color} and {repeats}: 'Put {colour} ",
-        ),
-        (
+        pytest.param(
             'pool = "train"\n',
             'pool = "train"\nneeds.tasks = ["StopCube"]\n',
             "'birthday', needs.tasks: There is no task 'StopCube'; known: PickXtimes.",
+            id="needs another task",
         ),
     ],
 )
@@ -171,24 +162,11 @@ def test_a_mistake_in_a_scenario_file_is_reported_with_file_scenario_and_field(
     Its text is in wording_stand_ins.py; the table pointers.toml lists the words that refer back.
     """
     assert before in BIRTHDAY
+
     with pytest.raises(InvalidValueError, match=r"^mine\.toml") as found:
         read_scenario_file(BIRTHDAY.replace(before, after))
+
     assert complaint in str(found.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "before", "after", "complaint"),
-    [
-        (TWO_CUBES, "Not <former", "Not <latter", "have the class 'former' for a"),
-        (FEWER, "once for each photo", "once per photo", "which does not exist"),
-    ],
-    ids=["wrong class", "not in the table"],
-)
-def test_a_pointer_that_the_table_does_not_have_is_refused(text, before, after, complaint):
-    """*The former* is of the class "former"; *once per photo* is said by none of our scenarios."""
-    assert before in text
-    with pytest.raises(InvalidValueError, match=complaint):
-        read_scenario_file(text.replace(before, after))
 
 
 def test_an_unknown_pointer_is_refused_with_the_five_nearest_known_ones():
@@ -283,30 +261,40 @@ def test_the_checker_finds_nothing_wrong_with_a_good_scenario(text):
 @pytest.mark.parametrize(
     ("before", "after", "rule"),
     [
-        ("turns {repeats} today and ", "", "points at what the"),
-        ("wants to", "has a {color} one and wants to", "has 2 antecedents"),
-        ("Let's surprise", "You saw this. Surprise", "what was seen is not checked"),
-        ("The cake", "The second cake", "names second, which could be a value"),
-        ("The cake", "Look at that cake", "may be covered"),
-        ('say.color = ["', 'lead = "Twice: "\nsay.color = ["', "names twice"),
-        ('say.color = ["', 'lead = "Twice: "\nsay.color = ["', "gives away twice"),
-        ("The cake", "The cake " + "is so very good " * 9, "only 64 are heard"),
-        (
+        pytest.param("turns {repeats} today and ", "", "points at what the", id="not introduced"),
+        pytest.param(
+            "wants to", "has a {color} one and wants to", "has 2 antecedents", id="named twice"
+        ),
+        pytest.param(
+            "Let's surprise", "You saw this. Surprise", "what was seen is not checked", id="seen"
+        ),
+        pytest.param(
+            "The cake", "The second cake", "names second, which could be a value", id="a value"
+        ),
+        pytest.param("The cake", "On the left, the cake", "names on the left", id="a place"),
+        pytest.param("The cake", "Four, the cake", "names four", id="a number"),
+        pytest.param("The cake", "Look at that cake", "may be covered", id="another pointer"),
+        pytest.param(
+            'say.color = ["', 'lead = "Twice: "\nsay.color = ["', "gives away twice", id="leak"
+        ),
+        pytest.param(
+            "The cake", "The cake " + "is so very good " * 9, "only 64 are heard", id="too long"
+        ),
+        pytest.param(
             "{rival color} one",
             "{rival color} one {list}",
             "a competing remark with a value for list or rival color in this",
+            id="no list",
         ),
-        ("The cake", "Twice, the cake", "names twice"),
-        ("The cake", "On the left, the cake", "names on the left"),
-        ("The cake", "Once, the cake", "names once"),
-        ("The cake", "Four, the cake", "names four"),
     ],
 )
 def test_the_checker_for_authors_names_the_rule_that_a_scenario_breaks(before, after, rule):
     """Each case replaces `before` by `after` in a scenario that breaks none, a birthday story."""
     assert before in BIRTHDAY
+
     broken = report_on(BIRTHDAY.replace(before, after), every=10).broken
-    assert any(rule in sentence for sentence in broken), list(broken)
+
+    assert rule in "\n".join(broken)
 
 
 @pytest.mark.parametrize(
@@ -329,8 +317,10 @@ def test_the_checker_finds_pointers_that_stand_for_another_value_or_for_none(
     the number of photos, *I took two* fits every goal.
     """
     assert before in text
+
     broken = report_on(text.replace(before, after), every=10).broken
-    assert any(rule in sentence for sentence in broken), list(broken)
+
+    assert rule in "\n".join(broken)
 
 
 def only_command(text, mentions=(), landmarks=()):
@@ -400,12 +390,6 @@ def test_adding_a_scenario_changes_only_the_episodes_that_choose_it(text, settin
             assert after == before, episode.key
 
     assert 3 < choosing_it < 60
-
-
-def test_the_example_file_of_the_documentation_breaks_no_rule():
-    words = parse_wordings(USER_FILE_OF_THE_PAGE, "mine.toml").tasks["PickXtimes"]
-    (report,) = check_scenarios(words, None, scenes_of("PickXtimes"))
-    assert not report.broken
 
 
 def test_the_example_file_of_the_documentation_has_a_scenario_for_every_scene():
@@ -608,52 +592,68 @@ def test_a_resolved_command_ends_with_the_explicit_command(some_instructions):
             assert said.command.lower().endswith(explicit.command.lower())
 
 
-def instructions_of_random_episodes(task, setting, count):
-    """Yield (episode, instruction) of a setting in both pools, where it can express the episode."""
-    for pool in POOLS:
-        options = InstructionOptions(setting, wordings=pool)
-        yield from said_where_possible(first_episodes(task, "random", count), options)
+@pytest.mark.parametrize(
+    ("setting", "turns"),
+    [
+        (
+            "spatial",
+            (
+                "I need to see the blue cube, but let's check in the middle first.",
+                "Lift the container there and put it down, then lift the one over that cube.",
+            ),
+        ),
+        (
+            "grounded",
+            (
+                (
+                    "I want to look under the container third from the right and then see the blue "
+                    "cube."
+                ),
+                "Lift that container and put it down, then lift the one over that cube.",
+            ),
+        ),
+        (
+            "reasoning",
+            (
+                "The kids want to see the blue and red cubes, the red one first.",
+                (
+                    "Lift the container over it and put it down, then lift the one over the other "
+                    "cube."
+                ),
+            ),
+        ),
+    ],
+)
+def test_of_two_containers_only_one_has_to_be_found_out(setting, turns):
+    """The goal is the red cube, then the blue one. The introduction names the other one, or both;
+    the command names neither."""
+    episode = get_episode("VideoUnmask", "random", 3)
+
+    assert instruct(episode, setting, wordings="train").turns == turns
 
 
 @pytest.mark.parametrize(
-    ("setting", "counts"), [("spatial", [0, 1]), ("grounded", [0, 1]), ("reasoning", [1, 2])]
+    ("setting", "command"),
+    [
+        (
+            "spatial",
+            "So put three like that one and two blue cubes into the bin, then press the button.",
+        ),
+        (
+            "grounded",
+            "So put two of that color and three green cubes into the bin, then press the button.",
+        ),
+    ],
 )
-def test_of_two_containers_only_one_has_to_be_found_out(setting, counts):
-    """`counts`: how often each color of the goal is named in the introduction.
+def test_of_several_amounts_only_the_color_of_one_has_to_be_found_out(setting, command):
+    """The goal is two blue cubes and three green ones. The color of either one may be hidden, so
+    that its place among the goal's colors tells nothing."""
+    episode = get_episode("BinFill", "random", 3)
 
-    *Grounded*: the container in the back, and the red cube. *Reasoning*: the red and the blue cube
-    are for us, and he has picked the blue one.
-    """
-    found = 0
-    for episode, said in instructions_of_random_episodes("VideoUnmask", setting, 60):
-        if len(episode.goal["colors"]) == 2:
-            named = re.findall("red|green|blue", said.turns[0])
-            assert sorted(map(named.count, episode.goal["colors"])) == counts, said.text
-            assert set(named) <= set(episode.goal["colors"]), said.text
-            assert not re.search("red|green|blue", said.turns[-1]), said.text
-            found += 1
-    assert found
+    said = instruct(episode, setting, wordings="train")
 
-
-@pytest.mark.parametrize("setting", ["spatial", "grounded"])
-def test_of_several_amounts_only_the_color_of_one_has_to_be_found_out(setting):
-    """*Two red cubes, and one like the one on the left*: the rest of the goal is stated."""
-    places_of_hidden = set()
-    for episode, said in instructions_of_random_episodes("BinFill", setting, 120):
-        colors = list(episode.goal["colors"])
-        if len(colors) < 2:
-            continue
-        stated = set(re.findall(r"(\w+) (red|green|blue) cube", said.turns[1]))
-        amounts = {(cardinal(count), color) for color, count in episode.goal.amounts}
-        hidden = amounts - stated
-        assert stated <= amounts, said.text
-        assert len(hidden) == said.metadata["hidden_slots"] == 1, said.text
-        if len(colors) == 2:
-            ((_, color),) = hidden
-            places_of_hidden.add(colors.index(color))
-
-    # That it is found out says nothing about its place among the goal's colors.
-    assert places_of_hidden == {0, 1}
+    assert said.command == command
+    assert said.metadata["hidden_slots"] == 1
 
 
 def test_three_amounts_are_said_in_one_phrase_with_a_mention_for_each_value():
@@ -896,31 +896,32 @@ say.placement = ["<that reference: that one>"]
     assert all(f"go {way} one. " in text for text in report.renderings)
 
 
-@pytest.fixture
-def said_with_gym_reps():
-    """What our VideoRepick scenario "gym reps" says, by the number of repetitions of the goal."""
+def said_with_gym_reps(repeats):
+    """Return what our VideoRepick scenario "gym reps" says where a cube is picked up so often."""
     scenarios = task_scenarios("VideoRepick").scenarios
     (gym_reps,) = [scenario for scenario in scenarios if scenario.fields.frame == "gym reps"]
-    said = {}
-    for episode in scenes_of("VideoRepick", 0)[::9]:
-        said[episode.goal["repeats"]] = said_with(gym_reps, episode)
-    return said
+    for episode in scenes_of("VideoRepick", 0):
+        if episode.goal["repeats"] == repeats:
+            return said_with(gym_reps, episode)
+    raise LookupError(repeats)
 
 
-def test_a_phrase_for_several_repetitions_stands_in_the_command(said_with_gym_reps):
-    """The goal is to pick the cube up twice."""
-    assert "put it back once for each rep, then" in said_with_gym_reps[2].command
+def test_a_phrase_for_several_repetitions_stands_in_the_command():
+    said = said_with_gym_reps(repeats=2)
+
+    assert "put it back once for each rep, then" in said.command
 
 
-def test_a_phrase_that_is_left_out_for_once_leaves_no_gap_in_the_command(said_with_gym_reps):
+def test_a_phrase_that_is_left_out_for_once_leaves_no_gap_in_the_command():
     """*Put it back once for each rep, then …* becomes *put it back, then …*"""
-    said = said_with_gym_reps[1].command
-    assert re.fullmatch("Pick up .* and put it back, then press the button.", said)
+    said = said_with_gym_reps(repeats=1)
+
+    assert re.fullmatch("Pick up .* and put it back, then press the button.", said.command)
 
 
-def test_a_phrase_that_is_left_out_for_once_still_agrees_with_the_number_one(said_with_gym_reps):
+def test_a_phrase_that_is_left_out_for_once_still_agrees_with_the_number_one():
     """Without *for each rep*, who listens knows that it is once."""
-    said = said_with_gym_reps[1]
+    said = said_with_gym_reps(repeats=1)
 
     assert len(said.mentions) == 1
     assert said.meaning.settled == frozenset()
@@ -1098,39 +1099,3 @@ say.color = ["<other taken: the other one>"]
     broken = report_on(text, "VideoPlaceButton", every=10).broken
     assert "means no goal, another one, or several" in broken
     assert "say.color must stand for the goal's value; it stands for blue or red" in broken
-
-
-@pytest.mark.parametrize(
-    ("task", "frame"),
-    [("VideoUnmask", "video series"), ("VideoPlaceButton", "belongs there")],
-    ids=["a list of colors, then one by its position", "one for a cube and one for a moment"],
-)
-def test_two_pointers_of_one_scenario_of_ours_are_understood(task, frame):
-    """*It's the second one's turn, so lift the container over it*; *put the one … on that one*.
-
-    The checker finds scenes that the scenario fits, and in all of them its words mean the goal.
-    """
-    report = report_on_ours(task, frame, scenes_of(task, 0)[::10])
-    assert report.fitting
-    assert not report.broken
-
-
-def test_a_target_that_has_moved_may_still_be_called_there():
-    """The scenario "target to test", in episodes whose targets change places."""
-    episodes = scenes_of("VideoPlaceButton", 0)
-    moved = [episode for episode in episodes if episode.scene.motions_of(Swap)][::5]
-
-    report = report_on_ours("VideoPlaceButton", "target to test", moved)
-
-    assert report.fitting
-    assert not report.broken
-
-
-def test_the_target_on_the_left_is_not_taken_for_words_that_refer_back():
-    """The resolved form names the place, and *on the left* is a part of it."""
-    scenes = scenes_of("VideoPlaceButton")
-
-    report = report_on_ours("VideoPlaceButton", "going with that target", scenes)
-
-    assert any("target on the left" in text for text in report.resolved)
-    assert not report.broken

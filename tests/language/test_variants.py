@@ -24,7 +24,8 @@ def test_tasks_and_settings_give_the_51_pairs_of_the_paper():
 
 def options_by_setting(task):
     """Count the combinations of options with which a task's first test episode can be said."""
-    return Counter(said.setting for said in expressible_options(get_episode(task, "test", 0)))
+    options = expressible_options(get_episode(task, "test", 0))
+    return Counter(option.setting for option in options)
 
 
 @each_task

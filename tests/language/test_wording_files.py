@@ -4,7 +4,6 @@ An open file has an identity, ``hand@1a2b3c4d``: its name and a digest of what i
 """
 
 import contextlib
-import itertools
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -114,17 +113,6 @@ def test_a_sentence_of_a_user_s_file_is_said_in_the_explicit_setting_only():
 
     assert explicit.text == "lift the red cube to the target, repeat 2"
     assert direct.text == instruct(episode, "direct").text
-
-
-def test_other_settings_keep_our_words_if_a_file_has_whole_sentences():
-    """A whole sentence leaves nothing unsaid, so that only *explicit* can use it."""
-    identity = identity_of(TWO_SENTENCES)
-    episode = episode_with("PickXtimes", color="red", repeats=2)
-    for options in options_of(episode):
-        if options.setting != "explicit":
-            ours = instruct_with(episode, options)
-            said = instruct_with(episode, replace(options, wordings=identity))
-            assert (said.turns, said.mentions) == (ours.turns, ours.mentions)
 
 
 @pytest.mark.parametrize(
@@ -254,15 +242,6 @@ def test_the_identity_of_an_open_file_is_its_name_and_a_digest(tmp_path):
     assert re.fullmatch("workshop@[0-9a-f]{8}", open_wordings(file))
 
 
-def test_what_the_example_file_of_the_documentation_says_means_the_goal():
-    """In the settings that its command and scenarios serve, in both forms."""
-    identity = identity_of(COMMAND_FILE_OF_THE_PAGE)
-    for episode in train_episodes("PickXtimes", 0, 100):
-        for setting, form in itertools.product(("explicit", "direct", "contextual"), FORMS):
-            said = instruct(episode, setting, form, wordings=identity)
-            assert understood_goals(said, episode) == (episode.goal,), said.text
-
-
 def test_the_text_that_the_documentation_quotes_is_said_in_a_training_episode():
     """It is of the scenario "fresh paint", one of two in the example file of the page."""
     (quoted,) = re.findall(r"\*(We have just\spainted the red cube\.[^*]*)\*", PAGE)
@@ -275,10 +254,6 @@ def test_the_text_that_the_documentation_quotes_is_said_in_a_training_episode():
 
     assert scenarios[quoted.replace("\n", " ")] == "fresh paint"
     assert set(scenarios.values()) == {"fresh paint", "photos"}
-
-
-def test_the_page_of_wording_files_is_short():
-    assert len(PAGE.split()) <= 950
 
 
 def test_the_example_commands_of_the_documentation_state_every_goal(tmp_path):
@@ -329,22 +304,20 @@ def test_a_mistake_in_a_command_for_training_and_tests_is_reported_once():
     assert str(caught.value).count("printable ASCII") == 1
 
 
-@pytest.fixture
-def without_tokenizer(monkeypatch):
-    """A function that hides the tokenizer, as if it were not installed."""
-    yield lambda: monkeypatch.setattr(token_counts, "_tokenizer", lambda: None)
-    monkeypatch.undo()
+@pytest.fixture(params=[True, False], ids=["tokenizer", "no tokenizer"])
+def has_tokenizer(request, monkeypatch):
+    """Whether a tokenizer is installed; once it is hidden, as if it were not."""
+    token_counts.tokens_of.cache_clear()
+    if not request.param:
+        monkeypatch.setattr(token_counts, "_tokenizer", lambda: None)
+    yield request.param
     token_counts.tokens_of.cache_clear()
 
 
-@pytest.mark.parametrize(("is_installed", "length"), [(True, r"\d+"), (False, r"at most \d+")])
 def test_words_outside_our_table_have_an_exact_length_with_a_tokenizer_only(
-    tmp_path, without_tokenizer, is_installed, length
+    tmp_path, has_tokenizer
 ):
     """*Juggle* is in no table of token counts. The check and `show` print the same length."""
-    if not is_installed:
-        without_tokenizer()
-    token_counts.tokens_of.cache_clear()
     text = f'{HEAD}[commands]\nall = ["Juggle {{color}} {{repeats}}."]'
 
     checked = run_check(text, tmp_path, "--seeds", "0").output
@@ -352,7 +325,7 @@ def test_words_outside_our_table_have_an_exact_length_with_a_tokenizer_only(
     shown = CliRunner().invoke(cli.app, [*show, str(tmp_path / "mine.toml")]).output
 
     longest = re.search(r"  (.*) of 64 tokens; states", checked)[1]
-    assert re.fullmatch(length, longest)
+    assert re.fullmatch(r"\d+" if has_tokenizer else r"at most \d+", longest)
     assert f"({longest} tokens)" in shown
 
 
@@ -462,12 +435,11 @@ def test_the_digest_of_a_wording_file_changes_with_what_is_said(text):
 @pytest.mark.parametrize(
     ("before", "after"),
     [
-        ("[[scenario]]", "# mine\n[[scenario]]"),
         ('["PickXtimes"]', '["PickXtimes", "SwingXtimes"]'),
         ('["PickXtimes"]', '["PickXtimes", "PickXtimes"]'),
         ("[[scenario]]", '[[scenario]]\nneeds.tasks = ["PickXtimes", "PickXtimes"]'),
     ],
-    ids=["comment", "one more task", "task named twice", "task needed twice"],
+    ids=["one more task", "task named twice", "task needed twice"],
 )
 def test_the_digest_of_a_wording_file_changes_with_nothing_else(before, after):
     """Each case replaces `before` by `after` in the file DUSTY."""
@@ -503,22 +475,29 @@ def test_wordings_that_were_never_opened_are_refused():
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("name = ", "is not valid TOML"),
-        ('name = "a b"\ntasks = ["PickXtimes"]', "has the name 'a b'; it must begin with"),
-        ('tasks = ["PickXtimes"]\n[commands]\nall = ["{color} {repeats}"]',
-         "has the name ''; it must begin with a line such as"),
-        ('name = 3\ntasks = ["PickXtimes"]', "name: Expected a text, got a number; it is 3"),
-        ('name = "a"', "has no tasks; add a line such as tasks = "),
-        ('name = "a"\ntasks = "PickXtimes"', "tasks: Expected a list, got a text; it is 'Pick"),
-        ('name = "a"\ntasks = ["PickXTimes"]', "Did you mean 'PickXtimes'?"),
-        ('name = "a"\ntasks = ["VideoRepick"]\n[[literal]]\ntask = "VideoRepick"\n\
-when.color = "red"\ntext = "x"',
-         "literal 1 has when = {'color': 'red'}; it must have a value for repeats."),
-        ('name = "a"\ntasks = ["BinFill"]\n[[literal]]\ntask = "BinFill"\n\
-when = { colors = ["red"], counts = [1, 2] }\ntext = "x"',
-         "literal 1 has when = {'colors': ('red',"),
+        pytest.param("name = ", "is not valid TOML", id="no TOML"),
+        pytest.param(
+            'name = "a b"\ntasks = ["PickXtimes"]',
+            "has the name 'a b'; it must begin with",
+            id="bad name",
+        ),
+        pytest.param(
+            'name = 3\ntasks = ["PickXtimes"]',
+            "name: Expected a text, got a number; it is 3",
+            id="number as name",
+        ),
+        pytest.param('name = "a"', "has no tasks; add a line such as tasks = ", id="no tasks"),
+        pytest.param(
+            'name = "a"\ntasks = ["PickXTimes"]', "Did you mean 'PickXtimes'?", id="unknown task"
+        ),
+        pytest.param(
+            'name = "a"\ntasks = ["BinFill"]\n[[literal]]\ntask = "BinFill"\n'
+            'when = { colors = ["red"], counts = [1, 2] }\ntext = "x"',
+            "literal 1 has when = {'colors': ('red',",
+            id="more counts than colors",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_bad_name_task_or_value_in_a_wording_file_is_refused_in_one_line(text, complaint):
     """Each case is a whole file, or its beginning."""
     check_refusal(text, complaint)
@@ -540,19 +519,12 @@ def check_refusal(text, complaint):
         ("source = 3", "source: Expected a text, got a number; it is 3"),
         ("[comands]", "Did you mean 'commands'?"),
         ("commands = 3", "commands: Expected a table, got a number; it is 3"),
-        ("commands.all = 'a'", "Expected a table or a list, got a text"),
         ("commands.all.test = ['Do {color}.']", "has no commands of PickXtimes in the pool train"),
-        ("commands.all.train = ['{color}']\ncommands.all.test = ['{colour}']",
-         "commands of PickXtimes has other marks than {color} and {repeats}: '{colour}'."),
         ("commands.all = ['Lift <it color: it> {repeats:lap}.']",
          "commands of PickXtimes has other marks than {color} and {repeats}: 'Lift <it color"),
-        ("commands.all = ['Lift {color} {repeats}[repeats: |!]']", "has other marks"),
         ("stated.all.color = 'the {person} cube'", "stated color has other marks than"),
-        ("stated.all.repeats = 'of {color}, {repeats}'", "stated repeats has other"),
-        ("stated.all.color = '<it color: it>'", "stated color has other marks"),
         ("stated.all.colour = 'the {colour} brick'",
          "stated.all: There is no field 'colour'; known: color, repeats. Did"),
-        ("literal = 3", "literal: Expected a list, got a number; it is 3"),
         ("[[literal]]\ntask = 'PickXtimes'\ntext = 'x'", "literal 1 has no when."),
     ],
 )  # fmt: skip
@@ -568,15 +540,15 @@ def test_a_bad_command_or_phrase_in_a_wording_file_is_refused_in_one_line(lines,
          "literal 1 has when = {'color': 'red'}; it must have a value for color and repeats"),
         ("color = 'red', repeats = '2'", "x",
          "literal 1, when.repeats: Expected a number, got a text"),
-        ("color = 'red', repeats = [2]", "x",
-         "literal 1, when.repeats: Expected a number, got a list"),
         ("color = 'red', repeats = 1", "lift {color}", "it must be a whole sentence"),
         ("color = 'red', repeats = 1", " ", "has the text ' '; it must be a whole sentence"),
     ],
+    ids=["no number", "text as number", "mark in the sentence", "blank sentence"],
 )  # fmt: skip
 def test_a_bad_sentence_in_a_wording_file_is_refused_in_one_line(when, text, complaint):
     """A sentence has the values of its goal under `when`, and its words under `text`."""
     lines = f"[[literal]]\ntask = 'PickXtimes'\nwhen = {{ {when} }}\ntext = '{text}'"
+
     check_refusal(HEAD + lines, complaint)
 
 
@@ -651,12 +623,8 @@ def test_two_scenarios_of_one_name_and_pool_are_refused(pool_of_the_second):
 
 def test_an_empty_table_of_commands_is_refused_and_not_filled_with_ours():
     """It could be an unfinished file."""
-    with pytest.raises(InvalidValueError) as caught:
+    with pytest.raises(InvalidValueError, match="no commands of PickXtimes in the pool train"):
         parse_wordings(f"{DUSTY}[commands.PickXtimes]\n", "words.toml")
-    assert str(caught.value) == (
-        "words.toml has no commands of PickXtimes in the pool train.\n"
-        "words.toml has no commands of PickXtimes in the pool test."
-    )
 
 
 def test_a_competing_remark_names_no_color_of_the_list_that_was_introduced():
@@ -831,43 +799,44 @@ def test_a_missing_or_binary_wording_file_is_refused(tmp_path, name):
         read_wordings(tmp_path / name)
 
 
-@pytest.fixture
-def changed_file(tmp_path):
-    """A wording file that was changed after it had been opened: its path and both identities."""
+def write_changed(path):
+    """Write a wording file, open it and change it: *lift* becomes *take*. Return its identity."""
+    path.write_text(TWO_SENTENCES)
+    identity = open_wordings(path)
+    path.write_text(TWO_SENTENCES.replace("lift", "take"))
+    return identity
+
+
+def test_a_wording_file_has_another_identity_after_a_change(tmp_path):
+    """Its sentences said *lift*, and now say *take*."""
+    before = write_changed(tmp_path / "words.toml")
+
+    assert open_wordings(tmp_path / "words.toml") != before
+
+
+def test_what_was_open_once_stays_open_in_this_process(tmp_path):
+    """Episodes that need the earlier words can still be said, though the file has changed."""
+    before = write_changed(tmp_path / "words.toml")
+
+    assert open_wordings(tmp_path / "words.toml", before) == before
+
+
+def test_a_wording_file_that_changed_no_longer_serves_episodes_of_its_old_version(tmp_path):
+    """The words "hand@00000000" were never open in this process."""
     path = tmp_path / "words.toml"
     path.write_text(TWO_SENTENCES)
-    before = open_wordings(path)
-    path.write_text(TWO_SENTENCES.replace("lift", "take"))
-    return path, before, open_wordings(path)
 
-
-def test_a_wording_file_has_another_identity_after_a_change(changed_file):
-    """Its sentences said *lift*, and now say *take*."""
-    _, before, after = changed_file
-    assert before != after
-
-
-def test_what_was_open_once_stays_open_in_this_process(changed_file):
-    """Episodes that need the earlier words can still be said, though the file has changed."""
-    path, before, _ = changed_file
-    assert open_wordings(path, before) == before
-
-
-def test_a_wording_file_that_changed_no_longer_serves_episodes_of_its_old_version(changed_file):
-    """The earlier words were never open in this process."""
-    path, _, after = changed_file
-    complaint = f"holds {after}, but the episodes need hand@00000000"
-    with pytest.raises(InvalidValueError, match=complaint):
+    with pytest.raises(InvalidValueError, match="but the episodes need hand@00000000"):
         open_wordings(path, "hand@00000000")
 
 
-def test_open_wordings_may_be_named_by_their_identity(changed_file):
+def test_open_wordings_may_be_named_by_their_identity():
     """Instead of the path of their file. Episodes that need other words are still refused."""
-    _, _, after = changed_file
+    identity = identity_of(TWO_SENTENCES)
 
-    assert open_wordings(after) == after
+    assert open_wordings(identity) == identity
     with pytest.raises(InvalidValueError, match="but the episodes need hand@00000000"):
-        open_wordings(after, "hand@00000000")
+        open_wordings(identity, "hand@00000000")
 
 
 def test_episodes_of_a_user_s_words_need_their_file():

@@ -5,19 +5,16 @@ the color of the goal, and ``<it color: it>`` for the word *it*, which refers ba
 """
 
 import shutil
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import robomme_stand_in
 
 from roboirg.apps.language_lab import robomme_import
 from roboirg.apps.language_lab.scenarios.scenario_check import (
-    ScenarioReport,
     check_scenarios,
     scenes_of,
 )
-from roboirg.core.episode import SUITES, Episode, Goal
+from roboirg.core.episode import SUITES, Episode
 from roboirg.language.scenarios import scenario_file
 from roboirg.language.scenarios.scenario_file import read_task_scenarios
 from roboirg.tasks import all_tasks, get_task
@@ -50,21 +47,21 @@ say.color = ["the cube <there place: there>"]
 """*The table wobbles on the left. Lift the cube there …*"""
 
 
-def report_on(text: str, task: str = "PickXtimes", every: int = 20) -> ScenarioReport:
+def report_on(text, task="PickXtimes", every=20):
     """Return the checker's report on the only scenario of a file, in every n-th published scene."""
     words = read_task_scenarios(text, "mine.toml")[task]
     (report,) = check_scenarios(words, None, scenes_of(task, 0)[::every])
     return report
 
 
-def take_words(monkeypatch, task: str) -> None:
+def take_words(monkeypatch, task):
     """Take our words of a task away, as if none had been written."""
     monkeypatch.setitem(all_tasks(SUITES), task, replace(get_task(task), words=""))
     read = scenario_file.task_scenarios.__wrapped__
     monkeypatch.setattr(scenario_file, "task_scenarios", read)
 
 
-def make_clone(folder: Path) -> Path:
+def make_clone(folder):
     """A folder with the stand-in in the place of RoboMME's file."""
     place = folder / robomme_import.FILE
     place.parent.mkdir(parents=True)
@@ -72,13 +69,13 @@ def make_clone(folder: Path) -> Path:
     return folder
 
 
-def sentence(task: str, goal: Goal, difficulty: str = "hard") -> str:
+def sentence(task, goal, difficulty="hard"):
     """What the stand-in says, asked without the import."""
     stand_in = robomme_import.stand_in(goal, difficulty)
     return str(robomme_stand_in.get_language_goal(stand_in, task)[0])
 
 
-def train_episodes(task: str, first: int, last: int) -> Iterator[Episode]:
+def train_episodes(task, first, last):
     """Published training episodes."""
     for index in range(first, last):
         found = published_episode(task, "train", index)
@@ -89,7 +86,7 @@ def train_episodes(task: str, first: int, last: int) -> Iterator[Episode]:
             )
 
 
-def train_goals(task: str) -> frozenset[Goal]:
+def train_goals(task):
     """Every goal that the published training scenes of a task allow."""
     return frozenset(
         goal

@@ -34,12 +34,12 @@ class StyledReply(NamedTuple):
     more: Mapping[str, Any] = MappingProxyType({})
     ended: str = "stop"
 
-    def options(self) -> ModelOptions:
+    def options(self):
         """Options of a model whose server replies so."""
         provider = "google" if self.style.startswith("Gemini") else "openai"
         return ModelOptions(provider=provider, model="m", base_url="http://127.0.0.1:9")
 
-    def body(self) -> dict[str, Any]:
+    def body(self):
         """The reply in JSON, as the server sends it."""
         if self.style.startswith("Gemini"):
             candidate = {"content": {"parts": self.content}, "finishReason": self.ended.upper()}

@@ -8,7 +8,6 @@ import os
 import re
 import threading
 import time
-from collections.abc import Callable
 from contextlib import contextmanager
 from fractions import Fraction
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -55,7 +54,7 @@ class FakeVLM(ThreadingHTTPServer):
     """Replies with what a function returns for the request, and keeps all requests.
 
     Attributes:
-        answer: from a request (path, headers, body) to a text, or one of the mishaps above.
+        answer: from the body of a request to a text, or one of the mishaps above.
         requests: bodies, in the order of arrival.
     """
 
@@ -66,7 +65,6 @@ class FakeVLM(ThreadingHTTPServer):
         self.answer = answer
         self.requests = []
         self.headers = []
-        self.paths = []
 
     @property
     def url(self):
@@ -84,7 +82,6 @@ class _Handler(BaseHTTPRequestHandler):
         body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
         self.server.requests.append(body)
         self.server.headers.append(dict(self.headers))
-        self.server.paths.append(self.path)
         said = self.server.answer(body)
         try:
             self._send(said)
@@ -161,16 +158,18 @@ def google_reply(text):
 
 
 @contextmanager
-def fake_vlm(answer: Callable | list | Path):
-    """A running server; `answer` may be a list of replies, the last of which stays, or the path of
-    a file with one reply a line, as JSON texts."""
-    if isinstance(answer, Path):
-        answer = [json.loads(line) for line in answer.read_text().splitlines()]
+def fake_vlm(answer):
+    """Run a server that answers with what a function returns for a request, or from a list.
+
+    The last reply of a list stays.
+    """
+    reply = answer
     if isinstance(answer, list):
         left = list(answer)
-        reply = lambda _body: left.pop(0) if len(left) > 1 else left[0]  # noqa: E731
-    else:
-        reply = answer
+
+        def reply(_body):
+            return left.pop(0) if len(left) > 1 else left[0]
+
     server = FakeVLM(reply)
     thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
     thread.start()

@@ -47,24 +47,38 @@ def test_a_client_without_the_key_cannot_fill_the_memory_of_the_server():
         assert server.is_healthy()
 
 
-def test_requests_from_web_pages_of_other_sites_are_refused_with_403(server_without_key):
-    """Rows are host, more headers, and whether the request is welcome."""
-    port = server_without_key.port
-    for host, headers, welcome in (
-        ("localhost:9", "", True),  # through a tunnel
-        ("192.0.2.7", "", True),
-        ("[::1]:8000", "", True),
-        ("robot-lab:8000", "", True),
-        (f"127.0.0.1:{port}", f"Origin: http://127.0.0.1:{port}\r\n", True),
-        (f"127.0.0.1:{port}", "Origin: http://evil.example\r\n", False),
-        (f"127.0.0.1:{port}", f"Origin: https://127.0.0.1:{port}\r\n", False),
-        (f"evil.example:{port}", "", False),
-        ("127.0.0.1:x", "", False),
-        ("", "", False),
-    ):
-        with server_without_key.connect(opening(host, headers)) as raw:
-            status = int(raw.recv(65536).split()[1])
-        assert (status == 403) is not welcome, (host, headers, status)
+def status_of_request(server, host, headers=""):
+    """Return the HTTP status with which a server answers the first request of a client."""
+    with server.connect(opening(host, headers)) as raw:
+        return int(raw.recv(65536).split()[1])
+
+
+@pytest.mark.parametrize(
+    "host", ["localhost:9", "192.0.2.7", "[::1]:8000", "robot-lab:8000"],
+    ids=["through a tunnel", "address", "address of version 6", "name of the machine"],
+)  # fmt: skip
+def test_requests_to_a_server_by_a_name_of_its_own_are_welcome(server_without_key, host):
+    """ROBOIRG_HOST_NAMES has the name of the machine. Status 101 begins a connection."""
+    assert status_of_request(server_without_key, host) == 101
+
+
+@pytest.mark.parametrize("host", ["evil.example:8000", "127.0.0.1:x", ""])
+def test_requests_to_a_server_by_a_name_of_another_site_are_refused(server_without_key, host):
+    """A page of another site may let its own name lead to this machine."""
+    assert status_of_request(server_without_key, host) == 403
+
+
+@pytest.mark.parametrize(
+    ("origin", "status"),
+    [("http://SERVER", 101), ("http://evil.example", 403), ("https://SERVER", 403)],
+    ids=["its own page", "page of another site", "its own page in another scheme"],
+)
+def test_requests_from_web_pages_of_other_sites_are_refused(server_without_key, origin, status):
+    """A browser names the site of the page as the origin of a request."""
+    host = f"127.0.0.1:{server_without_key.port}"
+    header = f"Origin: {origin.replace('SERVER', host)}\r\n"
+
+    assert status_of_request(server_without_key, host, header) == status
 
 
 def test_a_connection_that_sends_nothing_is_closed_after_the_timeout():
@@ -91,17 +105,22 @@ def test_the_key_of_a_server_is_not_in_the_text_of_its_options():
     assert "sesame" not in repr(ServerOptions(key="sesame"))
 
 
-@pytest.mark.parametrize("scheme", ["challenge", "mme-vla"])
-def test_the_largest_message_allowed_fits_the_longest_video_and_not_much_more(scheme):
-    """The longest video has 1,187 moments; at most 30 % more is accepted."""
-    # All of the longest video with the fields that the protocol can carry, as its client packs.
-    step = moment(0, size=256, sensors=scheme == "challenge")
-    if scheme == "mme-vla":
-        step = {name: step[name] for name in ("front_rgb", "joint_positions", "gripper")}
-    lists = {name: [value] * 10 for name, value in step.items() if name != "instruction"}
-    longest = 1187 * len(pack(lists)) / 10
+@pytest.mark.parametrize(
+    ("scheme", "fields"),
+    [
+        ("mme-vla", ("front_rgb", "joint_positions", "gripper")),
+        ("challenge", [name for name in moment(0, sensors=True) if name != "instruction"]),
+    ],
+)
+def test_the_largest_message_allowed_fits_the_longest_video_and_not_much_more(scheme, fields):
+    """The longest video has 1,187 moments, with the fields that the protocol carries."""
+    step = moment(0, size=256, sensors=True)
+    bytes_of_ten = len(pack({name: [step[name]] * 10 for name in fields}))
+    longest = 1187 * bytes_of_ten / 10
 
-    assert longest < protocols_by_scheme()[scheme].service.max_request_bytes < 1.3 * longest
+    allowed = protocols_by_scheme()[scheme].service.max_request_bytes
+
+    assert longest < allowed < 1.3 * longest
 
 
 def test_a_message_above_64_mib_is_refused_from_its_header(server_without_key):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import CAMERAS, PICTURE_SIZE
+from roboirg.core.observations import CAMERAS
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies.contract.json_values import as_json
 from roboirg.policies.contract.policy_version import read_version
@@ -41,31 +41,37 @@ def test_a_version_is_a_text_a_number_or_a_path(declared, version):
     assert read_version(SimpleNamespace(version=declared)) == version
 
 
-@pytest.mark.parametrize(("frames", "count"), [("all", 10), (4, 3), ("none", None)])
+@pytest.mark.parametrize(("frames", "count"), [("all", 10), (4, 3)])
 def test_made_up_videos_have_the_pictures_that_a_policy_wants(frames, count):
+    """Of ten steps, all or every fourth."""
     needs = PolicyNeeds(cameras=("front",), demonstration_frames=frames)
-    episode = SyntheticEpisodes(needs).episode("Go.", 10)
 
-    video = episode.demonstration
+    video = SyntheticEpisodes(needs).episode("Go.", 10).demonstration
 
     assert len(video["joint_positions"]) == 10
-    assert (len(video["front_rgb"]) if "front_rgb" in video else None) == count
-    assert "wrist_rgb" not in {*video, *episode.first}
-    assert "history" not in episode.first
+    assert len(video["front_rgb"]) == count
+    assert "wrist_rgb" not in video
+
+
+def test_made_up_videos_have_no_pictures_for_a_policy_that_wants_none():
+    needs = PolicyNeeds(cameras=("front",), demonstration_frames="none")
+
+    video = SyntheticEpisodes(needs).episode("Go.", 10).demonstration
+
+    assert "front_rgb" not in video
 
 
 def test_made_up_observations_have_depth_matrices_and_a_history_that_ends_in_the_present():
+    """In a chunk of 16 steps a policy that observes every 4 sees four moments."""
     needs = PolicyNeeds(cameras=CAMERAS, observe_every=4, depth=True, calibration=True)
     studio = SyntheticEpisodes(needs)
-    episode = studio.episode("Go.", 0)
-    later = studio.after(episode, 16)
 
-    for seen in (episode.first, later):
-        for camera in CAMERAS:
-            assert seen[f"{camera}_depth"].shape == (PICTURE_SIZE, PICTURE_SIZE, 1)
-            assert seen[f"{camera}_extrinsic"].shape == (3, 4)
-            assert seen[f"{camera}_intrinsic"].shape == (3, 3)
-    assert len(later["history"]) == 4
+    seen = studio.after(studio.episode("Go.", 0), 16)
 
-    now = later["history"][-1]
-    assert all(np.array_equal(now[name], later[name]) for name in now)
+    for camera in CAMERAS:
+        assert seen[f"{camera}_depth"].shape == (256, 256, 1)
+        assert seen[f"{camera}_extrinsic"].shape == (3, 4)
+        assert seen[f"{camera}_intrinsic"].shape == (3, 3)
+    assert len(seen["history"]) == 4
+    for name, value in seen["history"][-1].items():
+        assert np.array_equal(value, seen[name]), name

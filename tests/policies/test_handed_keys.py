@@ -48,7 +48,7 @@ SPELLINGS_OF_KEY = [
 
 
 @pytest.fixture(autouse=True)
-def key(monkeypatch: pytest.MonkeyPatch) -> None:
+def key(monkeypatch):
     monkeypatch.setattr(handed_keys, "_spellings", set())
     monkeypatch.setenv(VARIABLE, KEY)
 
@@ -94,9 +94,9 @@ MESSAGES_WITH_KEY = {
 
 @pytest.mark.parametrize("place_of_key", MESSAGES_WITH_KEY)
 def test_a_key_that_a_policy_server_sends_back_is_masked_in_records_and_errors(place_of_key):
-    def answer(peer: object) -> None:
+    def answer(peer):
         shake_hands(peer)
-        peer.sendall(MESSAGES_WITH_KEY[place_of_key])  # type: ignore[attr-defined]
+        peer.sendall(MESSAGES_WITH_KEY[place_of_key])
         wait_for_end(peer)
 
     with answering(answer) as place:

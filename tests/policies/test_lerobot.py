@@ -23,15 +23,22 @@ FRONT = "observation.images.front"
 WRIST = "observation.images.wrist"
 
 
-def test_a_lerobot_url_is_checked_without_loading_the_checkpoint(tmp_path):
-    find_policy("lerobot://lerobot/some-checkpoint?device=cpu&execute=8")
+def test_a_lerobot_policy_has_the_version_and_the_folder_of_its_url(tmp_path):
+    """Nothing is loaded for it."""
     folder = write_checkpoint(tmp_path / "last")
 
     policy = make_policy(f"lerobot://{folder}?version=step-3", 0)
 
     assert isinstance(policy, Policy)
-    assert (policy.version, policy.place) == ("step-3", str(folder))
-    assert find_policy("lerobot://x/y").version == "unknown"
+    assert policy.version == "step-3"
+    assert policy.place == str(folder)
+
+
+def test_the_version_of_a_lerobot_policy_is_unknown_if_its_url_names_none():
+    assert find_policy("lerobot://lerobot/some-checkpoint?device=cpu").version == "unknown"
+
+
+def test_a_misspelled_option_of_a_lerobot_url_is_refused():
     with pytest.raises(UnknownNameError, match=r"Did you mean 'device'\?"):
         find_policy("lerobot://x/y?devise=cpu")
 
@@ -74,12 +81,10 @@ def make_model(torch, config):
             super().__init__()
             self.weight = torch.nn.Parameter(torch.zeros(1, dtype=torch.bfloat16))
             self.batches = []
-            self.resets = []
             self.averages = Averages()
             self.config = config
 
         def reset(self):
-            self.resets.append(self)
             self.averages.reset()
             self._queues = {STATE: deque(maxlen=self.config.n_obs_steps), "action": deque()}
 
@@ -164,46 +169,63 @@ def policy_after_reset(seed=0, options=""):
 
 
 def test_a_checkpoint_gets_pictures_and_state_under_lerobot_s_names(checkpoint):
-    """Also: metadata name its processors, and its noise depends on the seed of the policy."""
-    checkpoint.config.is_noisy = True
-    policy = policy_after_reset(5, "?execute=4")
-    first = policy.act(moment(1))
-    assert first.shape == (4, 8)
+    """A picture has its channels first and values from 0 to 1."""
+    policy_after_reset().act(moment(1))
 
-    facts = inference_facts(policy)
-    assert (facts.dtypes, facts.devices) == (("bfloat16",), ("cpu",))
-    for name in ("tokenizer_processor", "unnormalizer_processor"):
-        assert name in policy.metadata["preprocessing"]
-    assert policy.metadata["text_normalization"] == "tokenizer_processor"
-    assert (policy.metadata["chunk"], policy.metadata["execute"]) == (6, 4)
-
-    batch = checkpoint.model.batches[0]
+    (batch,) = checkpoint.model.batches
+    assert set(batch) == {"task", STATE, FRONT, WRIST}
     assert batch["task"] == [INSTRUCTION]
-    assert batch[FRONT].shape == (1, 3, 8, 8)
-
     shown = batch[FRONT][0].permute(1, 2, 0).numpy() * 255
     assert np.allclose(shown, moment(1)["front_rgb"])
-    assert set(batch) == {"task", STATE, FRONT, WRIST}
-    assert np.array_equal(policy_after_reset(5, "?execute=4").act(moment(1)), first)
-    assert not np.array_equal(policy_after_reset(6, "?execute=4").act(moment(1)), first)
-    assert len(checkpoint.model.resets) == 3
 
 
-def test_pictures_are_resized_to_what_the_checkpoint_declares(checkpoint):
-    sized = SimpleNamespace(shape=(3, 4, 4))
-    checkpoint.config.input_features = {STATE: None, FRONT: sized}
+def test_the_metadata_of_a_checkpoint_name_its_processors_and_its_chunk(checkpoint):
+    policy = policy_after_reset(options="?execute=4")
+
+    assert "tokenizer_processor" in policy.metadata["preprocessing"]
+    assert "unnormalizer_processor" in policy.metadata["preprocessing"]
+    assert policy.metadata["text_normalization"] == "tokenizer_processor"
+    assert policy.metadata["chunk"] == 6
+    assert policy.metadata["execute"] == 4
+
+
+def test_the_type_and_device_of_a_checkpoint_s_weights_are_reported(checkpoint):
+    facts = inference_facts(policy_after_reset())
+
+    assert (facts.dtypes, facts.devices) == (("bfloat16",), ("cpu",))
+
+
+def test_the_noise_of_a_checkpoint_depends_on_the_seed_of_the_policy(checkpoint):
+    checkpoint.config.is_noisy = True
+
+    first = policy_after_reset(5).act(moment(1))
+
+    assert np.array_equal(policy_after_reset(5).act(moment(1)), first)
+    assert not np.array_equal(policy_after_reset(6).act(moment(1)), first)
+
+
+@pytest.mark.parametrize(
+    ("declared", "size"), [((3, 4, 4), (4, 4)), ((3, 4, 6), (8, 8))], ids=["square", "no square"]
+)
+def test_pictures_are_resized_to_the_square_that_a_checkpoint_declares(checkpoint, declared, size):
+    """Pictures here have 8 x 8 pixels; the checkpoint has no wrist camera."""
+    checkpoint.config.input_features = {STATE: None, FRONT: SimpleNamespace(shape=declared)}
+
     policy_after_reset().act(moment(1))
-    batch = checkpoint.model.batches[0]
 
+    (batch,) = checkpoint.model.batches
     assert set(batch) == {"task", STATE, FRONT}
+    assert batch[FRONT].shape == (1, 3, *size)
 
-    means = moment(1)["front_rgb"].reshape(4, 2, 4, 2, 3).mean(axis=(1, 3))
-    shown = batch[FRONT][0].permute(1, 2, 0).numpy() * 255
-    assert np.allclose(shown, means, atol=0.51)
 
-    checkpoint.config.input_features = {FRONT: SimpleNamespace(shape=(3, 4, 6))}
+def test_a_resized_picture_has_the_means_of_its_pixels(checkpoint):
+    checkpoint.config.input_features = {FRONT: SimpleNamespace(shape=(3, 4, 4))}
+
     policy_after_reset().act(moment(1))
-    assert checkpoint.model.batches[1][FRONT].shape == (1, 3, 8, 8)  # what is no square stays
+
+    (batch,) = checkpoint.model.batches
+    means = moment(1)["front_rgb"].reshape(4, 2, 4, 2, 3).mean(axis=(1, 3))
+    assert np.allclose(batch[FRONT][0].permute(1, 2, 0).numpy() * 255, means, atol=0.51)
 
 
 def actions_of_lerobot_s_loop(model, length):
@@ -257,43 +279,60 @@ def act_in_turns(episodes, length):
     return played
 
 
-def test_the_option_execute_changes_how_many_actions_of_a_chunk_are_played(checkpoint):
+@pytest.mark.parametrize(
+    ("options", "ensemble", "count"),
+    [("", None, 2), ("?execute=5", None, 5), ("?execute=3", 0.01, 3)],
+    ids=["as configured", "option", "option with averaging"],
+)
+def test_the_option_execute_changes_how_many_actions_of_a_chunk_are_played(
+    checkpoint, options, ensemble, count
+):
     """The checkpoint plans six actions, and says that two are to be played."""
     checkpoint.config.n_action_steps = 2
-    assert len(policy_after_reset().act(moment(1))) == 2
-    assert len(policy_after_reset(options="?execute=5").act(moment(1))) == 5
+    checkpoint.config.temporal_ensemble_coeff = ensemble
 
-    checkpoint.config.temporal_ensemble_coeff = 0.01
-    assert len(policy_after_reset(options="?execute=3").act(moment(1))) == 3
+    assert len(policy_after_reset(options=options).act(moment(1))) == count
+
+
+def test_more_actions_than_a_chunk_has_cannot_be_played(checkpoint):
+    """It plans six."""
     with pytest.raises(InvalidValueError, match=r"loaded: ValueError: The chunk size is the upper"):
         policy_after_reset(options="?execute=7")
 
 
-@pytest.mark.parametrize(("kind", "reads"), [("act", "no, "), ("groot", "")])
-def test_a_checkpoint_without_a_tokenizer_is_noted_as_not_reading_text(checkpoint, kind, reads):
-    """Groot has a tokenizer inside, ACT has none."""
-    checkpoint.config.type = kind
+def test_a_checkpoint_without_a_tokenizer_is_noted_as_not_reading_text(checkpoint):
     checkpoint.before.steps = ()
 
-    policy = policy_after_reset()
+    assert policy_after_reset().metadata["reads_text"].startswith("no, ")
 
-    assert policy.metadata.get("reads_text", "").startswith(reads)
-    assert ("reads_text" in policy.metadata) == bool(reads)
+
+def test_a_checkpoint_of_groot_reads_text_without_a_tokenizer_in_front_of_it(checkpoint):
+    """It has one inside."""
+    checkpoint.config.type = "groot"
+    checkpoint.before.steps = ()
+
+    assert "reads_text" not in policy_after_reset().metadata
 
 
 def test_episodes_in_a_batch_get_the_actions_that_they_get_alone(checkpoint):
     """Five episodes in batches of four, of which the second is filled up."""
     checkpoint.config.max_action_dim = 32
     moments = [moment(number) for number in range(5)]
-
     episodes = [policy_after_reset(seed, "?batch=4") for seed in range(5)]
-    together = episodes[0].act_together(episodes, moments)
-    assert [len(batch["task"]) for batch in checkpoint.model.batches] == [4, 4]  # always as many
 
-    alone = [policy_after_reset(seed, "?batch=4") for seed in range(5)]
-    for policy, now, expected in zip(alone, moments, together, strict=True):
-        assert np.array_equal(policy.act(now), expected)
-    assert not np.array_equal(alone[0].act(moments[0]), together[0])  # other noise in each call
+    together = episodes[0].act_together(episodes, moments)
+
+    assert [len(batch["task"]) for batch in checkpoint.model.batches] == [4, 4]
+    for seed in range(5):
+        alone = policy_after_reset(seed, "?batch=4").act(moments[seed])
+        assert np.array_equal(alone, together[seed]), seed
+
+
+def test_each_call_of_a_batched_episode_has_noise_of_its_own(checkpoint):
+    checkpoint.config.max_action_dim = 32
+    policy = policy_after_reset(0, "?batch=4")
+
+    assert not np.array_equal(policy.act(moment(0)), policy.act(moment(0)))
 
 
 @pytest.mark.parametrize("changes", [{"type": "diffusion"}, {"temporal_ensemble_coeff": 0.01}])

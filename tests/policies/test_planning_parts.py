@@ -1,18 +1,12 @@
 """Points, key frames, forms of subgoals, pictures and merged requirements, without a model."""
 
-import itertools
-import math
 import os
 import re
-from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import PICTURE_SIZE
 from roboirg.core.policy_needs import (
     merge_demonstration_frames,
     merge_observe_every,
@@ -35,29 +29,30 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import contact_sheets, sample_evenly
 from roboirg.util.reply_reading import UnparsableReplyError, text_of
 
-thousandths = st.integers(0, 1000)
 PROMPTS = ("listener", "qwen", "gemini", "memer", "subgoals")
 
 
 @pytest.mark.parametrize(
-    ("point", "reply"),
+    ("reply", "subgoal"),
     [
-        ("at <{}, {}>", "Go {}"),
-        ("at <|box_start|>({},{})<|box_end|>", "Go {}<|im_end|>"),
-        ("at ({}, {})", '"Go\n{}."'),
+        ("Go at <500, 250>", "go at <128, 64>"),
+        ("Go at <|box_start|>(500,250)<|box_end|><|im_end|>", "go at <128, 64>"),
+        ('"Go\nat (500, 250) and at (0, 1000)."', "go at <128, 64> and at <0, 255>"),
+        ("Go left", "go left"),
     ],
+    ids=["angle brackets", "box tags", "two points in parentheses", "no point"],
 )
-@given(st.lists(st.tuples(thousandths, thousandths), max_size=5))
-def test_points_in_thousandths_are_converted_to_pixels_with_the_row_first(point, reply, points):
-    """One pass: what is a pixel already is not taken for a thousandth again."""
-    said = " and ".join(point.format(y, x) for y, x in points)
-    expected = " and ".join(f"at <{to_pixel(y)}, {to_pixel(x)}>" for y, x in points)
-    assert parse_points(reply.format(said)) == f"go {expected}".strip()
+def test_points_in_thousandths_are_converted_to_pixels_of_a_picture_of_256(reply, subgoal):
+    """The row stands first: 500 of 1000 is row 128, 250 of 1000 is column 64."""
+    assert parse_points(reply) == subgoal
 
 
-@given(thousandths)
-def test_thousandths_become_pixels_rounded_down_and_within_the_picture(value):
-    assert to_pixel(value) == min(int(Fraction(PICTURE_SIZE * value, 1000)), PICTURE_SIZE - 1)
+@pytest.mark.parametrize(
+    ("thousandths", "pixel"), [(0, 0), (3, 0), (4, 1), (500, 128), (999, 255), (1000, 255)]
+)
+def test_thousandths_become_pixels_rounded_down_and_within_the_picture(thousandths, pixel):
+    """A picture has 256 pixels, from 0 to 255; 4 thousandths are 1.02 pixels."""
+    assert to_pixel(thousandths) == pixel
 
 
 @pytest.mark.parametrize(
@@ -72,21 +67,20 @@ def test_subgoals_with_a_broken_point_or_too_many_letters_are_refused(text):
         parse_points(text)
 
 
-@given(st.lists(st.integers(0, 200)), st.integers(0, 20))
-def test_key_frames_closer_than_a_gap_are_merged_into_one(steps, near):
-    """A chain is a series of steps, each at most `near` after the one before; one of it is kept."""
-    kept = merge_keyframes(steps, near)
-
-    assert set(kept) <= set(steps)
-    assert kept == tuple(sorted(kept))
-    assert merge_keyframes(reversed(steps), near) == kept == merge_keyframes(kept, near)
-    assert all(later - sooner > near for sooner, later in itertools.pairwise(kept))
-    chains = 0
-    end = -math.inf
-    for step in sorted(steps):
-        chains += step - end > near
-        end = step
-    assert len(kept) == chains
+@pytest.mark.parametrize(
+    ("steps", "gap", "kept"),
+    [
+        ([], 3, ()),
+        ([5, 8], 2, (5, 8)),
+        ([5, 6, 7], 1, (6,)),
+        ([5, 6], 1, (6,)),
+        ([40, 9, 5, 7, 20], 2, (7, 20, 40)),
+    ],
+    ids=["none", "apart", "middle of three", "later of two", "in any order"],
+)
+def test_key_frames_closer_than_a_gap_are_merged_into_one(steps, gap, kept):
+    """Of a chain of steps, each at most a gap after the one before, the middle one is kept."""
+    assert merge_keyframes(steps, gap) == kept
 
 
 def test_the_list_of_subgoal_forms_for_planners_covers_all_tasks_and_nothing_else():
@@ -119,34 +113,36 @@ def _pattern(form):
     )  # fmt: skip
 
 
-@given(st.integers(1, 60), st.integers(1, 12))
-def test_frames_sampled_from_a_video_are_spread_evenly_with_both_ends(length, most):
-    frames = np.arange(length, dtype=np.uint8)[:, None, None, None]
-    kept = sample_evenly(frames, most).ravel().tolist()
-    assert len(kept) == min(length, most)
-    assert kept[0] == 0
-    if len(kept) > 1:
-        assert kept[-1] == length - 1
-        gaps = np.diff(kept)
-        assert max(1, gaps.max() - 1) <= gaps.min()
+@pytest.mark.parametrize(
+    ("length", "most", "kept"),
+    [(3, 5, [0, 1, 2]), (10, 4, [0, 3, 6, 9]), (9, 1, [0]), (7, 3, [0, 3, 6])],
+)
+def test_frames_sampled_from_a_video_are_spread_evenly_with_both_ends(length, most, kept):
+    """At most `most` of `length` frames are kept."""
+    frames = np.arange(length)[:, None, None, None]
 
-    clip = summary_clip(frames, most, length)
-    assert len(kept) / clip.rate == Fraction(length, 30)
+    assert sample_evenly(frames, most).ravel().tolist() == kept
+
+
+def test_a_clip_of_sampled_frames_lasts_as_long_as_the_video():
+    """Of 10 frames, 30 a second, 4 are kept: 12 a second make the same third of a second."""
+    frames = np.zeros((10, 8, 8, 3), np.uint8)
+
+    assert summary_clip(frames, 4, 10).rate == 12
 
 
 def test_a_contact_sheet_shows_frames_in_reading_order_each_with_its_label():
-    """18 frames of different shades on sheets of four by four; one has the label "x"."""
-    shades = [10 * number for number in range(18)]
-    frames = [np.full((128, 128, 3), shade, np.uint8) for shade in shades]
-    labels = ["x" if shade == 50 else "" for shade in shades]
+    """Tiles have 64 pixels, four in a row; the second of five frames has the label "x"."""
+    shades = [10, 20, 30, 40, 50]
+    frames = np.stack([np.full((128, 128, 3), shade, np.uint8) for shade in shades])
 
-    found = []
-    for sheet in contact_sheets(np.stack(frames), labels):
-        for row, column in itertools.product(range(0, len(sheet), 64), range(0, 256, 64)):
-            tile = sheet[row : row + 64, column : column + 64]
-            found.append((int(tile[-1, -1, 0]), bool(np.ptp(tile))))
+    (sheet,) = contact_sheets(frames, ["", "x", "", "", ""])
 
-    assert found == [(shade, shade == 50) for shade in (*shades, 0, 0)]
+    corners = sheet[63::64, 63::64, 0]
+    assert corners[0].tolist() == [10, 20, 30, 40]
+    assert corners[1, 0] == 50
+    assert np.ptp(sheet[:64, :64]) == 0
+    assert np.ptp(sheet[:64, 64:128]) > 0
 
 
 @pytest.mark.parametrize("value", [None, 3, "", " ", ["x"]])
@@ -155,20 +151,39 @@ def test_a_reply_field_that_must_hold_words_is_refused_without_any(value):
         text_of({"a": value}, "a")
 
 
-def test_a_user_s_prompt_file_replaces_ours_and_has_another_fingerprint(tmp_path):
-    assert len({load_prompts(name).fingerprint for name in PROMPTS}) == len(PROMPTS)
+def test_each_of_our_prompt_files_has_a_fingerprint_of_its_own():
+    fingerprints = {load_prompts(name).fingerprint for name in PROMPTS}
 
+    assert len(fingerprints) == len(PROMPTS)
+
+
+@pytest.fixture
+def prompts_of_a_user(tmp_path):
+    """Prompts with two of the texts that a planner needs; one has a field that does not exist."""
     file = tmp_path / "mine.toml"
     file.write_text('again = "no: $why"\nsystem = "x $missing"\n')
-    mine = load_prompts("qwen", str(file))
-    assert mine.fill("again", why="so") == "no: so"
-    assert mine.fingerprint != load_prompts("qwen").fingerprint
-    with pytest.raises(InvalidValueError, match=r"'goal'"):
-        mine.fill("goal", instruction="x")
-    with pytest.raises(InvalidValueError, match=r"'system' .*missing.*\$why"):
-        mine.fill("system", why="so")
+    return load_prompts("qwen", str(file))
 
+
+def test_a_user_s_prompt_file_replaces_ours_and_has_another_fingerprint(prompts_of_a_user):
+    assert prompts_of_a_user.fill("again", why="so") == "no: so"
+    assert prompts_of_a_user.fingerprint != load_prompts("qwen").fingerprint
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"), [("goal", "'goal'"), ("system", r"'system' .*missing.*\$why")]
+)
+def test_a_prompt_that_a_user_s_file_lacks_or_that_cannot_be_filled_is_refused(
+    prompts_of_a_user, name, reason
+):
+    with pytest.raises(InvalidValueError, match=reason):
+        prompts_of_a_user.fill(name, why="so")
+
+
+def test_a_prompt_file_that_is_no_toml_is_refused(tmp_path):
+    file = tmp_path / "mine.toml"
     file.write_text("= 3")
+
     with pytest.raises(InvalidValueError, match="not TOML"):
         load_prompts("qwen", str(file))
 
@@ -181,48 +196,44 @@ def test_prompts_that_are_a_pipe_are_refused(tmp_path):
         load_prompts("qwen", str(tmp_path / "pipe.toml"))
 
 
-wishes = st.sampled_from(["all", "none"]) | st.integers(1, 12)
-
-
-@given(wishes, wishes, st.integers(0, 40))
-def test_planner_and_policy_each_get_the_video_frames_that_they_asked_for(one, other, steps):
-    """The environment draws frames for both wishes; each then sees its own part."""
-    drawn = merge_demonstration_frames(one, other)
-    assert drawn == merge_demonstration_frames(other, one)
-
-    every = {"all": 1}.get(drawn, drawn)
-    shown = {"joint_positions": np.arange(steps)}
-    if drawn != "none":
-        shown["front_rgb"] = np.arange(steps)[::every]
-    excerpt = DemonstrationSubset(shown, drawn, one)
-
-    assert dict(excerpt).keys() == shown.keys()
-    assert len(excerpt["joint_positions"]) == steps
-    if one != "none":
-        stride = {"all": 1}.get(one, one)
-        assert excerpt["front_rgb"].tolist() == list(range(0, steps, stride))
-
-
-@given(
-    st.none() | st.integers(1, 6),
-    st.none() | st.integers(1, 6),
-    st.lists(st.integers(1, 20), max_size=6),
+@pytest.mark.parametrize(
+    ("planner", "policy", "drawn"),
+    [("all", 3, "all"), ("none", 5, 5), (4, 6, 2), (5, 7, "all"), ("none", "none", "none")],
 )
-def test_planner_and_policy_each_get_the_observations_of_their_own_period(one, other, chunks):
-    every = merge_observe_every(one, other)
-    assert every == merge_observe_every(other, one)
+def test_the_video_has_the_frames_that_planner_and_policy_need_together(planner, policy, drawn):
+    """Every 4th and every 6th frame are both among every 2nd; every 5th and 7th need all."""
+    assert merge_demonstration_frames(planner, policy) == drawn
+    assert merge_demonstration_frames(policy, planner) == drawn
 
-    step = looked = 0
-    seen = []
-    for chunk in chunks:
-        observation = {"now": step + chunk}
-        if every is not None:
-            looks = range(step + 1, step + chunk + 1)
-            observation["history"] = tuple(at for at in looks if at % every == 0)
-        step += chunk
-        cut = select_history(observation, looked, every, one)
-        assert cut["now"] == step
-        assert ("history" in cut) == (one is not None)
-        seen += cut.get("history", ())
-        looked += len(observation.get("history", ()))
-    assert seen == ([] if one is None else list(range(one, step + 1, one)))
+
+@pytest.mark.parametrize(
+    ("wanted", "seen"), [("all", [0, 2, 4, 6, 8]), (4, [0, 4, 8]), (6, [0, 6])]
+)
+def test_each_sees_its_own_part_of_the_frames_of_a_video(wanted, seen):
+    """Of 10 steps every 2nd was drawn; fields without pictures keep all steps."""
+    video = {"joint_positions": np.arange(10), "front_rgb": np.arange(0, 10, 2)}
+
+    part = DemonstrationSubset(video, 2, wanted)
+
+    assert part["front_rgb"].tolist() == seen
+    assert len(part["joint_positions"]) == 10
+
+
+@pytest.mark.parametrize(
+    ("planner", "policy", "every"), [(None, 3, 3), (2, 3, 1), (4, 6, 2), (None, None, None)]
+)
+def test_observations_come_as_often_as_planner_and_policy_need_together(planner, policy, every):
+    assert merge_observe_every(planner, policy) == every
+    assert merge_observe_every(policy, planner) == every
+
+
+@pytest.mark.parametrize(
+    ("wanted", "seen"), [(2, {"history": (6, 8, 10)}), (4, {"history": (8,)}), (None, {})]
+)
+def test_each_sees_its_own_part_of_the_history(wanted, seen):
+    """Observations of steps 6, 8 and 10 follow the two of an earlier chunk, of steps 2 and 4."""
+    observation = {"now": 10, "history": (6, 8, 10)}
+
+    found = select_history(observation, earlier=2, every=2, wanted=wanted)
+
+    assert found == {"now": 10, **seen}

@@ -5,14 +5,10 @@ from importlib import resources
 
 import pytest
 from checkpoint_folders import write_checkpoint
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.language.token_counts import count_tokens
 from roboirg.policies.by_name.finding import find_policy
 from roboirg.policies.lerobot.checkpoint_policy import LeRobotPolicy
-from roboirg.policies.planners.systems import all_systems
 from roboirg.policies.prompt_length.prompt_audit import (
     PromptLimit,
     Tokens,
@@ -23,111 +19,109 @@ from roboirg.policies.prompt_length.prompt_audit import (
 )
 from roboirg.policies.prompt_length.tokenizer_file import prompt_limit, read_tokenizer
 
-WORDS = ["Put", "the", "red", "cube", "into", "bin.", "Remember:", "green_one", "Zürich", "quokka"]
-SOME_TEXTS = st.lists(st.sampled_from(WORDS), min_size=1, max_size=30).map(" ".join)
-LIMITS = st.integers(1, 80)
-
 
 def prompt_limit_of(spec):
     return prompt_limit(find_policy(spec).needs)
 
 
 def two_tokens_a_word(text):
-    """A tokenizer that splits every word in two."""
+    """Return the tokens of a tokenizer that splits words in two, and adds one before and behind.
+
+    *red cube* has six: the beginning, re, d, cu, be, and the line break behind the words.
+    """
     ends = []
-    place = 0
+    start = 0
     for word in text.split(" "):
-        ends += [place + (len(word) + 1) // 2, place + len(word)] if len(word) > 1 else []
-        ends += [place + 1] if len(word) == 1 else []
-        place += len(word) + 1
+        ends.append(start + (len(word) + 1) // 2)
+        ends.append(start + len(word))
+        start += len(word) + 1
     return Tokens(1, tuple(ends), 1)
 
 
-TOKENIZERS = st.sampled_from([None, two_tokens_a_word, most_tokens, fewest_tokens])
+@pytest.mark.parametrize(
+    ("tokens", "verdict", "reached"),
+    [(6, "heard", 8), (5, "cut", 8), (4, "cut", 6), (3, "cut", 3), (1, "cut", 0)],
+    ids=["all", "no line break", "red cu", "red", "nothing"],
+)
+def test_a_model_reads_as_many_characters_as_its_tokens_spell(tokens, verdict, reached):
+    """*red cube* has six tokens: the beginning, re, d, cu, be, and a line break."""
+    found = audit_instruction([["red cube"]], PromptLimit(tokens, 0, two_tokens_a_word))
+
+    assert found == (6, 6, (reached,), verdict)
 
 
-def audit_and_reach(text, limit):
-    """Audit of one message, and how many of its characters arrive."""
-    found = audit_instruction([[text]], limit)
-    return found, found.reached[0]
-
-
-@settings(max_examples=30)
-@given(SOME_TEXTS, LIMITS, st.integers(0, 30), TOKENIZERS)
-def test_a_prompt_is_heard_if_its_most_tokens_fit_and_cut_if_its_fewest_do_not(
-    text, tokens, added, tokenize
+@pytest.mark.parametrize(
+    ("tokens", "verdict", "reached"), [(11, "heard", 30), (8, "unknown", 30), (4, "cut", 16)]
+)
+def test_without_the_model_s_tokenizer_a_prompt_may_be_heard_or_cut_or_this_is_unknown(
+    tokens, verdict, reached
 ):
-    """Without the model's tokenizer only bounds are known, and between them nothing is certain."""
-    found, reached = audit_and_reach(text, PromptLimit(tokens, added, tokenize))
-    assert 0 < found.least <= found.most
-    assert (found.verdict == "heard") == (found.most <= tokens)
-    assert (found.verdict == "cut") == (found.least > tokens)
-    assert reached == len(text) or found.verdict != "heard"
+    """Only bounds are known: these 30 characters have 8 to 11 tokens."""
+    limit = PromptLimit(tokens, 0, None)
+
+    found = audit_instruction([["Put the red cube into the bin."]], limit)
+
+    assert found == (8, 11, (reached,), verdict)
 
 
-@settings(max_examples=30)
-@given(SOME_TEXTS, LIMITS)
-def test_what_is_read_is_the_prefix_that_its_tokens_spell(text, tokens):
-    found, reached = audit_and_reach(text, PromptLimit(tokens, 0, two_tokens_a_word))
-    spelled = two_tokens_a_word(clean_prompt(text))
+def test_tokens_that_a_model_adds_behind_the_words_make_their_fate_unknown():
+    """Six tokens are those of the words; up to ten more may be added."""
+    found = audit_instruction([["red cube"]], PromptLimit(6, 10, two_tokens_a_word))
 
-    assert found.least == found.most == spelled.total
-    # The line break behind the words may be all that is lost.
-    assert reached == max(spelled.ends[: max(tokens - 1, 0)], default=0)
+    assert found == (6, 16, (8,), "unknown")
 
 
-@settings(max_examples=30)
-@given(st.lists(st.lists(SOME_TEXTS, min_size=1, max_size=4), max_size=4), LIMITS, TOKENIZERS)
-def test_every_message_is_read_from_its_own_beginning(messages, tokens, tokenize):
-    limit = PromptLimit(tokens, 0, tokenize)
-    texts = [" ".join(turns) for turns in messages]
-    alone = [audit_and_reach(text, limit) for text in texts]
-    verdicts = [share.verdict for share, _ in alone]
+@pytest.mark.parametrize(
+    ("messages", "reached", "verdict"),
+    [
+        ([["red"], ["cube"]], (3, 4), "heard"),
+        ([["red"], ["red cube", "is it"]], (3, 6, 0), "cut"),
+        ([], (), "heard"),
+    ],
+    ids=["two that fit", "two turns in the second", "none"],
+)
+def test_every_message_is_read_from_its_own_beginning(messages, reached, verdict):
+    """With four tokens for each: the beginning, and three halves of words."""
+    found = audit_instruction(messages, PromptLimit(4, 0, two_tokens_a_word))
 
-    found = audit_instruction(messages, limit)
-
-    assert found.most == max((share.most for share, _ in alone), default=0)
-    assert (found.verdict == "heard") == all(verdict == "heard" for verdict in verdicts)
-    assert (found.verdict == "cut") == ("cut" in verdicts)
-    heard = list(found.reached)
-    for turns, text, (_, reached) in zip(messages, texts, alone, strict=True):
-        parts = [turn[: heard.pop(0)] for turn in turns]
-        assert " ".join(parts).rstrip() == text[:reached].rstrip()
-    assert not heard
+    assert found.reached == reached
+    assert found.verdict == verdict
 
 
-def test_mentions_behind_the_token_limit_of_a_prompt_are_reported_as_lost():
-    """A mention is a span (turn, end); "halves" counts two tokens a word."""
-    turns = ("Look at the red cube.", "Put it into the bin.")
-    limit = PromptLimit(1 + 2 * 6, 0, two_tokens_a_word)  # the beginning, five words and "Put"
-    found = audit_instruction([turns], limit)
-    assert found.reached == (21, 3)  # characters: all of the first turn, and "Put"
+TWO_TURNS = ("Look at the red cube.", "Put it into the bin.")
+MENTIONS = [(0, 20), (1, 3), (1, 6), (1, 19)]
+"""The turn of each mention, and where it ends in it: *… red cube*, *Put*, *it*, *the bin*."""
 
-    spans = [(0, 20), (1, 3), (1, 6), (1, 19)]  # turn, and where the mention ends in it
-    assert found.lost(spans) == (2, 3)
-    assert audit_instruction([turns], limit._replace(tokens=99)).lost(spans) == ()
-    # The second is not said yet: it is not lost.
-    assert audit_instruction([turns[:1]], limit).lost(spans) == ()
+
+@pytest.mark.parametrize(
+    ("tokens", "lost"), [(13, (2, 3)), (99, ())], ids=["five words and Put", "all"]
+)
+def test_mentions_behind_the_token_limit_of_a_prompt_are_reported_as_lost(tokens, lost):
+    """13 tokens are the beginning and the halves of six words; mentions are numbered from 0."""
+    found = audit_instruction([TWO_TURNS], PromptLimit(tokens, 0, two_tokens_a_word))
+
+    assert found.lost(MENTIONS) == lost
+
+
+def test_mentions_in_a_turn_that_was_not_said_yet_are_not_lost():
+    found = audit_instruction([TWO_TURNS[:1]], PromptLimit(13, 0, two_tokens_a_word))
+
+    assert found.lost(MENTIONS) == ()
 
 
 def test_prompts_are_stripped_and_underscores_and_line_breaks_are_blanks():
     assert clean_prompt("  Put_the\ncube.\n") == "Put the cube."
+
+
+def test_a_prompt_is_lowered_without_another_length():
+    """In Python the lower case of İ has two characters, so that places would shift."""
     assert clean_prompt("Put İt", lowers=True) == "put İt"
-    assert audit_and_reach("   red cube", PromptLimit(3, 0, two_tokens_a_word))[1] == 3 + len("red")
 
 
-def test_tokens_that_a_model_adds_behind_the_words_make_their_fate_unknown():
-    assert audit_and_reach("red cube", PromptLimit(6, 0, two_tokens_a_word))[0].verdict == "heard"
-    crowded = audit_instruction([["red cube"]], PromptLimit(6, 10, two_tokens_a_word))
-    assert crowded == (6, 16, (len("red cube"),), "unknown")
+def test_blanks_before_a_prompt_count_among_the_characters_that_are_read():
+    found = audit_instruction([["   red cube"]], PromptLimit(3, 0, two_tokens_a_word))
 
-
-@settings(max_examples=30)
-@given(SOME_TEXTS)
-def test_the_upper_bound_of_tokens_is_our_own_count_of_instructions(text):
-    ascii_text = clean_prompt(text.replace("ü", "u"))
-    assert most_tokens(ascii_text).total == count_tokens(ascii_text)
-    assert fewest_tokens(ascii_text).total <= count_tokens(ascii_text)
+    assert found.reached == (len("   red"),)
 
 
 @pytest.fixture(scope="module")
@@ -136,10 +130,12 @@ def sentencepiece_file():
     return str(resources.files(package) / "data" / "tokenizer.model.v1")
 
 
-@settings(max_examples=30)
-@given(st.lists(st.sampled_from([*WORDS[:6], "cubes,", "third"]), min_size=1).map(" ".join))
+@pytest.mark.parametrize(
+    "text", ["Put the red cube into the bin.", "cubes,", "third third", "Remember: green one"]
+)
 def test_a_sentencepiece_model_lies_between_the_bounds(sentencepiece_file, text):
     tokens = read_tokenizer(sentencepiece_file)(text)
+
     assert fewest_tokens(text).total <= tokens.total <= most_tokens(text).total
     assert tokens.ends[-1] == len(text)
 
@@ -159,54 +155,88 @@ def test_a_json_tokenizer_is_read(tmp_path):
     assert read_tokenizer(str(path))("put the cube.") == Tokens(1, (3, 7, 12, 13), 1)
 
 
-def test_a_tokenizer_file_that_cannot_be_read_is_refused_with_the_reason(tmp_path, monkeypatch):
-    with pytest.raises(InvalidValueError, match="is not a file"):
-        read_tokenizer(str(tmp_path / "none.model"))
+@pytest.mark.parametrize(
+    ("name", "size", "reason"),
+    [
+        ("none.model", None, "is not a file"),
+        ("empty.model", 0, "cannot be used as a SentencePiece model"),
+        ("large.json", 2**40, r"large\.json has more than 268,435,456 bytes"),
+    ],
+)
+def test_a_tokenizer_file_that_cannot_be_read_is_refused_with_the_reason(
+    tmp_path, name, size, reason
+):
+    """A file of 2**40 zeros takes no space on the disk."""
+    path = tmp_path / name
+    if size is not None:
+        with path.open("wb") as file:
+            file.truncate(size)
 
-    (tmp_path / "empty.model").write_text("")
-    with pytest.raises(InvalidValueError, match="cannot be used as a SentencePiece model"):
-        read_tokenizer(str(tmp_path / "empty.model"))
+    with pytest.raises(InvalidValueError, match=reason):
+        read_tokenizer(str(path))
 
-    with (tmp_path / "large.json").open("wb") as file:
-        file.truncate(2**40)  # takes no space
-    with pytest.raises(InvalidValueError, match=r"large\.json has more than 268,435,456 bytes"):
-        read_tokenizer(str(tmp_path / "large.json"))
 
-    for name, library in (("other.model", "sentencepiece"), ("a.json", "tokenizers")):
-        (tmp_path / name).write_text("{}")
-        monkeypatch.setitem(sys.modules, library, None)
-        with pytest.raises(
-            MissingDependencyError, match=rf"needs {library}, which is not installed .*tokens"
-        ):
-            read_tokenizer(str(tmp_path / name))
+@pytest.mark.parametrize(
+    ("name", "library"), [("other.model", "sentencepiece"), ("a.json", "tokenizers")]
+)
+def test_a_tokenizer_file_without_its_library_is_refused_with_what_to_install(
+    tmp_path, monkeypatch, name, library
+):
+    (tmp_path / name).write_text("{}")
+    monkeypatch.setitem(sys.modules, library, None)
+
+    with pytest.raises(MissingDependencyError, match=rf"needs {library}, .* installed .*tokens"):
+        read_tokenizer(str(tmp_path / name))
 
 
 def test_the_token_limit_of_a_remote_policy_is_read_from_its_url(sentencepiece_file):
     url = f"openpi://localhost:1?prompt_tokens=48&prompt_added=7&tokenizer={sentencepiece_file}"
+
     limit = prompt_limit_of(url)._replace(tokenize=None)
 
     assert limit == PromptLimit(48, 7, None, "tokenizer.model.v1", lowers=False)
+
+
+def test_a_server_of_mme_vla_lowers_its_prompts():
     assert prompt_limit_of("mme-vla://localhost:1?prompt_tokens=64").lowers
-    assert prompt_limit_of("openpi://localhost:1") is None
-    assert prompt_limit_of("oracle") is None
 
 
-def test_each_system_of_the_paper_declares_its_token_limit():
-    limits = {name: prompt_limit_of(f"system:{name}") for name in all_systems()}
-    assert len(limits) == 7
-    for name, limit in limits.items():
-        is_symbolic = name.startswith("GroundSG") or name == "MemER"
-        assert limit.tokens == (128 if is_symbolic else 64)
-        assert (limit.added > 0) == is_symbolic
-        assert limit.lowers
-    assert prompt_limit_of("system:pi0.5?policy.prompt_tokens=48").tokens == 48
+@pytest.mark.parametrize("spec", ["openpi://localhost:1", "oracle", "lerobot://nobody/nothing"])
+def test_a_policy_that_declares_no_token_limit_has_none(spec):
+    assert prompt_limit_of(spec) is None
+
+
+@pytest.mark.parametrize(
+    ("system", "tokens"),
+    [
+        ("FrameS-Modul", 64),
+        ("TTT-Expert", 64),
+        ("pi0.5", 64),
+        ("GroundSG-Gemini", 128),
+        ("GroundSG-QwenVL", 128),
+        ("GroundSG-oracle", 128),
+        ("MemER", 128),
+        ("pi0.5?policy.prompt_tokens=48", 48),
+    ],
+)
+def test_each_system_of_the_paper_declares_its_token_limit(system, tokens):
+    """Those of 128 also read a subgoal, which is added to the instruction."""
+    limit = prompt_limit_of(f"system:{system}")
+
+    assert limit.tokens == tokens
+    assert (limit.added > 0) == (tokens == 128)
+    assert limit.lowers
 
 
 def test_the_token_limit_of_a_lerobot_checkpoint_is_read_from_its_configuration(tmp_path):
     write_checkpoint(tmp_path, tokenizer_max_length=48)
-    assert LeRobotPolicy(f"lerobot://{tmp_path}").prompt_tokens == 48
+
+    assert prompt_limit_of(f"lerobot://{tmp_path}").tokens == 48
     assert prompt_limit_of(f"lerobot://{tmp_path}?prompt_tokens=9").tokens == 9
-    assert prompt_limit_of("lerobot://nobody/nothing") is None
-    for limit in ("many", None, 0, [48]):
-        write_checkpoint(tmp_path, tokenizer_max_length=limit)
-        assert LeRobotPolicy(f"lerobot://{tmp_path}").prompt_tokens is None
+
+
+@pytest.mark.parametrize("limit", ["many", None, 0, [48]])
+def test_a_token_limit_of_a_lerobot_checkpoint_that_makes_no_sense_is_none(tmp_path, limit):
+    write_checkpoint(tmp_path, tokenizer_max_length=limit)
+
+    assert LeRobotPolicy(f"lerobot://{tmp_path}").prompt_tokens is None

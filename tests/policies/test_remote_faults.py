@@ -27,8 +27,13 @@ PROTOCOLS = {
 
 
 def play_episode(policy, *, steps=1):
+    """Play an episode with a video of two moments; return the actions of each step."""
     policy.reset(INSTRUCTION, video(2))
-    return [policy.act(moment(2 + n, history=(moment(2 + n),) * n)) for n in range(steps)]
+    chunks = []
+    for number in range(steps):
+        now = moment(2 + number)
+        chunks.append(policy.act({**now, "history": (now,) * number}))
+    return chunks
 
 
 def failing_at_inference(protocol, fault):
@@ -43,21 +48,16 @@ def failing_at_inference(protocol, fault):
         ("Traceback …\nValueError: the weights melted\n", "error: ValueError: the weights melted."),
         ("", "error: an empty text"),
         (b"\xc1\xff\x00", "something other than a message: the bytes are not a msgpack"),
-        (b"", "something other than a message"),
         (pack([1, 2]), "the message is of type list, not a map"),
         (pack({b"x": 2}), "key b.x. that is not a text"),
-        (pack({1: 2}), "int is not allowed"),
         ({"action": np.zeros((20, 8))}, "without 'actions'; it holds 'action'"),
-        ({}, "it holds nothing"),
         ({"actions": np.zeros((20, 7))}, r"shape \(n, 8\) with n >= 1, got shape \(20, 7\)"),
-        ({"actions": np.zeros((0, 8))}, r"got shape \(0, 8\)"),
         (
             {"actions": np.full((20, 8), np.nan)},
             "value 0 of row 0: expected a finite number, got nan",
         ),
         ({"actions": "left"}, "array of 8 real numbers, got str"),
         ({"actions": {"__numpy__": "AAAA", "dtype": "<f8"}}, "dialect .keys '__numpy__', 'dtype'."),
-        ({"actions": None}, "got NoneType"),
         ({"actions": np.zeros((200_000, 8))}, "more than 1 MiB; option max_reply_mib"),
     ],
 )
@@ -70,23 +70,6 @@ def test_a_malformed_reply_is_reported_with_the_server_that_sent_it(reply, words
         play_episode(policy)
 
     assert server.place in str(caught.value)
-
-
-@pytest.mark.parametrize("protocol", ["mme-vla", "challenge"])
-@pytest.mark.parametrize(
-    ("reply", "words"),
-    [
-        ("ValueError: the weights melted\n", "error: ValueError: the weights melted."),
-        ({"actions": "left"}, "array of 8 real numbers, got str"),
-    ],
-)
-def test_protocols_with_a_reset_report_malformed_actions_too(protocol, reply, words):
-    with (
-        failing_at_inference(protocol, reply) as server,
-        client_of(server, protocol) as policy,
-        pytest.raises(PolicyReplyError, match=words),
-    ):
-        play_episode(policy)
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
@@ -158,17 +141,16 @@ def test_a_server_that_does_not_confirm_a_reset_is_an_error(protocol):
         play_episode(policy)
 
 
-@pytest.mark.parametrize("protocol", ["openpi", "mme-vla"])
-def test_a_reply_that_takes_longer_than_the_client_waits_is_a_timeout(protocol):
-    """The server takes five seconds, the client waits for two."""
+def test_a_reply_that_takes_longer_than_the_client_waits_is_a_timeout():
+    """The server takes five seconds, the client waits for two; the late reply confirms no reset."""
     with (
-        failing_at_inference(protocol, 5.0) as server,
-        client_of(server, protocol, "?timeout=2") as policy,
+        failing_at_inference("mme-vla", 5.0) as server,
+        client_of(server, "mme-vla", "?timeout=2") as policy,
     ):
         with pytest.raises(PolicyTimeoutError, match="within 2 s"):
             play_episode(policy)
 
-        time.sleep(3)  # until the late reply was sent, which is no confirmed reset
+        time.sleep(3)  # until the late reply was sent
         _played_in_time(policy)
 
 

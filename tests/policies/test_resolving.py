@@ -7,8 +7,7 @@ from planning_fakes import fake_vlm, model_options, stand_in
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.language import expressible, instruct
-from roboirg.policies.by_name.finding import make_policy, read_policy
-from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.policy_server import open_server
 from roboirg.policies.resolving.goal_namers import MeaningNamer, RuleNamer
 from roboirg.policies.resolving.resolving_policy import ResolvingPolicy
@@ -217,10 +216,6 @@ def test_the_version_names_that_of_the_namer_and_of_the_policy():
     policy = ResolvingPolicy(RuleNamer("surface"), Hearer())
 
     assert policy.version == "built-in → v7"
-
-
-def test_a_rewriter_is_no_planner():
-    assert not isinstance(make_policy("resolve:surface?policy=surface", 0), HierarchicalPolicy)
 
 
 @pytest.mark.parametrize(

@@ -39,43 +39,66 @@ def process_with_first_server(tmp_path):
     process.join()
 
 
-def test_a_busy_server_is_waited_for_replaced_by_a_free_one_or_inherited(
-    process_with_first_server, tmp_path, monkeypatch
-):
-    """Another process holds the first server; in the end it is killed and leaves it."""
-    reported = []
-    monkeypatch.setattr(waiting, "_listeners", [reported.append])
+@pytest.fixture
+def reported(monkeypatch):
+    """The list of waits that were reported, each with what is waited for."""
+    found = []
+    monkeypatch.setattr(waiting, "_listeners", [found.append])
+    return found
+
+
+@pytest.mark.usefixtures("process_with_first_server")
+def test_a_free_server_is_not_waited_for(tmp_path, reported):
     before = queued_seconds()
 
-    # The second server is free: nothing is waited for.
     lock_server([SECOND_SERVER], wait=5, folder=tmp_path).file.close()
-    assert (reported, queued_seconds()) == ([], before)
 
-    # The first one is busy: waiting is reported and counted, and ends in an error.
-    start = time.monotonic()
+    assert reported == []
+    assert queued_seconds() == before
+
+
+@pytest.mark.usefixtures("process_with_first_server")
+def test_waiting_for_a_busy_server_is_reported_counted_and_ends_in_an_error(tmp_path, reported):
+    before = queued_seconds()
+
     with (
         waiting.waiting("its turn in a test"),
         pytest.raises(PolicyTimeoutError, match=r"Other episodes used h:8001 for 0\.2 s"),
     ):
         lock_server([FIRST_SERVER], wait=0.2, folder=tmp_path)
-    assert 0.2 <= time.monotonic() - start < 300
 
-    (outer, wait, again, end) = reported
-    assert (wait.what, wait.is_queue, again, end) == ("a free server: h:8001", True, outer, None)
+    outer, for_server, again, end = reported
+    assert for_server.what == "a free server: h:8001"
+    assert for_server.is_queue
+    assert (again, end) == (outer, None)
     assert queued_seconds() - before >= 0.2
 
-    monkeypatch.setattr(os, "getpid", lambda: 1)  # it begins with the second, then the first
-    lock = lock_server([SECOND_SERVER, FIRST_SERVER], wait=0, folder=tmp_path)
+
+@pytest.mark.usefixtures("process_with_first_server")
+def test_of_two_servers_the_free_one_is_taken(tmp_path):
+    lock = lock_server([FIRST_SERVER, SECOND_SERVER], wait=0, folder=tmp_path)
+
     assert lock.endpoint == SECOND_SERVER
-    with pytest.raises(PolicyTimeoutError, match="used h:8001/two, h:8001 for"):
+    lock.file.close()
+
+
+@pytest.mark.usefixtures("process_with_first_server")
+def test_if_all_servers_are_busy_the_error_names_them(tmp_path):
+    lock = lock_server([SECOND_SERVER], wait=0, folder=tmp_path)
+
+    with pytest.raises(PolicyTimeoutError, match=r"Other episodes used .*h:8001/two"):
         lock_server([SECOND_SERVER, FIRST_SERVER], wait=0, folder=tmp_path, shared=True)
 
-    os.kill(process_with_first_server.pid, signal.SIGKILL)
-    again = lock_server([SECOND_SERVER, FIRST_SERVER], wait=300, folder=tmp_path)
-    assert again.endpoint == FIRST_SERVER
-
     lock.file.close()
-    again.file.close()
+
+
+def test_the_server_of_a_process_that_was_killed_becomes_free(process_with_first_server, tmp_path):
+    os.kill(process_with_first_server.pid, signal.SIGKILL)
+
+    lock = lock_server([FIRST_SERVER], wait=300, folder=tmp_path)
+
+    assert lock.endpoint == FIRST_SERVER
+    lock.file.close()
 
 
 def test_a_shared_lock_of_a_server_allows_more_shared_ones_and_no_other(tmp_path):
@@ -90,25 +113,44 @@ def test_a_shared_lock_of_a_server_allows_more_shared_ones_and_no_other(tmp_path
 
 def test_localhost_and_127_0_0_1_are_locked_as_the_same_server(tmp_path):
     lock = lock_server([Endpoint("localhost", 1)], wait=0, folder=tmp_path)
+
     with pytest.raises(PolicyConnectionError):
         lock_server([Endpoint("127.0.0.1", 1)], wait=0, folder=tmp_path)
 
-    lock_server([Endpoint("localhost", 1, "/a/b")], wait=0, folder=tmp_path).file.close()
+    lock.file.close()
+
+
+def test_two_paths_of_one_address_are_two_servers(tmp_path):
+    lock = lock_server([FIRST_SERVER], wait=0, folder=tmp_path)
+
+    lock_server([SECOND_SERVER], wait=0, folder=tmp_path).file.close()
+
     lock.file.close()
 
 
 def test_a_second_policy_of_the_same_thread_is_refused_instead_of_waiting_for_ever():
     with MmeVlaServer() as server:
-        first, second = (make_policy(f"mme-vla://{server.place}", 0) for _ in range(2))
+        first = make_policy(f"mme-vla://{server.place}", 0)
+        second = make_policy(f"mme-vla://{server.place}", 0)
         first.reset(INSTRUCTION, video(0))
+
         with pytest.raises(PolicyConnectionError, match=r"Another policy .*; close\(\) it"):
             second.reset(INSTRUCTION, video(0))
 
         first.close()
         second.reset(INSTRUCTION, video(0))
-        del second  # forgotten, not closed
-        first.reset(INSTRUCTION, video(0))
-        first.close()
+        second.close()
+
+
+def test_a_policy_that_is_forgotten_without_being_closed_leaves_its_server():
+    with MmeVlaServer() as server:
+        forgotten = make_policy(f"mme-vla://{server.place}", 0)
+        forgotten.reset(INSTRUCTION, video(0))
+        del forgotten
+
+        policy = make_policy(f"mme-vla://{server.place}", 0)
+        policy.reset(INSTRUCTION, video(0))
+        policy.close()
 
 
 def play(url, length):

@@ -1,5 +1,6 @@
 """Policies of this process behind real sockets: inputs, outputs and errors."""
 
+import contextlib
 import platform
 import signal
 from http.client import HTTPConnection
@@ -148,53 +149,75 @@ def test_a_policy_that_is_served_by_openpi_gets_no_video():
     assert len(first.demonstration["joint_positions"]) == 0
 
 
-@pytest.mark.parametrize("protocol", SERVED)
+GROWING_PROMPT = [
+    {**moment(0, history=()), "instruction": "this one is red."},
+    {**moment(2, history=(moment(1), moment(2))), "instruction": "please note."},
+    {**moment(3, history=(moment(3),)), "instruction": "please note."},
+    {**moment(5, history=(moment(4), moment(5))), "instruction": "take it."},
+]
+"""What a client sends at four questions: its instruction changes twice, at steps 2 and 5."""
+
+
+@pytest.mark.parametrize("protocol", [name for name in SERVED if name != "openpi"])
 def test_a_served_policy_hears_each_new_sentence_of_a_growing_prompt(protocol):
-    said = ["this one is red.", "please note.", "please note.", "take it."]
-    chunks = [(), (moment(1), moment(2)), (moment(3),), (moment(4), moment(5))]
-    moments = [
-        {**moment(number), "history": seen, "instruction": text}
-        for number, text, seen in zip((0, 2, 3, 5), said, chunks, strict=True)
-    ]
+    """In the second episode steps are counted anew."""
     with served(HERE, protocol) as url:
-        for length in (3, 2):  # the second episode has steps of its own
-            play(url, length, *moments)
+        play(url, 3, *GROWING_PROMPT)
+        play(url, 2, *GROWING_PROMPT)
 
     *_, policy = Recorder.episodes
+    assert policy.instruction == "this one is red."
+    assert policy.heard == [("please note.", 2), ("take it.", 5)]
 
-    assert [call["instruction"] for call in policy.calls] == said
-    if protocol == "openpi":  # has no reset: a new prompt is a new episode
-        assert (policy.instruction, policy.heard) == ("take it.", [])
-    else:
-        assert policy.instruction == "this one is red."
-        assert policy.heard == [("please note.", 2), ("take it.", 5)]
+
+def test_openpi_has_no_reset_so_that_a_new_prompt_is_a_new_episode():
+    with served(HERE, "openpi") as url:
+        play(url, 3, *GROWING_PROMPT)
+
+    *_, policy = Recorder.episodes
+    assert policy.instruction == "take it."
+    assert policy.heard == []
 
 
 def test_a_served_policy_sees_depth_and_calibration_if_the_client_sends_them():
-    moments = [moment(number, sensors=True) for number in range(6)]
-    first = {**moments[3], "history": ()}
-    later = {**moments[5], "history": (moments[4], moments[5])}
+    before, between, now = (moment(number, sensors=True) for number in (3, 4, 5))
+    fields = [field for field in now if field != "instruction"]
 
     with served(f"{__name__}:Seeing", "challenge") as url:
-        play(f"{url}?depth=yes&calibration=yes", 3, first, later, sensors=True)
+        play(
+            f"{url}?depth=yes&calibration=yes", 3, {**before, "history": ()},
+            {**now, "history": (between, now)}, sensors=True,
+        )  # fmt: skip
 
     _opened, policy = Recorder.episodes
-    shown = [field for field in moments[0] if field != "instruction"]
-    check_same(video(3, sensors=True), policy.demonstration, shown)
-    check_same(first, policy.calls[0], shown)
-    for given, kept in zip(later["history"], policy.calls[1]["history"], strict=True):
-        check_same(given, kept, shown)
-    assert policy.calls[1]["front_depth"].dtype == np.int16
+    first, second = policy.calls
+    check_same(video(3, sensors=True), policy.demonstration, fields)
+    check_same(before, first, fields)
+    check_same(between, second["history"][0], fields)
+    check_same(now, second["history"][1], fields)
+    assert second["front_depth"].dtype == np.int16
 
 
 def test_a_request_whose_lists_differ_in_length_is_refused():
-    names = ("front_rgb", "wrist_rgb", "joint_state", "eef_state", "gripper_state")
-    request = {f"{name}_list": [np.zeros(3)] * 2 for name in names}
-    request |= {"task_goal": ["go"], "is_first_step": True, "front_depth_list": [np.zeros(3)]}
-    with served(HERE, "challenge") as url, connect(url.replace("challenge", "ws")) as raw:
-        raw.recv()
+    """Two moments, and depth of one of them."""
+    request = {"task_goal": ["go"], "is_first_step": True, "front_depth_list": [np.zeros(3)]}
+    for name in ("front_rgb", "wrist_rgb", "joint_state", "eef_state", "gripper_state"):
+        request[f"{name}_list"] = [np.zeros(3), np.zeros(3)]
+
+    with served(HERE, "challenge") as url, opened(url) as raw:
         raw.send(pack(request))
-        assert "front_depth_list must be lists of the same length" in raw.recv()
+        answer = raw.recv()
+
+    assert "front_depth_list must be lists of the same length" in answer
+
+
+@contextlib.contextmanager
+def opened(url):
+    """Connect to a server without a client of ours, and take its metadata."""
+    _, _, place = url.partition("://")
+    with connect(f"ws://{place}") as raw:
+        assert unpack(raw.recv())["policy"] == HERE
+        yield raw
 
 
 def reply_to(raw, message):
@@ -202,39 +225,42 @@ def reply_to(raw, message):
     return unpack(raw.recv())
 
 
+FRAMES = np.stack([moment(number)["front_rgb"][None] for number in range(3)])
+VIDEO_OF_TWO_FRAMES_AND_THE_FIRST_MOMENT = {
+    "add_buffer": True,
+    "images": FRAMES,
+    "state": np.zeros((3, 8), np.float32),
+    "exec_start_idx": 2,
+}
+
+
 @pytest.mark.parametrize("kind", ["grounded", "simple"])
 def test_connections_to_an_mme_vla_server_share_one_policy(kind):
-    """The video is sent over one connection, the question over another."""
-    frames = np.stack([moment(number)["front_rgb"][None] for number in range(3)])
-    states = np.zeros((3, 8), np.float32)
-    shown = {"add_buffer": True, "images": frames, "state": states, "exec_start_idx": 2}
+    """The video is sent over one connection, the question with its subgoal over another."""
     request = {
-        "observation/image": frames[2, 0],
-        "observation/wrist_image": frames[2, 0],
+        "observation/image": FRAMES[2, 0],
+        "observation/wrist_image": FRAMES[2, 0],
         "observation/state": np.zeros(8),
         "prompt": "go",
         f"{kind}_subgoal": "pick up the cube at <1, 2>",
     }
-    with served(HERE, "mme-vla") as url:
-        place = url.replace("mme-vla", "ws")
-        with connect(place) as first, connect(place) as second:
-            assert unpack(first.recv())["policy"] == HERE
-            second.recv()
-            assert len(Recorder.episodes) == 1  # idle connections make no policy
+    with served(HERE, "mme-vla") as url, opened(url) as first, opened(url) as second:
+        reset = reply_to(first, {"reset": True})
+        shown = reply_to(first, VIDEO_OF_TWO_FRAMES_AND_THE_FIRST_MOMENT)
+        asked = reply_to(second, request)
 
-            reply = reply_to(first, {"reset": True})
-            assert reply["reset_finished"] is True
-            assert isinstance(reply["reset_time_ms"], float)
-            reply = reply_to(first, shown)
-            assert reply["add_buffer_finished"] is True
-            assert isinstance(reply["add_buffer_time_ms"], float)
-            reply = reply_to(second, request)
-            assert reply["actions"].shape == (4, 8)
-            assert set(reply) == {"actions", "infer_time_ms"}
-
+    assert reset.keys() == {"reset_finished", "reset_time_ms"}
+    assert shown.keys() == {"add_buffer_finished", "add_buffer_time_ms"}
+    assert asked.keys() == {"actions", "infer_time_ms"}
     _opened, policy = Recorder.episodes
-    assert np.array_equal(policy.demonstration["front_rgb"], frames[:2, 0])
+    assert np.array_equal(policy.demonstration["front_rgb"], FRAMES[:2, 0])
     assert policy.subgoals == ["pick up the cube at <1, 2>"]
+
+
+def test_idle_connections_make_no_policy():
+    """The only one is that with which the server was opened."""
+    with served(HERE, "mme-vla") as url, opened(url), opened(url):
+        assert len(Recorder.episodes) == 1
 
 
 @pytest.mark.parametrize(
@@ -245,53 +271,77 @@ def test_connections_to_an_mme_vla_server_share_one_policy(kind):
         (pack({"add_buffer": True, "images": np.zeros((2, 4, 4, 3), np.uint8)}), "'images' must"),
         ("hello", "Messages must be binary"),
     ],
+    ids=["no msgpack", "no state", "pictures of one camera", "text"],
 )
 def test_a_malformed_request_is_answered_by_a_traceback_and_close_code_1011(message, words):
-    with served(HERE, "mme-vla") as url:
-        with connect(url.replace("mme-vla", "ws")) as raw:
+    with served(HERE, "mme-vla") as url, opened(url) as raw:
+        raw.send(message)
+        answer = raw.recv()
+        with pytest.raises(ConnectionClosedError) as closed:
             raw.recv()
-            raw.send(message)
-            text = raw.recv()
-            assert text.startswith("Traceback")
-            assert words in text
-            with pytest.raises(ConnectionClosedError) as closed:
-                raw.recv()
-            assert closed.value.rcvd.code == 1011
-        assert play(url, 0, moment(0, history=()))
+
+    assert answer.startswith("Traceback")
+    assert words in answer
+    assert closed.value.rcvd.code == 1011
+
+
+def test_after_a_malformed_request_the_next_episode_works():
+    with served(HERE, "mme-vla") as url:
+        with opened(url) as raw:
+            raw.send(b"\xc1")
+            raw.recv()
+
+        chunks, _ = play(url, 0, moment(0, history=()))
+
+    assert np.shape(chunks) == (1, 4, 8)
 
 
 @pytest.mark.parametrize("protocol", SERVED)
 def test_an_exception_in_a_served_policy_reaches_the_client_with_its_message(protocol):
+    """The policy here fails at the instruction *fail*; the next episode works."""
+    now = moment(1, history=())
     with served(HERE, protocol) as url:
-        client = make_policy(url, 0)
-        client.reset("fail", video(1))
         with pytest.raises(PolicyReplyError, match="RuntimeError: the weights melted"):
-            client.act({**moment(1, history=()), "instruction": "fail"})
+            play(url, 1, {**now, "instruction": "fail"})
 
-        client.close()
-        assert play(url, 1, moment(1, history=()))
+        assert play(url, 1, now)
 
 
 @pytest.mark.parametrize("protocol", SERVED)
-def test_a_server_reports_its_health_and_refuses_other_keys(protocol, monkeypatch):
+def test_a_server_reports_its_health_to_anyone(protocol):
     with served(HERE, protocol, key="sesame") as url:
         health = HTTPConnection(url.split("://")[1], timeout=300)
         health.request("GET", "/healthz")
+
         assert health.getresponse().read() == b"OK\n"
 
-        monkeypatch.delenv("KEY", raising=False)
-        with pytest.raises(InvalidValueError, match=r"KEY .* holds no key"):
-            make_policy(f"{url}?api_key_env=KEY", 0).reset(INSTRUCTION, video(0))
 
-        monkeypatch.setenv("KEY", "sesam")
+@pytest.mark.parametrize("protocol", SERVED)
+def test_a_server_with_a_key_refuses_clients_without_it(protocol, monkeypatch):
+    monkeypatch.setenv("KEY", "sesam")
+    with served(HERE, protocol, key="sesame") as url:
         for query in ("", "?api_key_env=KEY"):
             with pytest.raises(OSError, match="HTTP status 401"):
                 make_policy(url + query, 0).reset(INSTRUCTION, video(0))
 
-        monkeypatch.setenv("KEY", "sesame")
-        client = make_policy(f"{url}?api_key_env=KEY", 0)
-        client.reset(INSTRUCTION, video(0))
-        client.close()
+
+@pytest.mark.parametrize("protocol", SERVED)
+def test_a_server_with_a_key_serves_a_client_with_the_same_key(protocol, monkeypatch):
+    monkeypatch.setenv("KEY", "sesame")
+    with served(HERE, protocol, key="sesame") as url:
+        chunks, _ = play(f"{url}?api_key_env=KEY", 0, moment(0, history=()))
+
+    assert np.shape(chunks) == (1, 4, 8)
+
+
+def test_a_client_whose_variable_holds_no_key_is_refused(monkeypatch):
+    monkeypatch.delenv("KEY", raising=False)
+
+    with (
+        served(HERE, "openpi", key="sesame") as url,
+        pytest.raises(InvalidValueError, match=r"KEY .* holds no key"),
+    ):
+        make_policy(f"{url}?api_key_env=KEY", 0).reset(INSTRUCTION, video(0))
 
 
 @pytest.mark.parametrize(

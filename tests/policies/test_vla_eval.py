@@ -14,8 +14,10 @@ from roboirg.core.errors import InvalidValueError, PolicyReplyError
 from roboirg.policies.contract.policy_calls import server_version
 
 
-def kinds(server):
-    return [kind for kind, _ in server.payloads]
+def shown_to(server):
+    """Return the only observation that a server was sent."""
+    (found,) = [payload for kind, payload in server.payloads if kind == "observation"]
+    return found
 
 
 def wait_for_messages(server, count):
@@ -34,97 +36,124 @@ def test_an_episode_is_what_the_harness_would_send(snapshot):
     with VlaEvalServer() as server:
         with client_of(server, "vla-eval") as client:
             client.reset(INSTRUCTION, video(3))
-            rows = [client.act(moment(n, history=())) for n in (3, 4)]
+            rows = [client.act(moment(number, history=())).tolist() for number in (3, 4)]
         wait_for_messages(server, 5)
-    assert client.metadata["model_server"] == "Test"
-    assert server_version(client.metadata) == "Test, vla-eval 0.8.0"
-    assert [row.tolist() for row in rows] == [[[1.0] * 8], [[2.0] * 8]]
 
+    assert rows == [[[1.0] * 8], [[2.0] * 8]]
     sent = json.dumps(server.payloads, indent=1, default=described)
     assert re.sub(r"roboirg [\d.]+", "roboirg", sent) == snapshot
 
 
-def test_observations_without_a_video_have_no_history_and_carry_the_subgoal():
+def test_the_version_of_a_server_is_its_name_and_that_of_vla_eval():
+    with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
+        client.reset(INSTRUCTION, video(0))
+
+    assert client.metadata["model_server"] == "Test"
+    assert server_version(client.metadata) == "Test, vla-eval 0.8.0"
+
+
+def test_observations_without_a_video_have_no_history():
+    with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
+        client.reset(INSTRUCTION, video(0))
+        client.act({**moment(1), "instruction": "said later"})
+
+    shown = shown_to(server)
+    assert shown["task_description"] == "said later"
+    assert not shown.keys() & {"video_history", "episode_restart"}
+
+
+def test_a_subgoal_is_sent_with_each_observation_of_its_episode():
     with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
         client.follow("pick it up at <1, 2>")
         client.act(moment(0))
-        client.act({**moment(1), "instruction": "said later"})
+        client.act(moment(1))
         client.reset(INSTRUCTION, video(0))
         client.act(moment(0))
-    shown = [payload for kind, payload in server.payloads if kind == "observation"]
 
-    assert [message.get("subgoal") for message in shown] == ["pick it up at <1, 2>"] * 2 + [None]
-    assert shown[1]["task_description"] == "said later"
-    assert "video_history" not in shown[0]
-    assert "episode_restart" not in shown[0]
+    subgoals = [shown.get("subgoal") for kind, shown in server.payloads if kind == "observation"]
+    assert subgoals == ["pick it up at <1, 2>", "pick it up at <1, 2>", None]
+
+
+WISHES = {"send_wrist_image": False, "send_state": False, "send_video_history": False}
 
 
 @pytest.mark.parametrize(
     ("query", "wishes"),
-    [
-        ("?wrist=no&state=no&video=no", {}),
-        (
-            "",
-            {
-                "send_wrist_image": False,
-                "send_state": False,
-                "send_video_history": False,
-                "something": "else",
-            },
-        ),
-    ],
+    [("?wrist=no&state=no&video=no", {}), ("", WISHES)],
+    ids=["options of the URL", "wishes of the server"],
 )
 def test_options_of_the_server_or_the_url_leave_out_camera_state_and_video(query, wishes):
     with VlaEvalServer() as server:
         server.hello = {**server.hello, "observation_params": wishes}
         with client_of(server, "vla-eval", query) as client:
-            assert client.cameras == (("front",) if query else ("front", "wrist"))
-            assert client.demonstration_frames == ("none" if query else "all")
             client.reset(INSTRUCTION, video(2))
             client.act(moment(0))
-    ((_, shown),) = [payload for payload in server.payloads if payload[0] == "observation"]
 
-    assert list(shown) == ["images", "task_description"]
-    assert list(shown["images"]) == ["agentview"]
+    assert list(shown_to(server)) == ["images", "task_description"]
+    assert list(shown_to(server)["images"]) == ["agentview"]
+
+
+def test_a_client_that_leaves_out_camera_and_video_does_not_need_them():
+    with VlaEvalServer() as server:
+        with client_of(server, "vla-eval", "?wrist=no&video=no") as client:
+            assert client.cameras == ("front",)
+            assert client.demonstration_frames == "none"
+        with client_of(server, "vla-eval") as client:
+            assert client.cameras == ("front", "wrist")
+            assert client.demonstration_frames == "all"
 
 
 @pytest.mark.parametrize(
-    ("params", "left_out"),
+    ("params", "shown"),
     [
-        (None, set()),
-        ({}, set()),
-        ({"send_state": False}, {"states"}),
-        ({"send_video_history": False}, {"video_history", "wrist_video_history"}),
+        (None, {"states", "video_history", "wrist_video_history"}),
+        ({"something": "else"}, {"states", "video_history", "wrist_video_history"}),
+        ({"send_state": False}, {"video_history", "wrist_video_history"}),
+        ({"send_video_history": False}, {"states"}),
     ],
+    ids=["says nothing", "says something else", "no state", "no video"],
 )
-def test_a_server_is_shown_all_that_it_does_not_refuse(params, left_out):
-    """It may say nothing of what it wants, or only of a part."""
+def test_a_server_is_shown_all_that_it_does_not_refuse(params, shown):
     with VlaEvalServer() as server:
         server.hello = {**server.hello, "observation_params": params}
         with client_of(server, "vla-eval") as client:
             client.reset(INSTRUCTION, video(2))
             client.act(moment(0))
-    ((_, shown),) = [payload for payload in server.payloads if payload[0] == "observation"]
 
-    what_it_can_refuse = {"states", "video_history", "wrist_video_history"}
-    assert shown.keys() & what_it_can_refuse == what_it_can_refuse - left_out
-    assert list(shown["images"]) == ["agentview", "wrist"]
+    assert shown_to(server).keys() - {"images", "task_description", "episode_restart"} == shown
+    assert list(shown_to(server)["images"]) == ["agentview", "wrist"]
 
 
-def test_a_server_with_another_action_space_or_protocol_version_is_refused():
+@pytest.mark.parametrize(
+    ("hello", "error", "reason"),
+    [
+        (
+            {"observation_params": {"action_space": "ee_pose"}},
+            InvalidValueError,
+            "'ee_pose', but the policy's URL says actions",
+        ),
+        ({"protocol_version": 2}, PolicyReplyError, "speaks version 2 of vla-eval's protocol"),
+        (
+            {"protocol_version": np.ones(2)},
+            PolicyReplyError,
+            r"speaks version \[1\.0, 1\.0\] of vla-eval's",
+        ),
+    ],
+    ids=["action space", "version", "a version that is no number"],
+)
+def test_a_server_with_another_action_space_or_protocol_version_is_refused(hello, error, reason):
     with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
-        server.hello = {**server.hello, "observation_params": {"action_space": "ee_pose"}}
-        with pytest.raises(InvalidValueError, match="'ee_pose', but the policy's URL says actions"):
+        server.hello = {**server.hello, **hello}
+
+        with pytest.raises(error, match=reason):
             client.reset(INSTRUCTION, video(0))
 
-        with client_of(server, "vla-eval", "?actions=ee_pose") as agreed:
-            agreed.reset(INSTRUCTION, video(0))
-        server.hello = {**server.hello, "protocol_version": 2}
-        with pytest.raises(PolicyReplyError, match="speaks version 2 of vla-eval's protocol"):
-            client.reset(INSTRUCTION, video(0))
-        server.hello = {**server.hello, "protocol_version": np.ones(2)}
-        with pytest.raises(PolicyReplyError, match=r"speaks version \[1\.0, 1\.0\] of vla-eval's"):
+
+def test_a_server_with_another_action_space_is_used_if_the_url_agrees():
+    with VlaEvalServer() as server:
+        server.hello = {**server.hello, "observation_params": {"action_space": "ee_pose"}}
+        with client_of(server, "vla-eval", "?actions=ee_pose") as client:
             client.reset(INSTRUCTION, video(0))
 
 
@@ -162,16 +191,24 @@ def test_actions_are_read_under_both_names_and_in_any_shape(name, action):
         assert client.act(moment(0)).tolist() == [[0.5] * 8]
 
 
-def test_an_error_of_the_server_is_reported_with_its_words():
-    class Failing(VlaEvalServer):
-        def answer(self, message):
-            raise RuntimeError("observation_failed: the weights melted \x1b[2J")
+class FailingServer(VlaEvalServer):
+    """Raises an error with codes that would clear a terminal."""
 
-    with Failing() as server, client_of(server, "vla-eval") as client:
+    def answer(self, message):
+        raise RuntimeError("observation_failed: the weights melted \x1b[2J")
+
+
+def test_an_error_of_the_server_is_reported_with_its_words():
+    with FailingServer() as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
+
         with pytest.raises(PolicyReplyError, match=r"the weights melted \\x1b\[2J\.$"):
             client.act(moment(0))
+
+
+def test_an_error_at_the_start_of_an_episode_is_reported_at_the_first_step():
     with VlaEvalServer(faults=["late-error"]) as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
+
         with pytest.raises(PolicyReplyError, match="replied with an error: cannot start"):
             client.act(moment(0))

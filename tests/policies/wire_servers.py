@@ -33,9 +33,8 @@ def decode(value, spell=str.encode):
     return value
 
 
-encode_texts, decode_texts = (
-    functools.partial(function, spell=str) for function in (encode, decode)
-)
+encode_texts = functools.partial(encode, spell=str)
+decode_texts = functools.partial(decode, spell=str)
 """As vla-eval spells it."""
 
 
@@ -58,7 +57,8 @@ class WireServer:
     def __init__(self, port=0, faults=(), most_bytes=None):
         self._most_bytes = most_bytes
         self.metadata = {}
-        self.port, self.faults = port, list(faults)
+        self.port = port
+        self.faults = list(faults)
         self.messages = []
         self.connections = 0
         self.open = 0
@@ -82,7 +82,8 @@ class WireServer:
         return f"127.0.0.1:{self.port}"
 
     async def _main(self):
-        self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
+        self._loop = asyncio.get_running_loop()
+        self._stop = asyncio.Event()
         async with serve(
             self._handle,
             "127.0.0.1",
@@ -207,11 +208,10 @@ class ChallengeServer(WireServer):
         super().__init__(*args, **kwargs)
         self.metadata = {"name": "submission", "version": "phase-1"}
         self.seen = 0
-        self.resets = 0
 
     def answer(self, message):
         if message.get("reset"):
-            self.seen, self.resets = 0, self.resets + 1
+            self.seen = 0
             return {"reset_finished": True}
         assert message["is_first_step"] == (self.seen == 0)
         assert isinstance(message["task_goal"], list)

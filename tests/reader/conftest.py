@@ -8,7 +8,7 @@ TAUGHT = ("hoist", "crimson", "vermilion")
 
 
 @pytest.fixture(autouse=True)
-def own_words(monkeypatch: pytest.MonkeyPatch) -> None:
+def own_words(monkeypatch):
     """Each test has its own table of synonyms, without the words that other tests teach."""
     known = {word: meaning for word, meaning in tokens.SYNONYMS.items() if word not in TAUGHT}
     monkeypatch.setattr(tokens, "SYNONYMS", known)

@@ -1,8 +1,8 @@
 """Places mean all things that they can mean: those that tie, and those that two measures choose."""
 
 import pytest
+from language_variants import containers
 
-from roboirg.core.episode import Point, Scene, SceneObject
 from roboirg.language.landmarks import selectors
 from roboirg.reader.command import parse_sentence
 from roboirg.reader.referents import Referents
@@ -19,17 +19,6 @@ def names_meant(scene, noun, words):
     (clause,) = reading.clauses
     (thing,) = clause.values("thing")
     return sorted(item.name for item in Referents(scene).things_at(thing, thing.place))
-
-
-def containers(*places):
-    """Return a scene with container_0, container_1 … at points (x, y) in meters.
-
-    The robot is at smaller x and looks along x; its left is positive y.
-    """
-    objects = []
-    for number, (x, y) in enumerate(places):
-        objects.append(SceneObject(f"container_{number}", "container", Point(x, y, 0.05)))
-    return Scene(tuple(objects))
 
 
 @pytest.mark.parametrize(

@@ -59,42 +59,52 @@ class PolicyGuidedByExpert(PolicyWithFixedWaypoints):
 
 @pytest.mark.sim
 def test_a_waypoint_policy_run_in_joint_angles_does_the_same():
-    """`JointChunks` turns each waypoint (a pose to move to) into a chunk of joint angles."""
+    """`JointChunks` turns each waypoint (a pose to move to) into a chunk of joint angles.
+
+    Looks within the last waypoint are not seen any more where that is one action.
+    """
     episode = get_episode("ButtonUnmask", "train", 0)
-    one = PolicyGuidedByExpert()
-    other = PolicyWithFixedWaypoints(one.waypoints)
-    ends = [
-        play(make(episode, **PolicyNeeds.of(policy).env_options), policy)
-        for policy in (one, JointChunks(other))
-    ]
+    guided = PolicyGuidedByExpert()
+    waypoints_end = play(make(episode, **PolicyNeeds.of(guided).env_options), guided)
+    again = PolicyWithFixedWaypoints(guided.waypoints)
+    chunks = JointChunks(again)
 
-    assert [end["status"] for end in ends] == ["success"] * 2
-    assert ends[0]["steps"] == ends[1]["steps"]
+    angles_end = play(make(episode, **PolicyNeeds.of(chunks).env_options), chunks)
 
-    # Looks within the last waypoint are not seen any more where that is one action.
-    count = len(one.tools)
-    assert np.allclose(one.tools, other.tools[:count], atol=1e-5)
-    assert np.array_equal(one.pictures, other.pictures[:count])
+    assert waypoints_end["status"] == angles_end["status"] == "success"
+    assert waypoints_end["steps"] == angles_end["steps"]
+    count = len(guided.tools)
+    assert np.allclose(guided.tools, again.tools[:count], atol=1e-5)
+    assert np.array_equal(guided.pictures, again.pictures[:count])
 
 
 STATE = {"front_rgb": 0, "joint_positions": HOME, "gripper": np.full(2, 0.04)}
 
 
+VIDEO_OF_TEN_STEPS = {
+    "joint_positions": np.tile(HOME, (10, 1)),
+    "gripper": np.full((10, 2), 0.04),
+    "front_rgb": np.arange(10),
+}
+
+
 @pytest.mark.sim
 def test_an_unreachable_waypoint_becomes_eight_steps_of_waiting():
-    """Of a video of ten frames every eighth is passed on."""
-    video = {
-        "joint_positions": np.tile(HOME, (10, 1)), "gripper": np.full((10, 2), 0.04),
-        "front_rgb": np.arange(10),
-    }  # fmt: skip
-    policy = PolicyWithFixedWaypoints([np.array([[2.0, 2.0, 2.0, np.pi, 0.0, 0.0, 0.0]])] * 2)
-    chunks = JointChunks(policy)
-    chunks.reset("wait", video)
+    """It is two meters away; to wait is to stay at the joint angles with the gripper open."""
+    far = np.array([[2.0, 2.0, 2.0, np.pi, 0.0, 0.0, 0.0]])
+    chunks = JointChunks(PolicyWithFixedWaypoints([far]))
+    chunks.reset("wait", VIDEO_OF_TEN_STEPS)
+
+    assert np.allclose(chunks.act(STATE), np.tile([*HOME, 1.0], (8, 1)))
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("drawn", [np.arange(10), np.arange(0, 10, 8)], ids=["all", "every 8th"])
+def test_every_eighth_frame_of_a_video_is_passed_on(drawn):
+    """With the pose of the tool at each of its ten steps."""
+    policy = PolicyWithFixedWaypoints([])
+
+    JointChunks(policy).reset("wait", {**VIDEO_OF_TEN_STEPS, "front_rgb": drawn})
 
     assert policy.demonstration["front_rgb"].tolist() == [0, 8]
     assert policy.demonstration["end_effector"].shape == (10, 6)
-    for _ in range(2):
-        assert np.allclose(chunks.act(STATE), np.tile([*HOME, 1.0], (8, 1)))
-
-    chunks.reset("wait", {**video, "front_rgb": np.arange(0, 10, 8)})
-    assert policy.demonstration["front_rgb"].tolist() == [0, 8]

@@ -48,14 +48,20 @@ def test_every_subgoal_of_a_task_is_encoded_with_its_motion(task):
 
 
 def test_a_point_in_a_subgoal_is_encoded_as_the_place_on_the_table():
+    """The last three numbers say whether there is a point, and where it is, in meters."""
     place = np.array([-0.05, 0.11, 0.02])
     subgoal = SubgoalTemplate("pick up the red cube {at}").at(points_of(place))
-    assert split_point(subgoal)[1] is not None
 
     found = encode_request(subgoal, OBJECTS)
-    assert found[-3] == 1
-    assert np.allclose(found[-2:], place[:2], atol=0.004)
+
+    assert found[-3:] == pytest.approx([1, -0.05, 0.11], abs=0.004)
+
+
+def test_a_subgoal_without_a_point_is_encoded_without_a_place():
     assert encode_request("pick up the red cube", OBJECTS)[-3] == 0
+
+
+def test_words_that_are_no_subgoal_are_not_encoded():
     assert encode_request("make me a sandwich", OBJECTS) is None
 
 
@@ -76,84 +82,156 @@ def recording_of(episode, done):
     )  # fmt: skip
 
 
-def test_recordings_give_the_due_subgoal_with_the_point_at_its_start():
-    """The first two looks are of stage 0, the others of stage 1; objects move on meanwhile."""
+@pytest.fixture
+def recording_of_two_stages():
+    """An episode, and a recording whose first two looks are of stage 0, the others of stage 1."""
     episode = get_episode("PickXtimes", "train", 0)
-    done = [0, 0, 1, 1, 1]
-    stages = [episode.stages[number] for number in done]
-    recorded = recording_of(episode, done)
+    return episode, recording_of(episode, [0, 0, 1, 1, 1])
+
+
+def test_recordings_give_the_subgoal_of_the_stage_that_is_due(recording_of_two_stages):
+    episode, recorded = recording_of_two_stages
+    first, second, *_ = episode.stages
 
     due = subgoals_due(recorded, episode, range(5))
+
+    words = [decision.move.words for decision in due]
+    assert words == [first.subgoal] * 2 + [second.subgoal] * 3
+    objects = [recorded.names[decision.object_number] for decision in due]
+    assert objects == [first.points_at] * 2 + [second.points_at] * 3
+
+
+def test_the_point_of_a_recorded_subgoal_is_that_at_its_start(recording_of_two_stages):
+    """Objects move on at every look; a point is row and column in the picture."""
+    episode, recorded = recording_of_two_stages
+    number = recorded.names.index(episode.stages[1].points_at)
+    column, row = points_of(recorded.things[2, number, :3].astype(float))
+
+    found = recorded_subgoals(recorded, episode, [0, 0, 1, 1, 1], None)
+
+    assert found[0] == found[1] != found[2] == found[3] == found[4]
+    assert split_point(found[2])[1] == pytest.approx((row, column), abs=0.5)
+
+
+def test_points_of_recorded_subgoals_are_moved_a_little_for_training(recording_of_two_stages):
+    episode, recorded = recording_of_two_stages
+    done = [0, 0, 1, 1, 1]
+
     exact = recorded_subgoals(recorded, episode, done, None)
-
-    assert [decision.move.words for decision in due] == [stage.subgoal for stage in stages]
-    names = [recorded.names[decision.object_number] for decision in due]
-    assert names == [stage.points_at for stage in stages]
-    assert exact[0] == exact[1] != exact[2] == exact[3] == exact[4]
-    wanted = points_of(recorded.things[2, due[2].object_number, :3].astype(float))
-    assert np.abs(np.array(split_point(exact[2])[1])[::-1] - wanted).max() <= 0.5
-
     moved = recorded_subgoals(recorded, episode, done, np.random.default_rng(0))
+
     away = np.subtract(split_point(moved[2])[1], split_point(exact[2])[1])
     assert 0 < np.abs(away).max() <= MOST_POINT_NOISE + 1
 
 
-def test_planner_history_keeps_the_looks_at_which_the_subgoal_changed():
-    """Subgoal templates are numbered; 0 is due at looks 2 and 4, 1 at 7, 0 again at 9."""
+@pytest.fixture
+def history_of_three_changes():
+    """Of three templates of subgoals, 0 is due at looks 2 and 4, 1 at look 7, 0 again at look 9."""
     history = PlannerHistory(3)
     for template, look in ((0, 2), (0, 4), (1, 7), (0, 9)):
         history.name(template, look)
-    assert history.switches == [2, 7, 9]
+    return history
 
-    # At look 19, of three templates: how often each was done, which is under way, and since when.
-    done, under_way, rest = np.split(history.context(19), [3, 6])
-    assert done.tolist() == [1, 1, 0]
-    assert under_way.tolist() == [1, 0, 0]
-    assert rest.tolist() == [0.25, 0, 0, 0]
-    assert len(history.context(19)) == context_size(3)
 
-    kept = history.kept(video=2, look=19)
+def test_planner_history_keeps_the_looks_at_which_the_subgoal_changed(history_of_three_changes):
+    assert history_of_three_changes.switches == [2, 7, 9]
+
+
+def test_the_context_of_a_planner_is_what_was_done_what_is_under_way_and_since_when(
+    history_of_three_changes,
+):
+    """At look 19: template 0 was done once, 1 once, 2 never; 0 is under way for 10 of 40 looks."""
+    context = history_of_three_changes.context(19)
+
+    assert len(context) == context_size(3)
+    assert context[:3].tolist() == [1, 1, 0]
+    assert context[3:6].tolist() == [1, 0, 0]
+    assert context[6:].tolist() == [0.25, 0, 0, 0]
+
+
+def test_a_planner_sees_the_video_the_changes_and_the_current_look(history_of_three_changes):
+    """The video has looks 0 and 1; what is left of the fixed number of frames is -1."""
+    kept = history_of_three_changes.kept(video=2, look=19)
+
     assert [look for look in kept if look >= 0] == [0, 1, 2, 7, 9, 19]
     assert len(kept) == VIDEO_FRAMES + MAX_SWITCHES + 1
 
 
-def test_neighboring_key_frames_are_merged_into_their_middle_one():
-    """Looks are as far apart as the merge rule's gap, so that neighbors join."""
+@pytest.mark.parametrize(
+    ("chosen", "kept"),
+    [
+        ([[5, 6, 7], [20, 21], [23, 40]], [6, 21, 23, 40]),
+        ([[5, 6, 7], [20, 21], [23, 40], [22]], [6, 22, 40]),
+    ],
+    ids=["neighbors", "one between two groups"],
+)
+def test_neighboring_key_frames_are_merged_into_their_middle_one(chosen, kept):
+    """Looks are as far apart as the merge rule's gap; of an even group the later middle counts."""
     history = KeyframeHistory(3)
-    history.choose([5, 6, 7])
-    history.choose([20, 21])
-    history.choose([23, 40])
-    kept = history.kept(video=0, look=60)
+    for looks in chosen:
+        history.choose(looks)
 
-    assert kept[:4].tolist() == [6, 21, 23, 40]
-    assert kept[4 : 4 + RECENT].tolist() == recent_looks(60)
+    found = history.kept(video=0, look=60)
 
-    history.choose([22])  # joins what was apart, as of an even group the later one counts
-    assert history.kept(video=0, look=60)[:3].tolist() == [6, 22, 40]
+    assert found[: len(kept)].tolist() == kept
 
+
+def test_at_most_a_fixed_number_of_key_frames_is_kept():
+    history = KeyframeHistory(3)
     history.choose(range(100, 200, 2))
-    assert (history.kept(video=50, look=300) >= 0).sum() == VIDEO_FRAMES + MAX_CHOSEN + RECENT
+
+    found = history.kept(video=50, look=300)
+
+    assert (found >= 0).sum() == VIDEO_FRAMES + MAX_CHOSEN + RECENT
 
 
-def test_training_inputs_equal_those_of_a_planner_that_is_always_right():
+def test_a_planner_with_key_frames_sees_the_recent_looks_too():
+    history = KeyframeHistory(3)
+    history.choose([6])
+
+    found = history.kept(video=0, look=60)
+
+    assert found[: 1 + RECENT].tolist() == [6, *recent_looks(60)]
+
+
+@pytest.fixture
+def inputs_of_five_looks():
+    """What a planner learns from looks 1, 4, 6, 9, 12, at which templates 0, 0, 1, 1, 0 are due."""
     templates = np.array([0, 0, 1, 1, 0])
-    looks = np.array([1, 4, 6, 9, 12])
-    inputs = ideal_planner_inputs(KeyframeHistory(2), templates, looks, 0)
+    return ideal_planner_inputs(KeyframeHistory(2), templates, np.array([1, 4, 6, 9, 12]), 0)
+
+
+def test_training_inputs_equal_those_of_a_planner_that_is_always_right(inputs_of_five_looks):
+    """Before its third answer, at look 6, it has named template 0 at looks 1 and 4."""
     history = KeyframeHistory(2)
-    for number, (template, look) in enumerate(zip(templates, looks, strict=True)):
-        assert np.array_equal(inputs.context[number], history.context(look))
-        assert np.array_equal(inputs.kept_looks[number], history.kept(0, look))
-        history.name(template, look)
-        if look in history.switches:
-            history.choose([look])
+    history.name(0, 1)
+    history.choose([1])
+    history.name(0, 4)
 
-    assert inputs.to_keep[:, -1].tolist() == [1, 0, 1, 0, 1]
+    assert np.array_equal(inputs_of_five_looks.context[2], history.context(6))
+    assert np.array_equal(inputs_of_five_looks.kept_looks[2], history.kept(0, 6))
 
-    unasked = ideal_planner_inputs(KeyframeHistory(2), np.array([0, -1, 1]), np.array([1, 2, 6]), 0)
+
+def test_a_planner_learns_to_keep_the_looks_at_which_the_subgoal_changes(inputs_of_five_looks):
+    """The last column is the current look; the first has none of the recent looks before it."""
+    to_keep = inputs_of_five_looks.to_keep
+
+    assert to_keep[:, -1].tolist() == [1, 0, 1, 0, 1]
+    assert to_keep[0, :-2].tolist() == [-1] * (RECENT - 2)
+    (kept_at_look_9,) = np.flatnonzero(to_keep[3] == 1)
+    assert recent_looks(9)[kept_at_look_9] == 6
+
+
+def test_a_look_at_which_no_subgoal_is_due_teaches_nothing():
+    """A template of -1 is none: what comes after looks as if nothing had been asked."""
+    looks = np.array([1, 2, 6])
+
+    unasked = ideal_planner_inputs(KeyframeHistory(2), np.array([0, -1, 1]), looks, 0)
+
     assert (unasked.to_keep[1] == -1).all()
-    assert np.array_equal(unasked.context[2], inputs.context[2])
-    assert inputs.to_keep[0, :-2].tolist() == [-1] * (RECENT - 2)
-    assert [recent_looks(9)[index] for index in np.flatnonzero(inputs.to_keep[3] == 1)] == [6]
+    history = KeyframeHistory(2)
+    history.name(0, 1)
+    assert np.array_equal(unasked.context[2], history.context(6))
 
 
 @pytest.fixture(params=["subgoal", "keyframes"])
@@ -181,87 +259,173 @@ def observation_of(seed=0):
 NO_VIDEO = {"joint_positions": np.zeros((0, 7))}
 
 
-@pytest.mark.sim
-def test_learned_hands_follow_given_subgoals_or_name_their_own(saved_policy):
-    """A subgoal that they cannot read, *sing*, changes nothing."""
-    from roboirg.policies.contract.base import SubgoalFollower
+@pytest.fixture
+def learned_hands(saved_policy):
+    """The saved policy at the beginning of an episode."""
     from roboirg_learn.kinds import make_learned
 
     hands = make_learned(saved_policy)
-    assert isinstance(hands, SubgoalFollower)
     hands.reset("pick the cube", NO_VIDEO)
-    assert hands.act(observation_of()).shape == (1, 7)
-    words = split_point(hands.subgoal)[0]
-    assert words in {
-        SubgoalTemplate(template.words).at(None) for template in hands.model.body.templates
-    }
-    hands.follow("press the button at <100, 90>")
-    hands.act(observation_of())
-    assert hands.subgoal == "press the button at <100, 90>"
-    hands.follow("sing")
-    assert hands.subgoal == "press the button at <100, 90>"
-    hands.reset("pick the cube", NO_VIDEO)
-    assert hands.subgoal is None
-    hands.follow("sing")
-    still = hands.act(observation_of())
-    assert np.allclose(still[0], [*observation_of()["end_effector"], 0.0])
+    return hands
 
 
 @pytest.mark.sim
-def test_learned_planners_and_hands_can_be_combined_with_others(saved_policy):
-    from roboirg.core.errors import InvalidValueError
-    from roboirg.policies.by_name.finding import make_policy, read_policy
-    from roboirg_learn.policy.subgoal_following import LearnedHands, LearnedPlanner
+def test_learned_hands_name_their_own_subgoal_if_none_is_given(learned_hands):
+    action = learned_hands.act(observation_of())
 
-    own = saved_policy.spec
-    scripted = f"{saved_policy.spec}&hands=scripted"
-    assert read_policy(own).is_hosted
-    assert not read_policy(own).is_privileged
-    assert read_policy(scripted).is_privileged
-    assert not read_policy(scripted).is_hosted
-    policy = make_policy(scripted, 0)
+    words, _ = split_point(learned_hands.subgoal)
+    known = {
+        SubgoalTemplate(template.words).at(None) for template in learned_hands.model.body.templates
+    }
+    assert words in known
+    assert action.shape == (1, 7)
+
+
+@pytest.mark.sim
+def test_learned_hands_follow_a_given_subgoal_and_ignore_words_that_are_none(learned_hands):
+    learned_hands.follow("press the button at <100, 90>")
+    learned_hands.act(observation_of())
+    learned_hands.follow("sing")
+
+    assert learned_hands.subgoal == "press the button at <100, 90>"
+
+
+@pytest.mark.sim
+def test_learned_hands_that_were_given_nothing_but_nonsense_stand_still(learned_hands):
+    """A waypoint is a pose, here that of the tool, and a command to the gripper."""
+    learned_hands.follow("sing")
+
+    (waypoint,) = learned_hands.act(observation_of())
+
+    assert waypoint == pytest.approx([0.0, 0.0, 0.2, np.pi, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.sim
+def test_a_new_episode_forgets_the_subgoal(learned_hands):
+    learned_hands.follow("press the button at <100, 90>")
+
+    learned_hands.reset("pick the cube", NO_VIDEO)
+
+    assert learned_hands.subgoal is None
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize(("options", "is_privileged"), [("", False), ("&hands=scripted", True)])
+def test_a_learned_policy_is_hosted_unless_hands_read_the_simulator(
+    saved_policy, options, is_privileged
+):
+    from roboirg.policies.by_name.finding import read_policy
+
+    ref = read_policy(saved_policy.spec + options)
+
+    assert ref.is_privileged == is_privileged
+    assert ref.is_hosted != is_privileged
+
+
+@pytest.mark.sim
+def test_a_learned_planner_can_ask_scripted_hands(saved_policy):
+    from roboirg.policies.by_name.finding import make_policy
+    from roboirg_learn.policy.subgoal_following import LearnedPlanner
+
+    policy = make_policy(f"{saved_policy.spec}&hands=scripted", 0)
+
     assert isinstance(policy.planner, LearnedPlanner)
     assert "front" in policy.cameras
-    policy = make_policy(f"planner:oracle?hands={own}", 0)
-    assert isinstance(policy.policy, LearnedHands)
-    assert policy.actions == "waypoint"
-    joints = f"planner:oracle?hands={own}%26actions=joint_angle"
-    assert make_policy(joints, 0).actions == "joint_angle"
-    with pytest.raises(InvalidValueError, match="other hands"):
-        make_policy(f"{scripted}&actions=joint_angle", 0)
-    with pytest.raises(InvalidValueError, match="when-done"):
-        make_policy(f"planner:stateless?model=none&hands={own}", 0)
 
 
 @pytest.mark.sim
-def test_a_learned_planner_may_point_at_an_object_that_is_out_of_sight(saved_policy):
-    """Object 1 is out of sight from look 4 on; the decision is made at look 5."""
-    torch = pytest.importorskip("torch")
+@pytest.mark.parametrize(
+    ("options", "actions"), [("", "waypoint"), ("%26actions=joint_angle", "joint_angle")]
+)
+def test_the_oracle_can_ask_learned_hands(saved_policy, options, actions):
+    from roboirg.policies.by_name.finding import make_policy
+    from roboirg_learn.policy.subgoal_following import LearnedHands
+
+    policy = make_policy(f"planner:oracle?hands={saved_policy.spec}{options}", 0)
+
+    assert isinstance(policy.policy, LearnedHands) == (actions == "waypoint")
+    assert policy.actions == actions
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize(
+    ("spec", "reason"),
+    [
+        ("{own}&hands=scripted&actions=joint_angle", "other hands"),
+        ("planner:stateless?model=none&hands={own}", "when-done"),
+    ],
+    ids=["joint angles of scripted hands", "a planner that waits for reports"],
+)
+def test_a_combination_that_cannot_act_is_refused(saved_policy, spec, reason):
+    from roboirg.core.errors import InvalidValueError
+    from roboirg.policies.by_name.finding import make_policy
+
+    with pytest.raises(InvalidValueError, match=reason):
+        make_policy(spec.format(own=saved_policy.spec), 0)
+
+
+@pytest.fixture
+def planner_and_episode(saved_policy):
+    """A planner, and numbers of an episode with three objects and six looks.
+
+    It decides at looks 2 and 5; object 1 is out of sight from look 4 on.
+    """
     from roboirg_learn.policy.body_net import TOOL_NUMBERS
-    from roboirg_learn.policy.policy_data import EpisodeArrays, LookArrays, to_batch
+    from roboirg_learn.policy.policy_data import EpisodeArrays, LookArrays
     from roboirg_learn.policy.trained_body import load_body
 
-    model = load_body(saved_policy.body)
-    size = len(model.templates)
-    looks = 6
-    things = 3
+    body = load_body(saved_policy.body)
     rng = np.random.default_rng(0)
-    seen = np.ones((looks, things), bool)
-    seen[4:, 1] = False
-    shown = LookArrays(
-        rng.integers(0, 5, (looks, things)),
-        *(rng.normal(0, 0.1, (looks, things, 2)).astype(np.float32) for _ in range(2)),
-        seen, np.ones_like(seen), rng.normal(0, 1, (looks, TOOL_NUMBERS)).astype(np.float32),
-    )  # fmt: skip
-    subgoal_inputs = ideal_planner_inputs(
-        KeyframeHistory(size), np.array([0, 1]), np.array([2, 5]), 0
+    in_sight = np.ones((6, 3), bool)
+    in_sight[4:, 1] = False
+    looks = LookArrays(
+        classes=rng.integers(0, 5, (6, 3)),
+        positions=rng.normal(0, 0.1, (6, 3, 2)).astype(np.float32),
+        yaw_codes=rng.normal(0, 0.1, (6, 3, 2)).astype(np.float32),
+        visible=in_sight,
+        confirmed=np.ones((6, 3), bool),
+        tool=rng.normal(0, 1, (6, TOOL_NUMBERS)).astype(np.float32),
     )
-    goal = np.zeros(model.goals.size, np.float32)
-    nothing = np.array([-1, -1])
-    numbers = EpisodeArrays(shown, goal, np.array([2, 5]), *[nothing] * 3, subgoal_inputs)
-    answer = model.planner(to_batch([numbers]))
+    decisions = np.array([2, 5])
+    inputs = ideal_planner_inputs(
+        KeyframeHistory(len(body.templates)), np.array([0, 1]), decisions, 0
+    )
+    none = np.array([-1, -1])
+    goal = np.zeros(body.goals.size, np.float32)
+    return body, EpisodeArrays(looks, goal, decisions, none, none, none, inputs)
+
+
+def answer_of_planner(body, episode):
+    from roboirg_learn.policy.policy_data import to_batch
+
+    return body.planner(to_batch([episode]))
+
+
+@pytest.mark.sim
+def test_a_learned_planner_may_point_at_an_object_that_is_out_of_sight(planner_and_episode):
+    """A score far below zero would exclude it."""
+    answer = answer_of_planner(*planner_and_episode)
+
     assert (answer.tracks[0, 1, :, 1] > -1e3).all()
-    assert (answer.keep_scores is None) == (model.plan["memory"] == "subgoal")
-    context = subgoal_inputs._replace(context=subgoal_inputs.context + 1)
-    other = model.planner(to_batch([numbers._replace(subgoal_inputs=context)]))
-    assert not torch.equal(answer.moves, other.moves)
+
+
+@pytest.mark.sim
+def test_only_a_planner_with_key_frames_scores_the_frames_to_keep(planner_and_episode):
+    body, episode = planner_and_episode
+
+    has_scores = answer_of_planner(body, episode).keep_scores is not None
+
+    assert has_scores == (body.plan["memory"] == "keyframes")
+
+
+@pytest.mark.sim
+def test_what_was_done_before_changes_the_answer_of_a_learned_planner(planner_and_episode):
+    torch = pytest.importorskip("torch")
+    body, episode = planner_and_episode
+    inputs = episode.subgoal_inputs
+    later = episode._replace(subgoal_inputs=inputs._replace(context=inputs.context + 1))
+
+    before = answer_of_planner(body, episode).moves
+    after = answer_of_planner(body, later).moves
+
+    assert not torch.equal(before, after)

@@ -3,8 +3,7 @@
 import math
 
 import numpy as np
-from hypothesis import given
-from hypothesis import strategies as st
+import pytest
 
 from roboirg.extension.sight import points_of
 from roboirg_learn.policy.moves import LEAST_SHARE, LookDecision, Move, common_moves, waypoint
@@ -12,10 +11,10 @@ from roboirg_learn.policy.sight import ObjectClasses
 from roboirg_learn.policy.tracks import MOST_TRACKS, Detections, Tracker
 
 OBJECTS = ObjectClasses(("button", "cube red", "target"), np.array([0.01, 0.02, 0.005]))
-places = st.tuples(st.floats(-0.25, 0.15), st.floats(-0.25, 0.25))
 
 
 def look_at(classes, spots):
+    """Return detections of these classes at points (x, y) in meters, all with the same yaw."""
     count = len(classes)
     yaw_codes = np.tile(np.array([1.0, 0.0], np.float32), (count, 1))
     return Detections(
@@ -23,85 +22,92 @@ def look_at(classes, spots):
     )
 
 
-@given(st.lists(st.tuples(places, st.integers(0, 2)), min_size=1, max_size=8))
-def test_a_point_in_the_picture_is_converted_to_its_place_on_the_table(things):
-    spots = np.array([spot for spot, _ in things])
-    classes = np.array([kind for _, kind in things])
-    positions = np.column_stack([spots, OBJECTS.heights[classes]])
+@pytest.mark.parametrize("place", [(0.0, 0.0), (0.1, 0.2), (-0.25, -0.1)])
+@pytest.mark.parametrize("number", [0, 1, 2], ids=OBJECTS.names)
+def test_a_point_in_the_picture_is_converted_to_its_place_on_the_table(number, place):
+    """Things have different heights, from 5 mm to 2 cm."""
+    point = points_of(np.array([[*place, OBJECTS.heights[number]]]))
 
-    found = OBJECTS.table_positions(classes, points_of(positions))
+    (found,) = OBJECTS.table_positions(np.array([number]), point)
 
-    np.testing.assert_allclose(found, spots, atol=1e-5)
+    assert found == pytest.approx(place, abs=1e-5)
 
 
-@given(
-    st.lists(st.tuples(places, st.integers(0, 2)), min_size=1, max_size=10),
-    st.randoms(use_true_random=False),
-)
-def test_objects_that_stay_keep_their_track_numbers_in_any_order_of_detection(things, rng):
-    apart = []
-    for spot, kind in things:
-        if all(math.dist(spot, other) > 0.02 or kind != like for other, like in apart):
-            apart.append((spot, kind))
-    order = rng.sample(range(len(apart)), len(apart))
-    spots, kinds = zip(*apart, strict=True)
+def test_objects_that_stay_keep_their_track_numbers_in_any_order_of_detection():
+    """Two red cubes (class 1) 10 cm apart, and a target (class 2) under the first one."""
     tracks = Tracker()
+    first = tracks.update(look_at([1, 1, 2], [(0.0, 0.0), (0.0, 0.1), (0.0, 0.0)]))
 
-    first = tracks.update(look_at(kinds, spots))
-    again = tracks.update(look_at([kinds[n] for n in order], [spots[n] for n in order]))
+    again = tracks.update(look_at([2, 1, 1], [(0.0, 0.0), (0.0, 0.1), (0.0, 0.0)]))
 
-    assert again.tolist() == [first[n] for n in order]
-    assert tracks.count == len(apart)
-    assert tracks.visible[: tracks.count].all()
+    assert first.tolist() == [0, 1, 2]
+    assert again.tolist() == [2, 1, 0]
+    assert tracks.count == 3
+    assert tracks.visible[:3].all()
 
 
 def test_two_containers_that_exchange_places_keep_their_track_numbers():
-    """They pass each other on opposite sides, as in the videos."""
+    """They pass each other on opposite sides, as in the videos: half a circle each, 5 cm wide."""
     tracks = Tracker()
-    for share in np.linspace(0.0, 1.0, 8):
-        smooth = share * share * (3 - 2 * share)
-        aside = 0.07 * math.sin(math.pi * smooth)
-        one = (-0.1 + 0.2 * smooth, aside)
-        other = (0.1 - 0.2 * smooth, -aside)
-        mine = tracks.update(look_at([0, 0], [one, other]))
-        assert mine.tolist() == [0, 1], share
+
+    for angle in np.linspace(0.0, math.pi, 8):
+        x = -0.1 * math.cos(angle)
+        y = 0.05 * math.sin(angle)
+        numbers = tracks.update(look_at([0, 0], [(x, y), (-x, -y)]))
+        assert numbers.tolist() == [0, 1], angle
+
     np.testing.assert_allclose(tracks.positions[:2], [(0.1, 0.0), (-0.1, 0.0)], atol=1e-6)
 
 
-def test_an_object_out_of_sight_keeps_its_place_and_its_track_number():
-    """Two objects are seen, then only the second, then the first one at other places."""
+@pytest.fixture
+def tracks_of_a_cube_out_of_sight():
+    """A cube, number 0, was seen at (0, 0.1) and then no more; a target, number 1, is in sight."""
     tracks = Tracker()
     tracks.update(look_at([1, 2], [(0.0, 0.1), (0.1, -0.1)]))
-
     tracks.update(look_at([2], [(0.1, -0.1)]))
+    return tracks
 
-    assert tracks.visible[:2].tolist() == [False, True]
-    np.testing.assert_allclose(tracks.positions[0], (0.0, 0.1))
-    # The way it was carried out of sight is no speed: it need not go on.
-    for x in (0.35, 0.2):
-        assert tracks.update(look_at([1], [(x, 0.1)])).tolist() == [0]
+
+def test_an_object_out_of_sight_keeps_its_place(tracks_of_a_cube_out_of_sight):
+    assert tracks_of_a_cube_out_of_sight.visible[:2].tolist() == [False, True]
+    np.testing.assert_allclose(tracks_of_a_cube_out_of_sight.positions[0], (0.0, 0.1))
+
+
+def test_an_object_that_is_seen_again_elsewhere_keeps_its_track_number(
+    tracks_of_a_cube_out_of_sight,
+):
+    """It was carried away and back: the way out of sight is no speed that goes on."""
+    far = tracks_of_a_cube_out_of_sight.update(look_at([1], [(0.35, 0.1)]))
+    nearer = tracks_of_a_cube_out_of_sight.update(look_at([1], [(0.2, 0.1)]))
+
+    assert far.tolist() == nearer.tolist() == [0]
 
 
 def test_objects_beyond_the_maximum_number_of_tracks_get_none():
     """Minus one stands for no track."""
-    spots = [(0.001 * n, 0.0) for n in range(MOST_TRACKS + 5)]
-    mine = Tracker().update(look_at([1] * len(spots), spots))
-    assert mine.tolist() == [*range(MOST_TRACKS), *[-1] * 5]
+    spots = [(0.001 * number, 0.0) for number in range(MOST_TRACKS + 2)]
+
+    numbers = Tracker().update(look_at([1] * len(spots), spots))
+
+    assert numbers.tolist() == [*range(MOST_TRACKS), -1, -1]
 
 
-@given(st.floats(-10.0, 10.0), st.floats(-math.pi, math.pi))
-def test_a_grasp_takes_the_side_that_needs_the_shortest_turn(now, angle):
-    """A cube can be gripped at four angles; the shortest turn is at most π/4."""
+@pytest.mark.parametrize(
+    ("tool_yaw", "cube_yaw", "grasp_yaw"),
+    [(0, 30, 30), (0, 80, -10), (200, 30, 210), (-10, 44, -46)],
+)
+def test_a_grasp_takes_the_side_that_needs_the_shortest_turn(tool_yaw, cube_yaw, grasp_yaw):
+    """In degrees: a cube can be gripped at four angles, so that 45 degrees are the longest turn."""
     move = Move(True, 0.0, 0.0, 0.02, "align", -1.0)
-    tool = np.array([0.3, 0.3, 0.15, math.pi, 0.0, now, 0.04])
-    turn = np.array([math.cos(4 * angle), math.sin(4 * angle)])
-    found = waypoint(move, tool, np.array([0.1, -0.1]), turn)
+    tool = np.array([0.3, 0.3, 0.15, math.pi, 0.0, math.radians(tool_yaw), 0.04])
+    yaw_code = np.array(
+        [math.cos(math.radians(4 * cube_yaw)), math.sin(math.radians(4 * cube_yaw))]
+    )
 
-    assert found[[0, 1, 2, 6]].tolist() == [0.1, -0.1, 0.02, -1.0]
-    assert abs(found[5] - now) <= math.pi / 4 + 1e-9
+    x, y, z, _, _, yaw, gripper = waypoint(move, tool, np.array([0.1, -0.1]), yaw_code)
 
-    quarters = (found[5] - angle) / (math.pi / 2)
-    assert abs(quarters - round(quarters)) < 1e-6
+    assert (x, y, z, gripper) == (0.1, -0.1, 0.02, -1.0)
+    assert math.degrees(yaw) == pytest.approx(grasp_yaw)
 
 
 def test_a_move_relative_to_the_tool_keeps_the_tool_s_yaw():
@@ -113,12 +119,16 @@ def test_a_move_relative_to_the_tool_keeps_the_tool_s_yaw():
     np.testing.assert_allclose(found, [0.2, 0.2, 0.2, math.pi, 0.0, 1.0, 0.0])
 
 
-def test_rare_moves_are_not_learned():
-    """A move whose share is below `LEAST_SHARE` is left out."""
-    usual, rare = (Move(True, 0.0, 0.0, z, "align", 0.0) for z in (0.1, 0.2))
-    # One rare move among so many is below the share `LEAST_SHARE`; among three it is not.
-    often = [LookDecision(0, usual, 0)] * round(3 / LEAST_SHARE)
-    once = [LookDecision(0, rare, 0)]
+@pytest.mark.parametrize(
+    ("count", "kept"), [(round(3 / LEAST_SHARE), ["usual"]), (3, ["usual", "rare"])]
+)
+def test_moves_with_a_share_below_the_least_are_not_learned(count, kept):
+    """One rare move among so many is below `LEAST_SHARE`; among three it is not."""
+    moves = {
+        "usual": Move(True, 0.0, 0.0, 0.1, "align", 0.0),
+        "rare": Move(True, 0.0, 0.0, 0.2, "align", 0.0),
+    }
+    often = [LookDecision(0, moves["usual"], 0)] * count
+    once = [LookDecision(0, moves["rare"], 0)]
 
-    assert common_moves([often, once]) == (usual,)
-    assert common_moves([often[:3], once]) == (usual, rare)
+    assert common_moves([often, once]) == tuple(moves[name] for name in kept)
