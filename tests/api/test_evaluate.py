@@ -1,7 +1,5 @@
 """`roboirg.evaluate` and its results; the episodes are not played but for one test."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np
@@ -24,7 +22,7 @@ class Still:
 
     def __init__(self, reach=1.0):
         self.reach = reach
-        self.instructions: list[str] = []
+        self.instructions = []
 
     def reset(self, instruction, demonstration):
         self.instructions.append(instruction)

@@ -1,7 +1,5 @@
 """Action logs: what is written is what is read, and nothing else is read."""
 
-from __future__ import annotations
-
 import io
 import os
 
@@ -24,7 +22,7 @@ finite = st.floats(-1e6, 1e6)
 
 
 @st.composite
-def any_action_logs(draw: st.DrawFn) -> ActionLog:
+def any_action_logs(draw):
     """Draw a log of up to seven answers of a policy, of 1 to 5 executed actions each.
 
     Nothing may be executed of the last answer. Some logs have numbers in single precision.
@@ -59,7 +57,7 @@ def test_an_action_log_is_read_back_as_it_was_written(log, tmp_path_factory):
     assert len(log.requests) == 0 or len(read.chunks()) == len(log.requests)
 
 
-def action_log_of(rows: int = 4) -> ActionLog:
+def action_log_of(rows=4):
     numbers = np.linspace(0.1, 1.7, rows * 8).reshape(rows, 8)
     return ActionLog("joint_angle", numbers, np.array([0], np.int32), np.zeros(3))
 
@@ -103,7 +101,7 @@ EMPTY_ZIP = b"PK\x05\x06" + bytes(18)
 def good_log_except(**changes):
     """Return the content of a good log, but for some arrays."""
     file = io.BytesIO()
-    np.savez_compressed(file, **ARRAYS_OF_A_GOOD_LOG | changes)  # type: ignore[arg-type]
+    np.savez_compressed(file, **ARRAYS_OF_A_GOOD_LOG | changes)
     return file.getvalue()
 
 

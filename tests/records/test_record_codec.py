@@ -1,7 +1,5 @@
 """Lines of a records file: damaged ones, results, keys, and very many of them."""
 
-from __future__ import annotations
-
 import msgspec
 import pytest
 from msgspec.structs import replace

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import errno
 import functools
 import math
@@ -25,7 +23,6 @@ from roboirg.core.versions import Versions
 from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.server_lock import lock_server
 from roboirg.records.line_file import LOCK_FILE
-from roboirg.records.record import Record
 from roboirg.records.record_codec import StoreError, encode, identity_key
 from roboirg.records.run_files import PLAN_FILE
 from roboirg.records.store import (
@@ -58,7 +55,7 @@ def test_a_run_is_refused_if_any_of_its_versions_differs_unless_it_is_unknown(fi
 
 
 @functools.cache
-def eight_records() -> tuple[Record, ...]:
+def eight_records():
     return tuple(fake_record(job) for job in small_plan().jobs())
 
 

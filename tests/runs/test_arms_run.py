@@ -1,7 +1,5 @@
 """Control arms in plans, records, resumed and merged runs, and verification."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -26,11 +24,7 @@ def plan_with_arms(arms=ALL_ARMS, **changes):
     return make_plan(["oracle"], arms=arms, **fields)
 
 
-def folder_of_fake_run(plan, folder):
-    folder.mkdir(exist_ok=True)
-    write_plan(plan, folder)
-    fake_run(folder, plan)
-    return folder
+
 
 
 def test_each_arm_of_an_episode_is_a_job_of_its_own():

@@ -1,8 +1,3 @@
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
 import pytest
 import yaml
 
@@ -20,7 +15,7 @@ NAMED_PLANS_TESTED_ELSEWHERE = ("challenge", "paper", "paper-context", "paper-sm
 """Named plans with a test of their own, or of the package that brings them."""
 
 
-def path_of_plan_file(folder: Path, text: str) -> str:
+def path_of_plan_file(folder, text):
     """Write ``plan.yaml`` into a folder and return its path."""
     path = folder / "plan.yaml"
     path.write_text(text)
@@ -126,7 +121,7 @@ def test_the_standard_protocol_plays_each_scene_in_explicit_too():
     ],
 )  # fmt: skip
 def test_a_value_in_a_plan_file_means_what_it_means_on_the_command_line(tmp_path, text, typed):
-    few: dict[str, Any] = {"policies": "random", "tasks": "PickXtimes"}
+    few = {"policies": "random", "tasks": "PickXtimes"}
 
     read = read_plan_file(path_of_plan_file(tmp_path, text))
 

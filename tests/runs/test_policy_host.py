@@ -1,7 +1,5 @@
 """Policies in a process of their own: same records, whoever shares the host, whatever dies."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random
@@ -28,7 +26,6 @@ from selection import slow_but
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies.by_name.finding import read_policy
-from roboirg.records.record import Job
 from roboirg.records.store import read_records
 from roboirg.runs.episode_errors import EpisodeError, EpisodeLostError
 from roboirg.runs.hosting import host_pool, policy_line
@@ -49,16 +46,15 @@ from roboirg.runs.hosting.messages import (
 from roboirg.runs.hosting.policy_child import PolicyChild
 from roboirg.runs.hosting.policy_line import PolicyLine
 from roboirg.runs.hosting.policy_opening import open_policy
-from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_sections import Hosting
 from roboirg.runs.run import ray_machines
-from roboirg.runs.run.executor import Executor, InProcess, LocalProcesses
+from roboirg.runs.run.executor import InProcess, LocalProcesses
 from roboirg.runs.run.ray_machines import MachineAgent, MachineVersions
 from roboirg.runs.run.runner import run_plan
 from roboirg.util.process_guard import descendants
 
-Write = Callable[[str, str], str]
-Host = Callable[[str, str], HostedPolicy]
+
+
 NUMBER_OF_KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "8"))
 THREE_POLICIES = tuple(f"hosting_fakes:{name}" for name in ("Dice", "BatchedDice", "Picky"))
 
@@ -94,7 +90,7 @@ def begun_policy(host_pool_of_test, write_policy):
     )
 
 
-def records_by_job(plan: Plan, folder: Path, executor: Executor) -> dict[Job, dict[str, Any]]:
+def records_by_job(plan, folder, executor):
     """Run a plan in worlds without a simulator, and return what its records have in common."""
     folder.mkdir(exist_ok=True)
     run_plan(plan, folder, fake_world_runner(plan, folder), executor)
@@ -104,7 +100,7 @@ def records_by_job(plan: Plan, folder: Path, executor: Executor) -> dict[Job, di
 # Arrays
 
 
-def relayed(call: Call) -> Call:
+def relayed(call):
     """Return a call as it arrives at the other end of a line."""
     ours, theirs = socket.socketpair()
     with ours, theirs:
@@ -237,7 +233,7 @@ class VideoThatNotesWhatIsDrawn(dict[str, Any]):
     def __init__(self):
         pictures = np.zeros((2, 4, 4, 3), np.uint8)
         super().__init__(joint_positions=np.zeros((2, 7)), front_rgb=pictures, wrist_rgb=pictures)
-        self.drawn: list[str] = []
+        self.drawn = []
 
     def __getitem__(self, field):
         self.drawn.append(field)
@@ -268,7 +264,7 @@ class It:
         policy = HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 0)
         policy.reset("Pick it.", video)
         drawn_by_reset.append(sorted(video.drawn))
-        policy.act({})  # type: ignore[typeddict-item]
+        policy.act({})
         policy.close()
 
     assert drawn_by_reset == [
@@ -452,7 +448,7 @@ def test_a_policy_that_cannot_be_loaded_is_reported_before_the_run(
 # Deaths
 
 
-def child_of(host_pool_of_test: HostPool) -> PolicyChild:
+def child_of(host_pool_of_test):
     (child,) = host_pool_of_test._children.values()
     return child
 
@@ -479,12 +475,12 @@ def test_a_crash_of_a_policys_process_is_an_error_only_for_the_episode_that_caus
     bad.reset("die", {})
 
     with pytest.raises(EpisodeError) as guilty:
-        bad.act({})  # type: ignore[typeddict-item]
+        bad.act({})
 
     assert guilty.value.kind == "policy"
     assert str(guilty.value) == "the process ended with exit code 7 in the policy's act()"
     with pytest.raises(EpisodeLostError):
-        good.act({})  # type: ignore[typeddict-item]
+        good.act({})
     with pytest.raises(EpisodeLostError):
         over.usage()  # what it has cost is lost
 
@@ -494,7 +490,7 @@ def test_after_a_crash_a_policy_gets_a_new_process(host_pool_of_test, write_poli
     bad = HostedPolicy(host_pool_of_test.connect(), ref, 0)
     bad.reset("die", {})
     with pytest.raises(EpisodeError):
-        bad.act({})  # type: ignore[typeddict-item]
+        bad.act({})
     # Each episode that asks gets the same answer.
     child = child_of(host_pool_of_test)
     expected = Loss("policy", "the process ended with exit code 7", b"last words\n")
@@ -504,7 +500,7 @@ def test_after_a_crash_a_policy_gets_a_new_process(host_pool_of_test, write_poli
     again = HostedPolicy(host_pool_of_test.connect(), ref, 0)
 
     again.reset("live", {})
-    assert again.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
+    assert again.act({}).shape == (1, 8)
     again.close()
 
 
@@ -525,7 +521,7 @@ class It(hostile_policies.Hostile):
     world.reset("Pick it.", {})
 
     with pytest.raises(EpisodeLostError, match="exit code 5") as lost:
-        world.act({})  # type: ignore[typeddict-item]
+        world.act({})
     assert lost.value.alone
 
 
@@ -594,7 +590,7 @@ class It:
     time.sleep(1)
 
     with pytest.raises(EpisodeLostError, match="began no call within 4 s"):
-        worlds[1].act({})  # type: ignore[typeddict-item]
+        worlds[1].act({})
 
     for world in worlds:
         world.close()
@@ -666,7 +662,7 @@ def test_the_time_that_the_world_takes_to_draw_is_not_that_of_the_policy(monkeyp
             for message in (Begun(), Question(("front_rgb",)), Outcome(message="done")):
                 send(process, message)
 
-            def draw(question: Question) -> Call:
+            def draw(question):
                 seconds[0] += 1000.0
                 return Call("answer", value=question.fields)
 
@@ -723,7 +719,7 @@ class It(hostile_policies.Hostile):
     world._line._limit_s = 0.5
     for name, seconds in (("DRAW_S", 1.0), ("MARGIN_S", 60.0)):
         monkeypatch.setattr(f"roboirg.runs.hosting.policy_child.{name}", seconds)
-    picture: Any = {"front_rgb": np.zeros((2000, 2000, 3), np.uint8)}
+    picture = {"front_rgb": np.zeros((2000, 2000, 3), np.uint8)}
 
     with pytest.raises(EpisodeError, match=r"did not begin the policy's act.., though"):
         world.act(picture)
@@ -766,7 +762,7 @@ class It(hostile_policies.Hostile):
         world.reset("again", {})
 
 
-def host_pids(supervisor: int) -> list[int]:
+def host_pids(supervisor):
     """Return the processes that a supervisor started for policies."""
     found = []
     for path in Path("/proc").glob("[0-9]*"):
@@ -834,7 +830,7 @@ class It:
     )
     monkeypatch.setattr("roboirg.runs.play.rollout.MAX_LOSSES", 2)
     plan = fake_world_plan(spec, 1)
-    runner: FakeWorldRunner = fake_world_runner(plan, tmp_path, seconds=2.0)
+    runner = fake_world_runner(plan, tmp_path, seconds=2.0)
 
     (record,) = InProcess().run(deque(plan.jobs()), runner)
 

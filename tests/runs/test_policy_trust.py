@@ -1,7 +1,5 @@
 """No policy reaches the goal, the next policy or the run; what it breaks is its own."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import re
@@ -12,7 +10,6 @@ import tempfile
 import time
 from collections import deque
 from pathlib import Path
-from typing import Any
 
 import hostile_policies
 import pytest
@@ -24,7 +21,6 @@ from roboirg.cli.options import add_working_directory
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.records.episode_log import logged_slugs
-from roboirg.records.record import Record
 from roboirg.records.record_codec import StoreError, encode, read_record
 from roboirg.records.store import read_records
 from roboirg.runs.episode_errors import EpisodeError, Terminated
@@ -40,9 +36,7 @@ from roboirg.util.process_guard import descendants
 HONEST_POLICY = "hosting_fakes:Dice"
 
 
-def records_of_each_policy(
-    folder: Path, names: tuple[str, ...], episodes: int = 2, **options: Any
-) -> dict[str, list[Record]]:
+def records_of_each_policy(folder, names, episodes=2, **options):
     """Play some episodes of each hostile policy, and of an honest one after it.
 
     The honest one that comes after ``Leaker`` is called ``Leaker+1``.
@@ -55,7 +49,7 @@ def records_of_each_policy(
     plan = changed(fake_world_plan("Dice", episodes), policies=specs, tries=1, **options)
     folder.mkdir()
     run_plan(plan, folder, fake_world_runner(plan, folder), LocalProcesses(1))
-    found: dict[str, list[Record]] = {}
+    found = {}
     for record in read_records(folder):
         found.setdefault(record.policy, []).append(record)
     return found
@@ -207,7 +201,7 @@ def test_processes_that_a_policy_starts_end_with_it_however_fast_they_multiply(
     with HostPool(HostSettings()) as pool:
         policy = HostedPolicy(pool.connect(), read_policy(hostile_policies.SPEC("Chain")), 0)
         policy.reset("Pick it.", {})
-        policy.act({})  # type: ignore[typeddict-item]
+        policy.act({})
 
     with (tmp_path / "lock").open() as lock:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -224,7 +218,7 @@ def test_a_policy_that_is_killed_for_memory_is_the_machines_error_and_leaves_no_
         policy = HostedPolicy(pool.connect(), read_policy(hostile_policies.SPEC("OutOfMemory")), 0)
         policy.reset("Pick it.", {})
         with pytest.raises(EpisodeError, match="died of signal 9") as killed:
-            policy.act({})  # type: ignore[typeddict-item]
+            policy.act({})
 
     assert killed.value.kind == "infrastructure"
     (note,) = tmp_path.iterdir()
@@ -312,7 +306,7 @@ def honest_policy_in_an_episode():
         world = FakeWorld(fake_world_plan("Dice", 1).jobs()[0])
         _, info = world.reset()
         policy.reset("Pick the needle in the haystack.", info["demonstration"])
-        policy.act(world.observation())  # type: ignore[arg-type]
+        policy.act(world.observation())
         yield policy
         policy.close()
 
@@ -342,7 +336,7 @@ def test_each_episode_begins_in_the_runs_folder_although_the_last_one_left_it(
         for _ in range(2):
             policy = HostedPolicy(pool.connect(), read_policy(hostile_policies.SPEC("Wanderer")), 0)
             policy.reset("Pick it.", {})
-            policy.act({})  # type: ignore[typeddict-item]
+            policy.act({})
 
             assert policy.metadata == {"before": str(tmp_path)}
             policy.close()

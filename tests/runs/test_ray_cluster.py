@@ -1,7 +1,5 @@
 """A real Ray cluster of several nodes on this machine."""
 
-from __future__ import annotations
-
 import socket
 import threading
 import time

@@ -1,16 +1,12 @@
 """One bad machine of a Ray cluster costs no record, and is named once."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 from unittest import mock
 
 import pytest
@@ -44,7 +40,7 @@ def cluster(monkeypatch):
     nodes.shutdown()
 
 
-def process_ids_of_actors(cluster: Any, name: str) -> list[int]:
+def process_ids_of_actors(cluster, name):
     """Return the processes of this cluster's actors, as other tests may have clusters, too."""
     raylets = [node.all_processes["raylet"][0].process.pid for node in cluster.list_all_nodes()]
     command = ["pgrep", "-P", ",".join(map(str, raylets)), "-f", f"ray::{name}"]
@@ -52,9 +48,7 @@ def process_ids_of_actors(cluster: Any, name: str) -> list[int]:
     return list(map(int, found.stdout.split()))
 
 
-def act_after_records(
-    folder: Path, count: int, act: Callable[[], object], run_ended: Callable[[], bool] | None = None
-) -> threading.Thread:
+def act_after_records(folder, count, act, run_ended=None):
     """Act in a thread as soon as that many records are stored; never, if the run ends before."""
 
     def run():
@@ -106,7 +100,7 @@ def test_a_worker_or_machine_that_freezes_is_ended_and_its_episode_played_elsewh
     monkeypatch.setattr(ray_pool, "BEAT_S", 1.0)
     monkeypatch.setattr(ray_pool, "SILENCE_S", 300.0)
     cluster.add_node(num_cpus=1)
-    frozen: list[int] = []
+    frozen = []
 
     def freeze():
         frozen.append(process_ids_of_actors(cluster, actor)[0])
@@ -143,7 +137,12 @@ def test_a_run_waits_for_a_free_machine_and_uses_one_that_joins_later(tmp_path, 
     monkeypatch.setattr(ray_pool, "WAIT_S", 2.0)
     run = threading.Thread(
         target=run_plan,
-        args=(PLAN_OF_16_EPISODES, tmp_path, FakePlayer(tmp_path), RayCluster(address=nodes.address)),
+        args=(
+            PLAN_OF_16_EPISODES,
+            tmp_path,
+            FakePlayer(tmp_path),
+            RayCluster(address=nodes.address),
+        ),
         kwargs={"reporter": reporter},
     )
     try:

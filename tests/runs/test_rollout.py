@@ -1,13 +1,10 @@
 """One episode with a fake world and a fake policy."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -31,8 +28,8 @@ from roboirg.runs.play import rollout
 from roboirg.runs.play.rollout import EpisodeRunner
 from roboirg.runs.play.video_writer import VideoWriter
 
-SetUp = Callable[..., None]
-Stage = Callable[..., Record]
+
+
 JOB = Job(
     policy="random",
     ref=read_policy("random"),
@@ -58,9 +55,9 @@ class FakeWorld:
         self.instruction = instruct_job(JOB)
         self.steps = 0
         self.executed_actions = 0
-        self.hook: Callable[[Any, bool], None] | None = None
+        self.hook = None
         self.closed = False
-        self.trouble: Exception | None = None
+        self.trouble = None
 
     @property
     def unwrapped(self):
@@ -117,7 +114,7 @@ class FakePolicy:
 
     def __init__(self, answer=None):
         self.answer = np.zeros((3, 8)) if answer is None else answer
-        self.heard: list[Any] = []
+        self.heard = []
 
     def reset(self, instruction, demonstration):
         self.heard += [instruction, len(demonstration["joint_positions"])]
@@ -138,7 +135,7 @@ class PolicyWithAttach(FakePolicy):
 def give_world_and_policy(monkeypatch):
     """Return what sets the world and the policy of the next episode."""
 
-    def give(world: FakeWorld, policy: Any) -> None:
+    def give(world, policy):
         monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: world)
         monkeypatch.setattr(rollout, "load_policy", lambda _job: policy)
 
@@ -147,7 +144,7 @@ def give_world_and_policy(monkeypatch):
 
 @pytest.fixture
 def record_of_episode(give_world_and_policy):
-    def play(world: FakeWorld, policy: Any, job: Job = JOB) -> Record:
+    def play(world, policy, job=JOB):
         give_world_and_policy(world, policy)
         return EpisodeRunner(Path()).play_once(job)[0]
 
@@ -481,7 +478,7 @@ class SpeakingWorld(FakeWorld):
 
     def step_chunk(self, actions):
         *others, info = super().step_chunk(actions)
-        return *others, {**info, "heard": self._fresh(self.steps)}  # type: ignore[return-value]
+        return *others, {**info, "heard": self._fresh(self.steps)}
 
     def _fresh(self, step):
         fresh = [{"text": text, "step": at} for text, at in self.told if at <= step]
@@ -548,7 +545,7 @@ def test_the_caption_of_a_video_grows_with_each_utterance(give_world_and_policy,
     Actions come in chunks of 3, and what is heard at step 3 stands in the frames after it.
     """
     world = SpeakingWorld((0, 3, 6, 6, 9), length=11)
-    captions: list[str] = []
+    captions = []
 
     class NotesCaptions(VideoWriter):
         def add_frame(self, source, is_demonstration=False):

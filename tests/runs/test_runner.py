@@ -1,14 +1,10 @@
 """Real processes, real signals."""
 
-from __future__ import annotations
-
 import dataclasses
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from pathlib import Path
 from unittest import mock
 
 import pytest
@@ -38,27 +34,26 @@ from roboirg.records.store import (
     TORN_FILE,
     read_records,
 )
-from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.stored_plans import read_plan, read_plans
 from roboirg.runs.play import episode_record
 from roboirg.runs.run.executor import InProcess, LocalProcesses, choose_executor
 from roboirg.runs.run.progress import Reporter
 from roboirg.runs.run.ray_machines import MachineVersions
-from roboirg.runs.run.runner import RunSummary, run_plan
+from roboirg.runs.run.runner import run_plan
 
-Comparable = list[dict[str, object]]
+
 WAIT_S = 300.0
 OTHER_WORDS = "PickXtimes/test@0a0a0a0a0a0a"
 
 
-def wait_until(condition: Callable[[], bool]) -> None:
+def wait_until(condition):
     deadline = time.monotonic() + WAIT_S
     while not condition():
         assert time.monotonic() < deadline, "it takes too long"
         time.sleep(0.02)
 
 
-def begun_run(folder: Path, workers: int = 1) -> subprocess.Popen[bytes]:
+def begun_run(folder, workers=1):
     """Start the run of `run_fakes`, 16 episodes, in a process; return when three have ended."""
     child = subprocess.Popen([sys.executable, run_fakes.__file__, folder, str(workers)])
     wait_until(lambda: line_count(folder) >= 3 or child.poll() is not None)
@@ -66,7 +61,7 @@ def begun_run(folder: Path, workers: int = 1) -> subprocess.Popen[bytes]:
     return child
 
 
-def finish_run(folder: Path) -> RunSummary:
+def finish_run(folder):
     """Play what is missing of the run of `run_fakes`."""
     return fake_run(folder, small_plan(8))
 
@@ -132,7 +127,7 @@ def test_an_episode_in_which_the_worker_dies_twice_is_one_error_and_the_rest_is_
     assert error.cause == "infrastructure: the process died of signal 9 (Killed) in the environment"
 
 
-def run_with_one_error(folder: Path) -> Plan:
+def run_with_one_error(folder):
     """Play four episodes, of which number 2 is an error after two attempts; return their plan."""
     plan = changed(small_plan(4), settings="direct")
 
@@ -321,7 +316,7 @@ def test_an_episode_that_lost_its_process_is_repeated_at_once_and_one_with_an_er
     tmp_path, error, place
 ):
     """The first episode fails: it is played again as the second one (1), or as the last (-1)."""
-    played: list[str] = []
+    played = []
 
     def fail_the_first(job):
         played.append(job.slug)

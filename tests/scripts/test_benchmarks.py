@@ -1,7 +1,5 @@
 """Our benchmarks: goals, the file of figures, and the page made from it."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import subprocess
@@ -27,16 +25,16 @@ from roboirg.main import app
 ROOT = Path(__file__).parents[2]
 
 
-def test_baselines_are_timed_once_a_round_and_rows_have_the_median_of_all_rounds() -> None:
+def test_baselines_are_timed_once_a_round_and_rows_have_the_median_of_all_rounds():
     """Greater ratios are better."""
-    asked: list[str] = []
+    asked = []
     paces = iter([8.0, 2.0, 9.0])
 
-    def rate(name: str, value: float) -> float:
+    def rate(name, value):
         asked.append(name)
         return value
 
-    def base() -> float:
+    def base():
         return rate("base", 4.0)
 
     rows = (
@@ -53,10 +51,10 @@ def test_baselines_are_timed_once_a_round_and_rows_have_the_median_of_all_rounds
     assert [reaches({**row, "goal": 0.2}) for row in found] == [True, True, False]
 
 
-def test_a_file_of_figures_is_kept_up_to_date(tmp_path: Path) -> None:
+def test_a_file_of_figures_is_kept_up_to_date(tmp_path):
     path = tmp_path / "bench.json"
 
-    def measured(**values: float) -> None:
+    def measured(**values):
         measures = [Measure(0.5, name, lambda value=value: value) for name, value in values.items()]
         update_figures(path, run_measures(measures, 1, lambda _text: None))
 
@@ -75,7 +73,7 @@ def test_a_file_of_figures_is_kept_up_to_date(tmp_path: Path) -> None:
         measured(first=1.0)
 
 
-def test_the_costs_of_a_command_that_fails_are_no_result(tmp_path: Path) -> None:
+def test_the_costs_of_a_command_that_fails_are_no_result(tmp_path):
     assert probe("command", "--version")["cpu_s"] > 0
     with pytest.raises(subprocess.CalledProcessError):
         probe("command", "tables", str(tmp_path / "missing"))
@@ -84,7 +82,7 @@ def test_the_costs_of_a_command_that_fails_are_no_result(tmp_path: Path) -> None
 
 
 @pytest.mark.sim
-def test_the_file_has_the_rows_that_are_measured_with_their_goals() -> None:
+def test_the_file_has_the_rows_that_are_measured_with_their_goals():
     figures = read_figures(ROOT / "docs" / "bench.json")
     measured = [(measure.name, measure.unit, measure.goal) for measure in all_measures()]
     assert sorted(measured) == sorted(
@@ -92,7 +90,7 @@ def test_the_file_has_the_rows_that_are_measured_with_their_goals() -> None:
     )
 
 
-def test_the_performance_page_shows_the_file_and_no_page_has_figures_of_its_own() -> None:
+def test_the_performance_page_shows_the_file_and_no_page_has_figures_of_its_own():
     script = runpy.run_path(str(ROOT / "scripts" / "write_bench_table.py"))
     assert script["PAGE"].read_text() == script["page_text"]()
     for page in ROOT.glob("docs/*.md"):

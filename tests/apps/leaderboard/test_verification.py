@@ -255,7 +255,7 @@ def test_a_merged_run_holds_by_the_plans_of_its_parts(honest, tmp_path):
 
 
 def test_a_sample_is_drawn_again_from_its_seed(honest):
-    told: list[tuple[int, int]] = []
+    told = []
     found = verify_run(honest, sample=0.5, seed=3, progress=lambda *now: told.append(now))
 
     assert told == [(1, 2), (2, 2)]
