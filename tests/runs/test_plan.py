@@ -74,7 +74,6 @@ ONE_EPISODE = {"tasks": "PickXtimes", "episodes": "1"}
     [
         ("hard", (3, 7, 11, 15)),
         ("hard, medium", (2, 3, 6, 7)),
-        ("hard,0,3", (3, 7, 11, 15)),
     ],
 )
 def test_a_difficulty_selects_the_episodes_that_have_it(text, first_episodes):
@@ -339,16 +338,6 @@ def test_plain_words_come_last_in_each_scene():
     ]
 
 
-def test_no_two_jobs_of_a_plan_have_the_same_name():
-    """Files of an episode are called by the slug of its job."""
-    jobs = make_plan(
-        ["random", "oracle"], tasks="VideoUnmask,BinFill", episodes="3,0", policy_seeds="2,0",
-        forms="resolved,implicit",
-    ).jobs()  # fmt: skip
-
-    assert len({job.slug for job in jobs}) == len(jobs)
-
-
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
@@ -356,7 +345,6 @@ def test_no_two_jobs_of_a_plan_have_the_same_name():
         ({"split": "tests"}, r"no split 'tests'.*Did you mean 'test'\?"),
         ({"episodes": "0,50,3"}, r"no episode 50: split 'test' has episodes 0 to 49"),
         ({"video": "on"}, r"video is 'on'; it must be 'off', 'failures' or 'all'"),
-        ({"retry_on": "none,policy"}, r"no kind of error 'none'"),
         ({"stages": "2,5"}, r"stages \(2, 5\)"),
         ({"frame": "world"}, r"no frame 'world'"),
         ({"settings": "explicit", "delivery": "turn"}, r"no delivery 'turn'.*'turns'"),
@@ -371,7 +359,6 @@ def test_no_two_jobs_of_a_plan_have_the_same_name():
         ({"episodes": []}, r"No episode was given"),
         ({"episodes": [True]}, r"'True' is not a valid episode"),
         ({"episodes": 2.0}, r"'2.0' is not a valid episode"),
-        ({"devices": ""}, r"No device was given"),
         ({"max_steps": "many"}, r"max_steps is 'many'"),
         ({"max_cost": "1_0.5"}, r"max_cost is '1_0.5'; write the number without underscores"),
         ({"max_steps": 9, "environment": {"max_steps": 8}},

@@ -10,7 +10,6 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
@@ -52,8 +51,6 @@ from roboirg.runs.run.executor import InProcess, LocalProcesses
 from roboirg.runs.run.ray_machines import MachineAgent, MachineVersions
 from roboirg.runs.run.runner import run_plan
 from roboirg.util.process_guard import descendants
-
-
 
 NUMBER_OF_KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "8"))
 THREE_POLICIES = tuple(f"hosting_fakes:{name}" for name in ("Dice", "BatchedDice", "Picky"))
@@ -307,12 +304,17 @@ def test_records_are_the_same_whatever_the_number_of_workers_or_the_size_of_batc
         assert max(sizes) > 1
 
 
-def test_all_worlds_of_a_run_share_one_object_of_a_batched_policy(tmp_path):
-    """It counts how many of it were made."""
-    plan = fake_world_plan("BatchedDice", 4)
-    records_by_job(plan, tmp_path, LocalProcesses(2))
+def test_all_worlds_share_one_object_of_a_batched_policy(host_pool_of_test):
+    """It tells in its metadata how many of it were made."""
+    ref = read_policy("hosting_fakes:BatchedDice")
+    worlds = [HostedPolicy(host_pool_of_test.connect(), ref, seed) for seed in range(3)]
 
-    assert {record.policy_metadata["made"] for record in read_records(tmp_path)} == {1}
+    for world in worlds:
+        world.reset("Pick it.", {})
+
+    assert [world.metadata for world in worlds] == [{"made": 1}] * 3
+    for world in worlds:
+        world.close()
 
 
 def test_a_privileged_policy_runs_in_the_worlds_process_and_reads_its_secret(

@@ -92,10 +92,8 @@ def test_another_policy_of_the_same_name_is_refused_or_kept_apart(
         ("mine:Policy", "mine:Other", "policy"),
         ("mine:Policy", "privileged:mine:Policy", "policy"),
         (OPENPI, MME, "policy"),
-        ("planner:listener", "planner:forgetful", "policy"),
         ("lerobot://lab/one", "lerobot://lab/two", "policy"),
         (f"{OPENPI}?execute=8", f"{OPENPI}?execute=2", "option execute"),
-        ("system:pi0.5", "system:pi0.5?policy.execute=4", "option execute"),
         (
             "planner:listener?hands=mine:Hands",
             "planner:listener?hands=mine:Hands&subgoals=simple",

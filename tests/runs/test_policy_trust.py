@@ -34,6 +34,9 @@ from roboirg.tasks.splits.private_splits import SALT_VARIABLE
 from roboirg.util.process_guard import descendants
 
 HONEST_POLICY = "hosting_fakes:Dice"
+on_linux = pytest.mark.skipif(
+    sys.platform != "linux", reason="subreapers and /proc are those of Linux"
+)
 
 
 def records_of_each_policy(folder, names, episodes=2, **options):
@@ -172,7 +175,7 @@ def test_forged_replies_are_errors_of_their_episode(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="there are subreapers on Linux")
+@on_linux
 @pytest.mark.parametrize("name", ["Asker", "Forker", "GuardStopper", "Umlauts"])
 def test_a_policy_that_leaves_processes_or_asks_much_fails_as_any_and_its_processes_end(
     tmp_path, monkeypatch, name
@@ -191,7 +194,7 @@ def test_a_policy_that_leaves_processes_or_asks_much_fails_as_any_and_its_proces
         time.sleep(0.1)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="there are subreapers on Linux")
+@on_linux
 def test_processes_that_a_policy_starts_end_with_it_however_fast_they_multiply(
     tmp_path, monkeypatch
 ):
@@ -207,7 +210,7 @@ def test_processes_that_a_policy_starts_end_with_it_however_fast_they_multiply(
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="there are subreapers on Linux")
+@on_linux
 def test_a_policy_that_is_killed_for_memory_is_the_machines_error_and_leaves_no_process(
     tmp_path, monkeypatch
 ):
@@ -311,7 +314,7 @@ def honest_policy_in_an_episode():
         policy.close()
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@on_linux
 @pytest.mark.usefixtures("honest_policy_in_an_episode")
 def test_no_socket_of_the_run_accepts_connections():
     """In /proc/net/unix flags that are not 0 mean that a socket listens."""
@@ -337,6 +340,7 @@ def test_each_episode_begins_in_the_runs_folder_although_the_last_one_left_it(
             policy = HostedPolicy(pool.connect(), read_policy(hostile_policies.SPEC("Wanderer")), 0)
             policy.reset("Pick it.", {})
             policy.act({})
+            policy.hear("The red one.", 1)  # metadata come with its reply
 
             assert policy.metadata == {"before": str(tmp_path)}
             policy.close()
@@ -409,7 +413,7 @@ def memory_of(pid, needle):
     return False
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@on_linux
 @pytest.mark.usefixtures("honest_policy_in_an_episode")
 def test_the_memory_of_a_policys_process_holds_its_instruction_but_not_the_goal():
     """The search is tried on this process, which does know the goal."""

@@ -92,44 +92,38 @@ def test_a_run_ends_if_no_machine_of_the_cluster_can_render(cluster, tmp_path):
         run_plan(PLAN_OF_TWO_ARMS, tmp_path, FakePlayer(tmp_path, fatal=0), RayCluster(1))
 
 
+def without_usage(folder):
+    """Return the comparable fields of a run's records, but for their usage."""
+    return [record | {"usage": None} for record in all_comparable(folder)]
+
+
 def test_all_workers_of_a_machine_ask_one_process_for_their_policy(cluster, tmp_path, monkeypatch):
-    """Three workers on two machines, two processes with the policy, which all end with the run."""
+    """Three workers on two machines, two processes with the policy, which all end with the run.
+
+    The policy tells its process as its usage; all else in its records is as on one machine.
+    """
     monkeypatch.syspath_prepend(Path(hosting_fakes.__file__).parent)
     plan = fake_world_plan("Resident", 12)
+    local = tmp_path / "local"
+    far = tmp_path / "far"
+    local.mkdir()
+    far.mkdir()
     cluster.add_node(num_cpus=2)
     ray.init(address=cluster.address, log_to_driver=False)
-    runner = PatientRunner(tmp_path, hosting=plan.hosting.settings, notes=tmp_path, wanted=3)
 
-    run_plan(plan, tmp_path, runner, RayCluster())
+    run_plan(plan, local, fake_world_runner(plan, local), InProcess())
+    runner = PatientRunner(far, hosting=plan.hosting.settings, notes=far, wanted=3)
+    run_plan(plan, far, runner, RayCluster())
 
-    hosts = {int(record.usage["process"]) for record in read_records(tmp_path)}
-    assert len(worker_pids(tmp_path)) == 3
+    assert without_usage(far) == without_usage(local)
+    hosts = {int(record.usage["process"]) for record in read_records(far)}
+    assert len(worker_pids(far)) == 3
     assert len(hosts) == 2
     for _ in range(600):
         if not any(map(is_alive, hosts)):
             return
         time.sleep(0.1)
     pytest.fail("a policy's process is left")
-
-
-def test_a_policy_gives_the_same_records_on_a_cluster_as_on_one_machine(
-    cluster, tmp_path, monkeypatch
-):
-    """But for the usage, in which this policy tells its process."""
-    monkeypatch.syspath_prepend(Path(hosting_fakes.__file__).parent)
-    plan = fake_world_plan("Resident", 4)
-    local = tmp_path / "local"
-    far = tmp_path / "far"
-    local.mkdir()
-    far.mkdir()
-    ray.init(address=cluster.address, log_to_driver=False)
-
-    run_plan(plan, local, fake_world_runner(plan, local), InProcess())
-    run_plan(plan, far, fake_world_runner(plan, far), RayCluster())
-
-    assert [record | {"usage": None} for record in all_comparable(far)] == [
-        record | {"usage": None} for record in all_comparable(local)
-    ]
 
 
 def test_a_cluster_that_cannot_be_joined_is_reported_in_one_sentence(tmp_path):

@@ -2,7 +2,6 @@
 
 import itertools
 import re
-from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -21,14 +20,12 @@ from roboirg.core.errors import (
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.contract.base import SubgoalEnd
-from roboirg.records.record import EventRecord, Job, Record
+from roboirg.records.record import EventRecord, Job
 from roboirg.records.record_codec import encode, read_record
 from roboirg.runs.job_instruction import instruct_job
 from roboirg.runs.play import rollout
 from roboirg.runs.play.rollout import EpisodeRunner
 from roboirg.runs.play.video_writer import VideoWriter
-
-
 
 JOB = Job(
     policy="random",
@@ -231,7 +228,6 @@ def test_the_outcome_and_its_cause_are_those_of_the_world(
         (KeyError("<It at 0x7f3a12345678>\n \ud800"), "policy: KeyError: '<It at 0x…>"),
         (MotionPlanningError("no path to the cube"), "policy: no path to the cube"),
         (SystemExit(3), "policy: SystemExit: 3"),
-        (np.zeros((2, 7)), "invalid action: .*shape"),
         (np.zeros((0, 8)), "invalid action: .*shape"),
         (np.full((2, 8), np.nan), "invalid action: .*nan"),
         ("left", "invalid action: .*numbers"),
@@ -254,13 +250,11 @@ def test_a_policy_that_raises_or_answers_nonsense_ends_its_episode_as_an_error_n
 @pytest.mark.parametrize(
     ("value", "stored"),
     [
-        (np.float32(0.5), 0.5),
         (np.str_("adam"), "adam"),
         (Path("a/b"), "a/b"),
         (np.eye(2), [[1.0, 0.0], [0.0, 1.0]]),
         ((np.bool_(True), {Path("x"): None}), [True, {"x": None}]),
         (np.zeros((9, 9)), "array of shape (9, 9), float64"),
-        (np.zeros((1000, 0)), "array of shape (1000, 0), float64"),
     ],
     ids=str,
 )

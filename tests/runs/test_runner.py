@@ -41,7 +41,6 @@ from roboirg.runs.run.progress import Reporter
 from roboirg.runs.run.ray_machines import MachineVersions
 from roboirg.runs.run.runner import run_plan
 
-
 WAIT_S = 300.0
 OTHER_WORDS = "PickXtimes/test@0a0a0a0a0a0a"
 
