@@ -44,7 +44,8 @@ def build_splits(
     for slot, rejections in found:
         for seed, reason, cause in rejections:
             typer.echo(f"{slot.key}: seed {seed} is rejected, {reason}: {cause}", err=True)
-    text = splits.splits_text(seed_selection.merge_splits(names, found, splits.shipped_splits()))
+    built = seed_selection.merge_splits(names, found, splits.shipped_splits())
+    text = seed_selection.splits_text(built)
     if out is None:
         typer.echo(text, nl=False)
     else:

@@ -28,7 +28,7 @@ from roboirg.core.episode import SPLITS, Color, Goal, Scene, SceneObject
 from roboirg.core.motions import Motion, Point, Shuttle
 from roboirg.tasks import bin_fill, stop_cube, swing_x_times, video_repick
 from roboirg.tasks.shared import unmask, unmask_swap, video_place
-from roboirg.tasks.splits.recordings import FOLDER, INCOMPLETE
+from roboirg.tasks.splits.recordings import FOLDER
 from roboirg.tasks.splits.scene_codec import encode
 
 Row = Mapping[str, Any]
@@ -40,6 +40,16 @@ COLOR_OF_RGB: dict[tuple[float, ...], Color] = {
     (0.0, 1.0, 0.0): "green",
     (0.0, 0.0, 1.0): "blue",
 }
+INCOMPLETE = frozenset(
+    {
+        ("VideoPlaceOrder", "test", 7),
+        ("VideoPlaceOrder", "train", 94),
+        ("VideoRepick", "train", 47),
+        ("VideoRepick", "val", 35),
+    }
+)
+"""Episodes whose recorded actions leave a stage of the video undone here, and in two of them there:
+contacts between crowded cubes go another way. The scripted expert plans their videos."""
 
 
 def main(folder: Path, out: Annotated[Path, typer.Option()]) -> None:
@@ -203,11 +213,9 @@ def convert_swing_x_times(row: Row) -> tuple[Scene, Goal]:
     """Button, cubes, and a target on either side with the disc that lights up over it."""
     facts = row["facts"]
     targets = []
-    for side in swing_x_times.SIDES:
-        source = body_name(facts[f"target_{side}"])
-        name = f"target_{side}"
-        radius = swing_x_times.TARGET_RADIUS
-        targets.append(make_target(row, source, name, radius, rgb=swing_x_times.TARGET_RGB))
+    for plan in swing_x_times.TARGETS:
+        source = body_name(facts[plan.name])
+        targets.append(make_target(row, source, plan.name, plan.radius, rgb=plan.rgb))
     color = facts["target_color_name"]
     scene = swing_x_times.make_scene(make_button(row), colored_cubes(row), targets, f"cube_{color}")
     return scene, Goal.of(color=color, repeats=facts["num_repeats"])

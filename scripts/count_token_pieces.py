@@ -16,14 +16,16 @@ from pathlib import Path
 
 from sentencepiece import SentencePieceProcessor
 
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS
-from roboirg.language.generator import instruct_with
+from roboirg.language.instruction import FORMS as ALL_FORMS
 from roboirg.language.number_words import CARDINALS, ORDINALS, plural
 from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text
 from roboirg.language.scenarios.scenario import PERSON, Scenario
 from roboirg.language.scenarios.scenario_file import general, task_scenarios
+from roboirg.language.settings import all_settings
 from roboirg.language.token_counts import split_words
-from roboirg.language.variants import expressible_options
+from roboirg.language.variants import instructions
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import write_atomically
@@ -48,8 +50,11 @@ def texts() -> Iterator[str]:
         for index in range(EPISODES):
             episode = get_episode(task, "random", index)
             pool = POOLS[index % len(POOLS)]
-            for options in expressible_options(episode, pool):
-                yield instruct_with(episode, options).text
+            for setting in all_settings().values():
+                for changes in setting.variants:
+                    options = InstructionOptions(wordings=pool, **changes)
+                    for _, said in instructions([episode], [setting.name], ALL_FORMS, options):
+                        yield said.text
 
 
 def scenario_words() -> frozenset[str]:

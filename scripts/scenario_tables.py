@@ -203,7 +203,7 @@ def _missing() -> Iterator[str]:
         for frame in frames:
             scenes = list(split_episodes([task], TEST))
             reports = check_scenarios(written_words()[task], frame, scenes)
-            fits = sum(report.scenes for report in reports)
+            fits = sum(len(report.fitting) for report in reports)
             reason = f"fits {fits} of {len(scenes)} scenes, where others were drawn"
             if not fits:
                 reason = f"fits none of {len(scenes)} scenes"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
@@ -20,12 +21,13 @@ from roboirg.language.generator import request_of
 from roboirg.language.settings import ACCEPTANCE_SETTINGS, all_settings, settings_of
 from roboirg.policies import make_policy, play
 from roboirg.tasks import every_task, get_task
+from roboirg.tasks.splits.fingerprint import fingerprint
 from roboirg.tasks.splits.published_episodes import published_episode
 from roboirg.tasks.splits.splits import (
     MAX_REJECTED,
     SIZES,
     TaskSplits,
-    fingerprint_of,
+    fixed_episode,
     make_episode,
     slot_difficulty,
     slot_key,
@@ -218,8 +220,25 @@ def merge_splits(
             count = rejected.get(slot, old.get(key, 0))
             if count:
                 passed_over[key] = count
-        splits[task] = TaskSplits(fingerprint_of(task, passed_over), passed_over)
+        sha256 = fingerprint(_fixed_episodes(task, passed_over))
+        splits[task] = TaskSplits(sha256, passed_over)
     return {task: splits[task] for task in every_task() if task in splits}
+
+
+def _fixed_episodes(task: str, passed_over: Mapping[str, int]) -> Iterator[Episode]:
+    """Yield the episodes of train, val and test, in this order, as `fixed_episode` returns them."""
+    for split in SPLITS:
+        for index in range(SIZES[split]):
+            yield fixed_episode(get_task(task), split, index, passed_over)
+
+
+def splits_text(splits: Mapping[str, TaskSplits]) -> str:
+    """Return the text of ``splits.json``, which `shipped_splits` reads: a line for each task."""
+    lines: list[str] = []
+    for task, entry in splits.items():
+        numbers = json.dumps(entry._asdict())
+        lines.append(f"{json.dumps(task)}: {numbers}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
 def _episode(slot: EpisodeSlot, seed: int) -> Episode:

@@ -16,12 +16,10 @@ from roboirg.tasks.splits.recordings import is_recorded
 from roboirg.tasks.splits.splits import (
     MAX_REJECTED,
     SEED_STRIDE,
-    TaskSplits,
     get_episode,
     shipped_splits,
     slot_seed,
     split_episodes,
-    splits_text,
 )
 
 TASKS = tuple(every_task())
@@ -170,14 +168,6 @@ def test_what_a_fingerprint_is_made_of_is_the_same_after_json():
 def test_only_plain_data_has_a_fingerprint(wrong):
     with pytest.raises(TypeError, match="is not plain data"):
         plain((wrong,))
-
-
-def test_the_file_of_splits_is_read_back_and_has_a_line_for_each_task():
-    splits = {"A": TaskSplits("0f", {"train/3": 2}), "B": TaskSplits("ff", {})}
-    text = splits_text(splits)
-
-    assert len(text.splitlines()) == 4
-    assert {task: TaskSplits(**entry) for task, entry in json.loads(text).items()} == splits
 
 
 @pytest.mark.parametrize(

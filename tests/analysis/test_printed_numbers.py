@@ -178,8 +178,8 @@ def test_the_rate_over_tasks_is_the_same_in_the_terminal_on_the_page_and_in_pyth
 
 
 def intervals_of(measured: Measured) -> Iterator[Interval | None]:
-    """Yield the intervals of a rate, of that beside it, and of the gaps between them."""
-    yield from (measured.interval, measured.other_interval)
+    """Yield the intervals of a rate, and of the gaps to those beside it."""
+    yield measured.interval
     for gap in (measured.gap, measured.second_gap):
         if gap is not None:
             yield from (gap.interval, gap.retention_interval)

@@ -7,9 +7,9 @@ from roboirg.core.episode import SPLITS, Episode, Point
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct_with
 from roboirg.language.generator import find_refusal
-from roboirg.language.instruction import Instruction
-from roboirg.language.settings import plain_settings, settings_of
-from roboirg.tasks import every_task
+from roboirg.language.instruction import FORMS, Instruction
+from roboirg.language.settings import all_settings, plain_settings, settings_of
+from roboirg.tasks import every_task, get_task
 from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.splits import get_episode
 
@@ -56,3 +56,23 @@ def without_landmark(episode: Episode) -> Episode:
         for index, item in enumerate(episode.scene.objects)
     )
     return replace(episode, scene=replace(episode.scene, objects=objects))
+
+
+def expressible_options(
+    episode: Episode, wordings: str | None = None
+) -> Iterator[InstructionOptions]:
+    """Yield all options with which an episode can be instructed: every setting, form and variant.
+
+    A setting that cannot express the episode with some options is left out with these.
+
+    Args:
+        episode: to instruct.
+        wordings: a pool of words, or the identity of an open wording file; None for the usual
+            words.
+    """
+    for name in settings_of(get_task(episode.task)):
+        usual = InstructionOptions(name, wordings=wordings)
+        variants = [replace(usual, **changes) for changes in all_settings()[name].variants]
+        possible = [options for options in variants if find_refusal(episode, options) is None]
+        for form in FORMS:
+            yield from (replace(options, form=form) for options in possible)

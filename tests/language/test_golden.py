@@ -3,10 +3,9 @@
 import hashlib
 
 import pytest
-from language_variants import TASKS, first_episodes
+from language_variants import TASKS, expressible_options, first_episodes
 
 from roboirg.language import LANGUAGE_VERSION, instruct_with
-from roboirg.language.variants import expressible_options
 
 VERSION_OF_DIGESTS = "4.7.0"
 DIGESTS: dict[str, str] = {

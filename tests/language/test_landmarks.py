@@ -52,7 +52,7 @@ def name_called(scene, phrase, kind="container", frame="robot"):
     """Return the name of the object of a kind that a phrase singles out; None if there is none."""
     for selector in selectors(scene, kind, frame):
         thing = selector.select()
-        if selector.landmark.phrase == phrase and thing is not None:
+        if selector.phrase == phrase and thing is not None:
             return thing.name
     return None
 
@@ -216,7 +216,7 @@ def test_a_place_has_these_words_and_no_others(kind, count, snapshot):
     for selector in selectors(scene, kind, "robot"):
         thing = selector.select()
         if thing is not None:
-            found.append(f"{selector.landmark.phrase}: {thing.name}")
+            found.append(f"{selector.phrase}: {thing.name}")
 
     assert found == snapshot
 
@@ -246,9 +246,7 @@ def test_a_corner_phrase_is_dropped_if_work_area_and_table_corner_disagree():
     """
     words = "closest to your near left corner"
     scene = containers((-0.11, 0.06), (0.0, 0.17), (-0.11, -0.2), (0.0, -0.2), (0.1, 0.17))
-    by_phrase = {
-        selector.landmark.phrase: selector for selector in selectors(scene, "container", "robot")
-    }
+    by_phrase = {selector.phrase: selector for selector in selectors(scene, "container", "robot")}
     corner = by_phrase[words]
     nearest = [ranking.select(corner.candidates, 0).name for ranking in corner.rankings]
 

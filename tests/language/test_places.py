@@ -135,7 +135,7 @@ def test_each_phrase_selects_the_object_it_was_made_for(task):
         for words, name in names_by_phrase(scene, kind, frame).items():
             assert heard[words].name == name, words
         for selector in selectors(scene, kind, frame):
-            assert heard[selector.landmark.phrase] is selector.select()
+            assert heard[selector.phrase] is selector.select()
 
 
 @each_task

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from language_variants import first_episodes, said_where_possible
+from language_variants import expressible_options, first_episodes, said_where_possible
 from wording_stand_ins import BIRTHDAY, WOBBLY, report_on, take_words
 
 from roboirg.apps.language_lab.scenarios.leaks import find_leaks
@@ -45,7 +45,7 @@ from roboirg.language.scenarios.scenario_file import (
 from roboirg.language.scenarios.spoken import say_chosen
 from roboirg.language.scenarios.wording_file import parse_wordings
 from roboirg.language.settings import all_settings, settings_of
-from roboirg.language.variants import expressible_options, instructions
+from roboirg.language.variants import instructions
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode, split_episodes
 
@@ -891,7 +891,7 @@ say.placement = ["<that reference: that one>"]
 """
     report = report_on(text, "VideoPlaceOrder", every=4)
 
-    assert report.scenes
+    assert report.fitting
     assert not report.broken
     assert all(f"go {way} one. " in text for text in report.renderings)
 
@@ -1000,7 +1000,7 @@ say.colors.1 = ["the one over <latter colors.1: {person.2}'s>"]
 
     (report,) = check_scenarios(words, None, scenes_of("ButtonUnmask", 40))
 
-    assert report.scenes
+    assert report.fitting
     assert not report.broken
 
 
@@ -1078,7 +1078,7 @@ introduction = "The target the robot used right {taken} pressing the button is g
 say.relation = ["on <other taken: the other one it used>"]
 """
     report = report_on(text, "VideoPlaceButton", every=10)
-    assert report.scenes
+    assert report.fitting
     assert not report.broken
 
 
@@ -1111,7 +1111,7 @@ def test_two_pointers_of_one_scenario_of_ours_are_understood(task, frame):
     The checker finds scenes that the scenario fits, and in all of them its words mean the goal.
     """
     report = report_on_ours(task, frame, scenes_of(task, 0)[::10])
-    assert report.scenes
+    assert report.fitting
     assert not report.broken
 
 
@@ -1122,7 +1122,7 @@ def test_a_target_that_has_moved_may_still_be_called_there():
 
     report = report_on_ours("VideoPlaceButton", "target to test", moved)
 
-    assert report.scenes
+    assert report.fitting
     assert not report.broken
 
 

@@ -7,12 +7,13 @@ from importlib.resources import files
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from language_variants import expressible_options
 from sentencepiece import SentencePieceProcessor
 
 from roboirg.core.word_pools import POOLS
 from roboirg.language import FORMS, instruct, instruct_with, plain_settings
 from roboirg.language.token_counts import ADDED_TOKENS, count_tokens
-from roboirg.language.variants import expressible_options, instructions
+from roboirg.language.variants import instructions
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode, split_episodes
 

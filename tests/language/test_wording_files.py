@@ -511,8 +511,6 @@ def test_wordings_that_were_never_opened_are_refused():
         ('name = "a"', "has no tasks; add a line such as tasks = "),
         ('name = "a"\ntasks = "PickXtimes"', "tasks: Expected a list, got a text; it is 'Pick"),
         ('name = "a"\ntasks = ["PickXTimes"]', "Did you mean 'PickXtimes'?"),
-        ('name = "a"\n[PickXtimes]\nown = ["direct"]\n[[PickXtimes.commands]]\ntext = "lift"',
-         "has the table [PickXtimes] of an earlier format; write its comma"),
         ('name = "a"\ntasks = ["VideoRepick"]\n[[literal]]\ntask = "VideoRepick"\n\
 when.color = "red"\ntext = "x"',
          "literal 1 has when = {'color': 'red'}; it must have a value for repeats."),

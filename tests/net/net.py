@@ -15,6 +15,7 @@ import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+sys.path.append(str(Path(__file__).parents[1] / "language"))
 import net_printed
 import net_runs
 import net_words

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from language_variants import expressible_options
+
 import roboirg
 from roboirg.core.arms import ARMS, PARAPHRASE, TOLD
 from roboirg.core.episode import Episode
@@ -16,7 +18,6 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.word_pools import POOLS
 from roboirg.language import instruct_with
 from roboirg.language.arms import ArmWords, say_arm
-from roboirg.language.variants import expressible_options
 from roboirg.reader import interpret
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import SIZES, get_episode

@@ -1,5 +1,6 @@
 """Kinds of policies that other packages add: the recipe of docs/add-protocol.md, as it stands."""
 
+import subprocess
 import sys
 
 import pytest
@@ -40,3 +41,12 @@ def test_a_broken_kind_of_policy_is_reported_only_when_it_is_named():
     make_policy("lab:walk", 0)
     with pytest.raises(InvalidValueError, match=r"'gone' .* of add-protocol .* cannot be loaded"):
         make_policy("gone:anything", 0)
+
+
+def test_finding_policies_does_not_load_the_reader_of_commands():
+    """Only listeners and rewriters need its patterns, whose compiling delays every command."""
+    code = "import sys, roboirg.policies; print('roboirg.reader' in sys.modules)"
+
+    printed = subprocess.check_output([sys.executable, "-c", code], text=True)
+
+    assert printed.strip() == "False"

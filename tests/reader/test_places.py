@@ -88,6 +88,6 @@ def test_the_interpreter_finds_the_object_of_each_of_our_phrases_for_a_place(tas
     scene = get_episode(task, "test", index).scene
     for selector in [*selectors(scene, kind, "robot"), *selectors(scene, kind, "camera")]:
         thing = selector.select()
-        phrase = selector.landmark.phrase
+        phrase = selector.phrase
         if thing is not None:
             assert thing.name in names_meant(scene, noun, phrase), phrase

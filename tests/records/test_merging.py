@@ -28,7 +28,7 @@ def test_merging_two_parts_of_a_run_gives_the_whole_without_duplicates(tmp_path)
 
     merged = merge_runs([first, last], tmp_path / "out")
 
-    assert (merged.added, merged.duplicates, merged.conflicts) == (8, 2, ())
+    assert (merged.added, merged.duplicates, merged.conflicts) == (8, 2, [])
     assert read_records(tmp_path / "out") == records
 
 
@@ -63,7 +63,7 @@ def test_merging_keeps_a_verdict_rather_than_an_error(tmp_path):
     merged = merge_runs(sources, tmp_path / "out")
 
     assert read_records(tmp_path / "out") == (won,)
-    assert (merged.added, merged.duplicates, merged.conflicts) == (1, 2, ())
+    assert (merged.added, merged.duplicates, merged.conflicts) == (1, 2, [])
 
 
 def test_merging_keeps_the_first_of_two_errors(tmp_path):
@@ -97,7 +97,7 @@ def test_merging_warns_of_verdicts_by_other_code(tmp_path):
         [fill(tmp_path / "a", first), fill(tmp_path / "b", by_other_code)], tmp_path / "out"
     )
 
-    (warning,) = merged.warnings
+    (warning,) = merged.warnings()
     assert warning.startswith(
         f"Mixed states of the code that decides verdicts: {first.verdict_code}, old."
     )
@@ -115,7 +115,7 @@ def test_merging_does_not_warn_of_other_code_in_episodes_without_instruction(tmp
     )
 
     assert read_records(tmp_path / "out") == (first, silent)
-    assert merged.warnings == ()
+    assert not merged.warnings()
 
 
 def test_videos_actions_and_logs_are_copied_with_the_records_that_are_kept(tmp_path):

@@ -224,6 +224,19 @@ def test_a_policy_whose_version_cannot_be_read_cannot_go_on_in_its_run(
         run_plan(plan, tmp_path, fake_world_runner(plan, tmp_path), InProcess())
 
 
+def test_a_run_whose_policy_could_not_be_opened_goes_on_once_it_can(write_policy_module, tmp_path):
+    """Its errors are of an unknown version, which is not another one."""
+    write_policy_module(reset="raise OSError('no weights')")
+    play_one_episode(tmp_path)
+    write_policy_module()
+
+    play_one_episode(tmp_path)
+
+    (record,) = read_records(tmp_path)
+    assert record.outcome != "error"
+    assert record.policy_version != "unknown"
+
+
 @pytest.mark.parametrize("checkpoint", ["7", "8"])
 def test_the_version_of_a_class_in_this_process_is_read_when_it_is_opened(monkeypatch, checkpoint):
     """Would find the version of a checkpoint that was loaded for an earlier run."""

@@ -244,10 +244,12 @@ def test_long_prompts_refuse_lets_an_instruction_begin_that_is_short_enough_in_t
 
 
 @pytest.mark.parametrize("verdict", ["heard", "unknown"])
-def test_a_prompt_that_may_or_may_not_be_cut_is_not_refused(verdict):
-    audit, _ = audit_job(job_with(), LIMIT_OF_64_TOKENS)
+def test_a_prompt_that_may_or_may_not_be_cut_is_not_refused(verdict, monkeypatch):
+    job = job_with()
+    audited = audit_job(job, LIMIT_OF_64_TOKENS)._replace(verdict=verdict)
+    monkeypatch.setattr("roboirg.runs.play.prompt_shares.audit_job", lambda *_: audited)
 
-    check_prompt(audit, verdict)
+    check_prompt(job, LIMIT_OF_64_TOKENS, instruct_job(job))
 
 
 def test_long_prompts_are_sent_or_refused_and_nothing_else():

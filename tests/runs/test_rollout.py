@@ -356,7 +356,7 @@ def test_a_full_disk_costs_the_video_but_not_the_verdict(
 
     def encode_until_full(writer, frame):
         if next(frames) == frame_number:
-            writer._video = writer._video._replace(container=FullDiskContainer())
+            writer._video.container = FullDiskContainer()
         encode_frame(writer, frame)
 
     monkeypatch.setattr(VideoWriter, "_encode", encode_until_full)

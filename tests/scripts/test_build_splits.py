@@ -1,5 +1,6 @@
 """The script that selects the seeds of the splits again."""
 
+import json
 import re
 
 import build_splits
@@ -7,7 +8,15 @@ import pytest
 import seed_selection
 
 from roboirg.core.errors import RoboIRGError
-from roboirg.tasks.splits.splits import shipped_splits, splits_text
+from roboirg.tasks.splits.splits import TaskSplits, shipped_splits
+
+
+def test_the_file_of_splits_is_read_back_and_has_a_line_for_each_task():
+    splits = {"A": TaskSplits("0f", {"train/3": 2}), "B": TaskSplits("ff", {})}
+    text = seed_selection.splits_text(splits)
+
+    assert len(text.splitlines()) == 4
+    assert {task: TaskSplits(**entry) for task, entry in json.loads(text).items()} == splits
 
 
 def test_splits_are_built_anew_for_what_is_named(tmp_path, monkeypatch, capsys):
@@ -23,12 +32,12 @@ def test_splits_are_built_anew_for_what_is_named(tmp_path, monkeypatch, capsys):
     build_splits.build_splits(**chosen)
     printed = capsys.readouterr()
 
-    assert printed.out == splits_text(shipped_splits())
+    assert printed.out == seed_selection.splits_text(shipped_splits())
     assert re.search(r"VideoPlaceOrder/val/\d+: seed \d+ is rejected, no room", printed.err)
     assert "episodes 52/52" in printed.err  # the other 98 are published
 
     build_splits.build_splits(**chosen, out=str(tmp_path / "splits.json"))
-    assert (tmp_path / "splits.json").read_text() == splits_text(shipped_splits())
+    assert (tmp_path / "splits.json").read_text() == printed.out
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from language_variants import PAIRS, TASKS, first_episodes
+from language_variants import PAIRS, TASKS, expressible_options, first_episodes
 from plan_files import plan_file
 from typer.testing import CliRunner
 
@@ -21,7 +21,6 @@ from roboirg.core.episode import values_in
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct, instruct_with
-from roboirg.language.variants import expressible_options
 from roboirg.main import app
 from roboirg.shortcuts import SURFACE_RULES, draw_goal, goal_share, guess_goal
 from roboirg.shortcuts.goal_learner import LEARNED_FLOORS
@@ -469,10 +468,15 @@ def test_how_far_a_shortcut_exceeds_chance_is_printed_with_sign_and_interval(val
 
 
 def test_the_caption_of_a_table_names_the_adjustment_of_its_intervals():
-    """Two rows are two comparisons with chance."""
-    rows = [ShortcutRow((name,), 9, {}, Excess(0.1, 0.02)) for name in ("direct", "spatial")]
-    caption = str(shortcut_table(rows, "Shortcuts").caption)
-    assert caption.endswith("with 95 % intervals, Bonferroni-adjusted for 2 rows.")
+    """Two rows with an interval are two comparisons with chance; that of 49 texts has none."""
+    counts = {"direct": 50, "spatial": 80, "grounded": 49}
+    rows = [ShortcutRow((name,), count, {}, Excess(0.1, 0.02)) for name, count in counts.items()]
+
+    table = shortcut_table(rows, "Shortcuts")
+
+    assert "95 % intervals, Bonferroni-adjusted for 2 rows;" in str(table.caption)
+    *_, excesses = table.columns
+    assert list(excesses.cells)[-1] == "+10.0 (too few texts)"
 
 
 @pytest.mark.parametrize(

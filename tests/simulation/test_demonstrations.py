@@ -25,6 +25,7 @@ from roboirg.simulation.rendering.render_settings import FAITHFUL
 from roboirg.simulation.video import demonstration_cache, frame_sequence
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.cache import open_cache
 
 pytestmark = [pytest.mark.sim, pytest.mark.usefixtures("without_cache")]
 
@@ -291,7 +292,7 @@ def test_a_reset_from_the_cache_equals_one_that_plans_the_demonstration(
 def stored_recording(cache):
     """Return the store, and the name and content of the one recording in it."""
     (entry,) = cache.glob("actions/*")
-    store = demonstration_cache.open_cache("actions")
+    store = open_cache("actions")
     return store, entry.name, Recording.from_bytes(store.read(entry.name))
 
 

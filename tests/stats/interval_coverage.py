@@ -2,7 +2,8 @@
 
 ``python tests/stats/interval_coverage.py`` prints it: for each number of tasks, episodes and policy
 seeds the lowest coverage over rates from 1 to 99 % and over correlations of the trials of an
-episode.
+episode. Three rates are drawn on the same episodes: of two sides, such as a setting and explicit,
+and one between them, such as another setting or the setting behind a rewriter.
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.stats.intervals import Interval, Rows, TaskRates, mean_interval
+from roboirg.stats.intervals import Interval, Rows, TaskRates, mean_interval, share_interval
 
-KINDS = ("rate", "gap", "retention")
+KINDS = ("rate", "gap", "retention", "headline", "share")
 RATES = (
     (0.01, 0.01), (0.02, 0.04), (0.05, 0.2), (0.3, 0.6), (0.5, 0.5), (0.8, 0.95), (0.98, 0.99),
     (0.02, 0.9),
@@ -50,6 +51,14 @@ DESIGNS = (
 )
 
 
+class Truth(NamedTuple):
+    """The true rates of the two sides, and of what lies between them."""
+
+    first: float
+    second: float
+    between: float
+
+
 def task_rates(rate: float, tasks: int) -> NDArray[np.float64]:
     """Return the true rates of some tasks around one, evenly spaced in log-odds."""
     spread = SPREAD if tasks > 1 else 0.0
@@ -60,21 +69,22 @@ def task_rates(rate: float, tasks: int) -> NDArray[np.float64]:
 def drawn_rows(
     rng: np.random.Generator, episodes: int, seeds: int, rates: Sequence[float], correlation: float
 ) -> Rows:
-    """Return successes and trials of both sides by episode, as of `TaskRates`."""
+    """Return successes and trials of all sides by episode, as of `TaskRates`."""
+    sides = len(rates)
     shared = rng.standard_normal((episodes, 1, 1))
-    alone = rng.standard_normal((episodes, 2, seeds))
+    alone = rng.standard_normal((episodes, sides, seeds))
     ease = np.sqrt(correlation) * shared + np.sqrt(1 - correlation) * alone
     limits = [NormalDist().inv_cdf(rate) for rate in rates]
-    wins = (ease < np.reshape(limits, (2, 1))).sum(axis=2)
-    rows = np.full((episodes, 4), seeds)
+    wins = (ease < np.reshape(limits, (sides, 1))).sum(axis=2)
+    rows = np.full((episodes, 2 * sides), seeds)
     rows[:, 0::2] = wins
     return rows
 
 
-def covered(
+def missed(
     design: Design, rates: tuple[float, float], correlation: float, rng: np.random.Generator
 ) -> Iterator[str]:
-    """Simulate a run once; yield the kinds of intervals that hold the truth.
+    """Simulate a run once; yield the kinds of intervals that are printed and miss the truth.
 
     That of the retention holds it if that of a difference holds 0: of the first rate times the true
     second one, less the second rate times the true first one.
@@ -82,18 +92,39 @@ def covered(
     count = len(design.episodes)
     first = task_rates(rates[0], count)
     second = task_rates(rates[1], count)
+    between = (first + second) / 2
     tasks = []
-    for episodes, first_rate, second_rate in zip(design.episodes, first, second, strict=True):
-        pair = (first_rate, second_rate)
-        tasks.append(TaskRates.of(drawn_rows(rng, episodes, design.seeds, pair, correlation)))
-    rate = first.mean()
-    other = second.mean()
-    factors = {"rate": (1, 0), "gap": (1, -1), "retention": (other, -rate)}
-    truths = {"rate": rate, "gap": rate - other, "retention": 0.0}
-    for kind in KINDS:
-        strata = [task.combined(*np.divide(factors[kind], count)) for task in tasks]
-        if holds(mean_interval(strata), truths[kind]):
+    for episodes, *rates_of_task in zip(design.episodes, first, second, between, strict=True):
+        tasks.append(
+            TaskRates.of(drawn_rows(rng, episodes, design.seeds, rates_of_task, correlation))
+        )
+    truth = Truth(first.mean(), second.mean(), between.mean())
+    factors = {
+        "rate": (1, 0, 0),
+        "gap": (1, -1, 0),
+        "retention": (truth.second, -truth.first, 0),
+        "headline": (0.5, -1, 0.5),
+    }
+    truths = {
+        "rate": truth.first,
+        "gap": truth.first - truth.second,
+        "retention": 0.0,
+        "headline": (truth.first + truth.between) / 2 - truth.second,
+    }
+    for kind, factors_of_kind in factors.items():
+        strata = [task.combined(*np.divide(factors_of_kind, count)) for task in tasks]
+        if not holds(mean_interval(strata), truths[kind]):
             yield kind
+    # What lies between closes half of the gap; without a gap that is seen, no share is printed.
+    share = share_interval([_in_order_of_share(task) for task in tasks])
+    if share is not None and rates[0] < rates[1] and not holds(share, 0.5):
+        yield "share"
+
+
+def _in_order_of_share(task: TaskRates) -> TaskRates:
+    """Return rates in the order of `share_interval`: between, first, second."""
+    order = [2, 0, 1]
+    return TaskRates(task.contributions[:, order], task.weights, task.has_trials[order])
 
 
 def holds(interval: Interval | None, truth: float) -> bool:
@@ -104,13 +135,13 @@ def holds(interval: Interval | None, truth: float) -> bool:
 def coverage(
     design: Design, rates: tuple[float, float], correlation: float, simulations: int
 ) -> dict[str, float]:
-    """Return the share of simulated intervals of each kind that hold the truth."""
+    """Return the share of simulated runs, by kind of interval, that print none that misses."""
     rng = np.random.default_rng(7)
     counts = dict.fromkeys(KINDS, 0)
     for _ in range(simulations):
-        for kind in covered(design, rates, correlation, rng):
+        for kind in missed(design, rates, correlation, rng):
             counts[kind] += 1
-    return {kind: count / simulations for kind, count in counts.items()}
+    return {kind: 1 - count / simulations for kind, count in counts.items()}
 
 
 def lowest_coverage(design: Design, simulations: int) -> list[float]:
@@ -124,7 +155,7 @@ def lowest_coverage(design: Design, simulations: int) -> list[float]:
 def main() -> None:
     """Print a line of the table for each design, in percent."""
     for design in DESIGNS:
-        simulations = 1000 if len(design.episodes) == 1 else 500
+        simulations = 4000 if len(design.episodes) == 1 else 500
         shares = lowest_coverage(design, simulations)
         texts = [f"{100 * share:.1f}" for share in shares]
         line = f"| {design.name} | {design.seeds} | {' | '.join(texts)} |"

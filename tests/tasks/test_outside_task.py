@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from language_variants import expressible_options
 
 import roboirg
 from roboirg import tasks
@@ -17,7 +18,6 @@ from roboirg.judging import Judge, Status
 from roboirg.language import instruct_with
 from roboirg.language.scenarios import scenario_file
 from roboirg.language.settings import plain_settings, settings_of
-from roboirg.language.variants import expressible_options
 from roboirg.policies import make_policy, play
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.shortcuts.command_chance import understood_goals

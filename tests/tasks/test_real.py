@@ -14,7 +14,8 @@ from roboirg.core.footprints import Rectangle, Region
 from roboirg.judging import Status
 from roboirg.tasks import all_tasks, every_task, find_tasks, get_task, pick_by_count, put_in_box
 from roboirg.tasks.pick_by_count import WAIT_STEPS
-from roboirg.tasks.shared.real_table import draw_regions, draw_tape, left_to_right
+from roboirg.tasks.shared.fixtures import draw_item
+from roboirg.tasks.shared.real_table import draw_regions, left_to_right
 
 REAL = ("PutInBox", "PickByCount")
 MODULES = {"PutInBox": put_in_box, "PickByCount": pick_by_count}
@@ -94,10 +95,9 @@ def test_the_region_on_the_right_mirrors_the_one_on_the_left():
 
 
 def test_a_scene_without_room_for_the_tape_is_rejected():
-    region = Region(0, 0, 0.1, 0.1)
     full = [Rectangle(0, 0, 1, 1)]
     with pytest.raises(SceneRejectedError, match="no place for tape"):
-        draw_tape(np.random.default_rng(0), "tape", "yellow", region, 0.0, full)
+        draw_item(np.random.default_rng(0), put_in_box.TAPE_PLAN, full)
 
 
 def judged_in_first_scene(task, goal, *steps):

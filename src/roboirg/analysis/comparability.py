@@ -6,6 +6,7 @@ RoboMME's, which a wording file brings. The paper's implicit instructions are no
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 
 from roboirg.analysis.published import PUBLISHED_MAX_STEPS, TRIALS, published_tasks
@@ -114,9 +115,9 @@ def _different_notes(found: AllDifferences, names: RunNames) -> Iterator[str]:
     for key, differences in found.items():
         if differences is not None and comparison_sign(differences):
             runs.setdefault(key.policy_run, {})[key.task] = differences
-    runs_by_text: dict[str, list[PolicyRun]] = {}
+    runs_by_text = defaultdict(list)
     for policy_run, tasks in runs.items():
-        runs_by_text.setdefault(_text(tasks), []).append(policy_run)
+        runs_by_text[_text(tasks)].append(policy_run)
 
     for text, policy_runs in runs_by_text.items():
         if not text:
@@ -133,10 +134,10 @@ def _text(tasks: Mapping[str, Differences]) -> str:
     For example ``split train; 1 error (PickXtimes, StopCube)``; a difference of all tasks names
     none.
     """
-    tasks_by_difference: dict[str, list[str]] = {}
+    tasks_by_difference = defaultdict(list)
     for task, differences in tasks.items():
         for difference in differences:
-            tasks_by_difference.setdefault(difference, []).append(task)
+            tasks_by_difference[difference].append(task)
     parts = []
     for difference, its_tasks in tasks_by_difference.items():
         part = difference

@@ -27,7 +27,7 @@ def merge(
     typer.echo(
         f"Added {counted(merged.added, 'record')} to {out}; {merged.duplicates:,} already there."
     )
-    for sentence in merged.warnings:
+    for sentence in merged.warnings():
         typer.echo(sentence, err=True)
     if merged.conflicts:
         first = merged.conflicts[0]

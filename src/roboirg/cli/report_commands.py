@@ -15,7 +15,9 @@ from roboirg.core.errors import InvalidValueError, known_name
 
 if TYPE_CHECKING:
     from roboirg.analysis.measures.breakdowns import Breakdown
+    from roboirg.analysis.measures.comparison import Comparison
     from roboirg.analysis.measures.run_data import RunData
+    from roboirg.analysis.results.frame import Frame
     from roboirg.analysis.tables.table import Table
 
 # Heavy modules are imported inside the commands, so that --help answers at once.
@@ -239,12 +241,8 @@ def compare(
     from rich.text import Text
 
     from roboirg.analysis.measures.comparison import compare as compare_frames
-    from roboirg.analysis.measures.comparison_text import sentences
-    from roboirg.analysis.measures.headline import headline_notes
     from roboirg.analysis.results.reading import read_frame
-    from roboirg.analysis.results.run_cells import cells_of
     from roboirg.analysis.results.sources import opened_sources
-    from roboirg.analysis.tables.arm_table import language_use_sentences
     from roboirg.cli.run_commands import warn_of_mixtures
     from roboirg.util.console_width import widen
 
@@ -261,16 +259,29 @@ def compare(
     if name == other_name:  # the same policy in two runs
         name = f"{name} ({first})"
         other_name = f"{other_name} ({second})"
-    lines = [
-        *sentences(comparison, name, other_name),
-        *headline_notes(cells_of(frame), {comparison.first: name}),
-        *headline_notes(cells_of(other_frame), {comparison.second: other_name}),
-        *language_use_sentences(frame, other_frame, (name, other_name)),
-    ]
     console = Console()
     widen(console)
-    for line in lines:
+    for line in _comparison_lines(comparison, (frame, other_frame), (name, other_name)):
         console.print(Text(line), highlight=False)
+
+
+def _comparison_lines(
+    comparison: Comparison, frames: tuple[Frame, Frame], names: tuple[str, str]
+) -> list[str]:
+    """Return a comparison of two policies in sentences; frames and names are theirs, in order."""
+    from roboirg.analysis.measures.comparison_text import sentences
+    from roboirg.analysis.measures.headline import headline_notes
+    from roboirg.analysis.results.run_cells import cells_of
+    from roboirg.analysis.tables.arm_table import language_use_sentences
+
+    first, second = frames
+    name, other_name = names
+    return [
+        *sentences(comparison, name, other_name),
+        *headline_notes(cells_of(first), {comparison.first: name}),
+        *headline_notes(cells_of(second), {comparison.second: other_name}),
+        *language_use_sentences(first, second, names),
+    ]
 
 
 class _TableChoice(NamedTuple):

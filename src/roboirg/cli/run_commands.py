@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import sys
 from collections.abc import Sequence
@@ -300,9 +301,7 @@ def _print_sizes(plan: Plan, jobs: tuple[Job, ...], console: Console) -> tuple[s
     from roboirg.runs.run.plan_counts import cell_sizes
 
     sizes = cell_sizes(jobs)
-    settings: dict[str, None] = {}  # a set that keeps its order
-    for counts_by_setting in sizes.values():
-        settings.update(dict.fromkeys(counts_by_setting))
+    settings = tuple(dict.fromkeys(itertools.chain.from_iterable(sizes.values())))
     rows: list[tuple[str, ...]] = []
     for (policy, task), counts_by_setting in sizes.items():
         cells: list[str] = []
@@ -318,7 +317,7 @@ def _print_sizes(plan: Plan, jobs: tuple[Job, ...], console: Console) -> tuple[s
         caption = f"episodes: {' + '.join(forms)}"
     heads = ("policy", "task", *settings)
     _print_table(console, f"plan {plan.fingerprint}", heads, rows, caption)
-    return tuple(settings)
+    return settings
 
 
 def _print_table(

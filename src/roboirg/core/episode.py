@@ -82,19 +82,18 @@ def describe_goal(goal: Mapping[str, Any]) -> str:
     "counts": [2, 1]}`` -> ``"2 red, 1 blue"``. Counted colors come last. Never fails: values of a
     model that fit no slot are shown as they are.
     """
-    values = {slot: values_in(content) for slot, content in goal.items()}
-    amounts: list[str] = []
-    if "colors" in values and "counts" in values:
-        counts = values.pop("counts")
-        colors = values.pop("colors")
-        # A model may give more counts than colors, or fewer.
-        pairs = itertools.zip_longest(counts, colors, fillvalue="?")
-        amounts = [f"{count} {color}" for count, color in pairs]
+    has_amounts = "colors" in goal and "counts" in goal
     words = []
-    for slot, slot_values in values.items():
-        in_words = _SLOT_WORDS.get(slot, str)
-        words += [in_words(value) for value in slot_values]
-    return ", ".join(words + amounts)
+    for slot, content in goal.items():
+        if not has_amounts or slot not in ("colors", "counts"):
+            in_words = _SLOT_WORDS.get(slot, str)
+            words += [in_words(value) for value in values_in(content)]
+    if has_amounts:
+        counts = values_in(goal["counts"])
+        # A model may give more counts than colors, or fewer.
+        pairs = itertools.zip_longest(counts, values_in(goal["colors"]), fillvalue="?")
+        words += [f"{count} {color}" for count, color in pairs]
+    return ", ".join(words)
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,12 +94,7 @@ def overlap(first: Footprint, second: Obstacle) -> bool:
     the line.
     """
     if isinstance(second, Line):
-        thin = Rectangle(second.x, second.y, second.half, 0.0, second.yaw)
-        if isinstance(first, Circle):
-            return overlap(first, thin)
-        # The second axis of the line, across it, is the one that does not count.
-        are_apart_along_line, _ = _separations(thin, first)
-        return not are_apart_along_line and not any(_separations(first, thin))
+        return _overlaps_line(first, second)
     if isinstance(first, Rectangle) and isinstance(second, Rectangle):
         return not any(_separations(first, second)) and not any(_separations(second, first))
     if isinstance(first, Circle) and isinstance(second, Circle):
@@ -108,6 +103,16 @@ def overlap(first: Footprint, second: Obstacle) -> bool:
     if isinstance(first, Circle) and isinstance(second, Rectangle):
         return distance_to(second, first.x, first.y) <= first.radius
     return overlap(second, first)  # a rectangle and a circle, the other way round
+
+
+def _overlaps_line(footprint: Footprint, line: Line) -> bool:
+    """Return whether a footprint touches or overlaps a line; see `overlap`."""
+    thin = Rectangle(line.x, line.y, line.half, 0.0, line.yaw)
+    if isinstance(footprint, Circle):
+        return overlap(footprint, thin)
+    # The second axis of the line, across it, is the one that does not count.
+    are_apart_along_line, _ = _separations(thin, footprint)
+    return not are_apart_along_line and not any(_separations(footprint, thin))
 
 
 def distance_to(rectangle: Rectangle, x: float, y: float) -> float:

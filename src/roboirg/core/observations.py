@@ -137,17 +137,17 @@ class FetchedDemonstration(Mapping[str, NDArray[Any]]):
         return dict, (dict(self),)
 
 
-def proprioception(joints: NDArray[Any], gripper: NDArray[Any]) -> NDArray[np.float32]:
+def proprioception(seen: Mapping[str, Any]) -> NDArray[np.float32]:
     """Return the state as openpi, MME-VLA and our LeRobot datasets define it.
 
     Args:
-        joints: (..., 7) rad.
-        gripper: (..., 2) finger positions, m.
+        seen: an observation, or a demonstration of T steps, of which it reads `joint_positions`
+            ((7,) or (T, 7), rad) and `gripper` ((2,) or (T, 2), finger positions in m).
 
     Returns:
-        (..., 8): the joints and the first finger.
+        The joints and the first finger, (8,) or (T, 8).
     """
     state: NDArray[np.float32] = np.concatenate(
-        [joints, gripper[..., :1]], axis=-1, dtype=np.float32
+        [seen["joint_positions"], seen["gripper"][..., :1]], axis=-1, dtype=np.float32
     )
     return state

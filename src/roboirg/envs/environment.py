@@ -18,6 +18,7 @@ from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS, Pixels
 from roboirg.core.subgoal_text import Point
+from roboirg.envs.demonstration_play import replay_or_plan
 from roboirg.envs.env_settings import RENDER_MODES, EnvOptions, EnvSettings, choose_index
 from roboirg.envs.episode_state import EpisodeState
 from roboirg.envs.observation_spaces import make_observation_space
@@ -30,7 +31,6 @@ from roboirg.simulation.observation_builder import ObservationBuilder
 from roboirg.simulation.pixel_grounding import PixelGrounding, objects_at
 from roboirg.simulation.recording import Recording
 from roboirg.simulation.rendering.render_device import describe_device, find_render_device
-from roboirg.simulation.video.demonstration_cache import replay_or_plan
 from roboirg.simulation.video.demonstration_video import make_video
 from roboirg.tasks.choices import choices_of
 from roboirg.tasks.splits.recordings import is_recorded, recorded_actions
@@ -384,12 +384,11 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
         state = self._start_episode()
         self._state = state
 
-        def record_step(stage: Stage) -> None:
+        for stage in state.session.demonstrate(recording):
             self._after_step(stage, demonstration=True)
             state.video_proprioception.append(state.observation_builder.read_proprioception())
             state.video_subgoals.append(state.describe_stage(stage))
-
-        return state.session.play_demonstration(record_step, recording)
+        return state.session.demonstrated
 
     def _start_episode(self) -> EpisodeState:
         """Return the state of the episode at its beginning, with a new world."""

@@ -48,7 +48,7 @@ def episodes_of(
         InvalidValueError: the split is shorter.
     """
     size = SIZES[split] if count is None else count
-    episodes: list[Episode] = []
+    episodes = []
     for task in tasks:
         for number in range(size):
             episodes.append(get_episode(task, split, number))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,6 @@ import sapien
 import sapien.physx
 from numpy.typing import ArrayLike, NDArray
 
-from roboirg.core.actions import WAYPOINT
 from roboirg.core.episode import ROBOT_BASE, Episode, SceneObject
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.motions import Point
@@ -99,7 +99,7 @@ def _view(world: World, episode: Episode) -> LabeledView:
     Centers are (column, row) in pixels, positions (x, y) in meters. Objects of which fewer than
     `MIN_PIXELS` pixels are visible are left out.
     """
-    names: list[str] = []
+    names = []
     centers = []
     positions = []
     pixels = pixels_by_object(world)
@@ -285,55 +285,38 @@ def record_expert(
         env.draws = False
         with contextlib.closing(env), contextlib.suppress(MotionPlanningError):
             return _LookRecorder(env, WaypointExpert(SEED, disturbance), drawn).record()
-    nothing: NDArray[Any] = np.zeros(0)
     return ExpertRecording(
         key=episode.key,
         names=(),
         classes=(),
-        **dict.fromkeys(_ARRAYS, nothing),
+        **_as_arrays({}),
         turns=(),
         pictures={},
         status="unplanned",
     )
 
 
-_ARRAYS = (
-    "things",
-    "visible",
-    "tool",
-    "is_video",
-    "steps",
-    "done",
-    "looks",
-    "actions",
-    "anchors",
-)
-"""The arrays of a recording."""
+_ARRAY_TYPES = {
+    "things": np.float32,
+    "visible": np.bool_,
+    "tool": np.float32,
+    "is_video": np.bool_,
+    "steps": np.int32,
+    "done": np.int32,
+    "looks": np.int32,
+    "actions": np.float32,
+    "anchors": np.int32,
+}
+"""The types of the numbers in the arrays of an `ExpertRecording`."""
 
 
-class _Look(NamedTuple):
-    """What was to be seen at a look; see the fields of the same names in `ExpertRecording`."""
+def _as_arrays(noted: Mapping[str, Sequence[Any]]) -> dict[str, Any]:
+    """Return the arrays of an `ExpertRecording` by name; those of which nothing is noted are empty.
 
-    things: list[tuple[float, ...]]
-    visible: list[bool]
-    tool: tuple[float, ...]
-    is_video: bool
-    steps: int
-    done: int
-
-
-class _Decision(NamedTuple):
-    """A decision of the expert; see `ExpertRecording` for look, anchor and turn."""
-
-    look: int
-    action: NDArray[np.float64]
-    anchor: int
-    turn: str
-
-
-def _column(rows: Sequence[_Look | _Decision], name: str, dtype: type) -> NDArray[Any]:
-    """Return a field of all rows as one array."""
-    return np.array([getattr(row, name) for row in rows], dtype)
+    Args:
+        noted: by the name of the array, its rows.
+    """
+    return {name: np.array(noted.get(name, ()), dtype) for name, dtype in _ARRAY_TYPES.items()}
 
 
 class _LookRecorder(EpisodeLoop):
@@ -352,8 +335,8 @@ class _LookRecorder(EpisodeLoop):
         self._expert = policy
         self._drawn = drawn
         self._names = tuple(item.name for item in env.episode.scene.objects)
-        self._looks: list[_Look] = []
-        self._decisions: list[_Decision] = []
+        self._noted: defaultdict[str, list[Any]] = defaultdict(list)
+        self._turns: list[str] = []
         self._pictures: dict[int, bytes] = {}
         self._video_steps = 0
         self._steps = 0
@@ -363,25 +346,20 @@ class _LookRecorder(EpisodeLoop):
         """Play the episode, and return all looks and decisions as arrays."""
         self.env.set_frame_hook(self._after_step)
         info = self.play()
-        looks = self._looks
-        decisions = self._decisions
         return ExpertRecording(
             key=self.env.episode.key,
             names=self._names,
             classes=tuple(map(class_of, self.env.episode.scene.objects)),
-            things=_column(looks, "things", np.float32),
-            visible=_column(looks, "visible", bool),
-            tool=_column(looks, "tool", np.float32),
-            is_video=_column(looks, "is_video", bool),
-            steps=_column(looks, "steps", np.int32),
-            done=_column(looks, "done", np.int32),
-            looks=_column(decisions, "look", np.int32),
-            actions=_column(decisions, "action", np.float32).reshape(-1, WAYPOINT.size),
-            anchors=_column(decisions, "anchor", np.int32),
-            turns=tuple(decision.turn for decision in decisions),
+            **_as_arrays(self._noted),
+            turns=tuple(self._turns),
             pictures=self._pictures,
             status=info["status"],
         )
+
+    def _note(self, **values: object) -> None:
+        """Add a row to each of some arrays of `ExpertRecording`, by their names."""
+        for name, value in values.items():
+            self._noted[name].append(value)
 
     def act(self, observation: dict[str, Any]) -> ArrayLike:
         """Return the expert's action; note its decision, and the look that it belongs to.
@@ -393,16 +371,16 @@ class _LookRecorder(EpisodeLoop):
             self._look(is_video=False)
         decided = self._expert.last
         anchor = -1 if decided.anchor is None else self._names.index(decided.anchor)
-        look = len(self._looks) - 1
-        self._decisions.append(_Decision(look, decided.action, anchor, decided.turn))
+        newest_look = len(self._noted["steps"]) - 1
+        self._note(looks=newest_look, actions=decided.action, anchors=anchor)
+        self._turns.append(decided.turn)
         return action
 
     def _has_looked(self) -> bool:
         """Return whether the newest look is of the policy's turn, at this step."""
-        if not self._looks:
+        if not self._noted["steps"]:
             return False
-        newest = self._looks[-1]
-        return not newest.is_video and newest.steps == self._steps
+        return not self._noted["is_video"][-1] and self._noted["steps"][-1] == self._steps
 
     def _after_step(self, env: RoboIRGEnv, is_demonstration: bool) -> None:
         """Look after every `LOOK_EVERY`-th step; video and policy's turn are counted apart.
@@ -432,27 +410,36 @@ class _LookRecorder(EpisodeLoop):
         visible only if enough pixels show it; else what the robot hides counts as visible.
         """
         session = self.env.session
-        world = session.world
-        bodies = [world.bodies[name] for name in self._names]
-        visible = visible_of(world, bodies)
-        number = len(self._looks)
+        bodies = [session.world.bodies[name] for name in self._names]
+        stages_done = session.judge.index - len(self.env.episode.demonstration)
+        number = len(self._noted["steps"])
+        visible = visible_of(session.world, bodies)
         if number in self._drawn:
-            pixels = pixels_by_object(world)
-            for index, name in enumerate(self._names):
-                rows, _ = pixels[name]
-                if len(rows) < MIN_PIXELS:
-                    visible[index] = False
-            self._pictures[number] = encode_png(Picture(world.picture(FRONT)))
-        done = session.judge.index - len(self.env.episode.demonstration)
-        look = _Look(
+            visible = self._draw(number, visible)
+        self._note(
             things=[(*body.position, body.yaw) for body in bodies],
             visible=visible,
-            tool=_tool_of(world),
+            tool=_tool_of(session.world),
             is_video=is_video,
             steps=self._video_steps if is_video else self._steps,
-            done=max(0, done),
+            done=max(0, stages_done),
         )
-        self._looks.append(look)
+
+    def _draw(self, number: int, visible: Sequence[bool]) -> list[bool]:
+        """Draw the picture of a look; return which objects enough of its pixels show.
+
+        Args:
+            number: of the look.
+            visible: for each object, whether it could be seen if the robot hid nothing.
+        """
+        world = self.env.session.world
+        pixels = pixels_by_object(world)
+        self._pictures[number] = encode_png(Picture(world.picture(FRONT)))
+        shown = []
+        for name, can_be_seen in zip(self._names, visible, strict=True):
+            rows, _ = pixels[name]
+            shown.append(can_be_seen and len(rows) >= MIN_PIXELS)
+        return shown
 
 
 def _tool_of(world: World) -> tuple[float, ...]:
@@ -471,16 +458,18 @@ def visible_of(world: World, bodies: Sequence[Body]) -> list[bool]:
     the order of `bodies`.
     """
     absent = world.absent
-    present = [body for body in bodies if body.item.name not in absent]
-    containers = [body.position for body in present if body.item.kind == "container"]
-    lids = [position for position in containers if position.z < ON_TABLE]
-    visible: list[bool] = []
+    lids = []
     for body in bodies:
-        kind = body.item.kind
-        can_be_seen = body.item.name not in absent and kind != "site"
+        stands_on_table = body.item.kind == "container" and body.position.z < ON_TABLE
+        if stands_on_table and body.item.name not in absent:
+            lids.append(body.position)
+    visible = []
+    for body in bodies:
+        item = body.item
         # A *hidden cube* is one that a container may cover.
-        is_hidden = kind == "hidden_cube" and _is_covered(body.position, lids)
-        visible.append(can_be_seen and not is_hidden)
+        is_hidden = item.kind == "hidden_cube" and _is_covered(body.position, lids)
+        is_there = item.name not in absent and item.kind != "site"
+        visible.append(is_there and not is_hidden)
     return visible
 
 

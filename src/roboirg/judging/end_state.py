@@ -68,17 +68,16 @@ explain it |
     | the hand still moved, and had been at something that is expected | ``out_of_time`` |
     | it moved elsewhere | ``no_attempt`` |
     """
-    slips = find_slips(replay)
     unmet = replay.unmet()
     unexpected = _unexpected_act(replay, unmet)
     # An object that fell where it lies was not put there: then the drop, a slip, decides below.
-    if unexpected is not None and drop_before(replay, slips, unexpected.act) is None:
-        explained = explain_early_act(replay, slips, unexpected.act.fact)
+    if unexpected is not None and drop_before(replay, unexpected.act) is None:
+        explained = explain_early_act(replay, unexpected.act.fact)
         return explained or _describe_act(replay, unexpected.failure, unexpected.act)
 
     # With the expected object in the hand, the tries to take it have succeeded: none decides.
     if not _is_in_hand(replay, unmet):
-        failed_try = judge_tries(replay, slips)
+        failed_try = judge_tries(replay)
         if failed_try is not None:
             return failed_try
 
@@ -86,8 +85,7 @@ explain it |
     if misunderstanding is None:
         return _at_rest(replay)
     # Who missed a grasp and went on without noticing has misunderstood nothing.
-    stages_left = range(replay.expected_stage, len(replay.stages))
-    return explain_missing(replay, slips, stages_left) or misunderstanding
+    return explain_missing(replay, replay.stages_left) or misunderstanding
 
 
 def _is_in_hand(replay: EpisodeReplay, facts: Sequence[Fact]) -> bool:
@@ -96,9 +94,7 @@ def _is_in_hand(replay: EpisodeReplay, facts: Sequence[Fact]) -> bool:
     return any(fact.subject in held for fact in facts)
 
 
-def explain_early_act(
-    replay: EpisodeReplay, slips: Sequence[Slip], act: Fact
-) -> FailureAttribution | None:
+def explain_early_act(replay: EpisodeReplay, act: Fact) -> FailureAttribution | None:
     """Return the failed tries that explain why an act was done before its time; else None.
 
     The button is pressed although two of three cubes are in the bin: a grasp that was missed
@@ -109,17 +105,15 @@ def explain_early_act(
     stage_of_act = next_stage_with(act, replay.stages, current_stage)
     if stage_of_act is None:
         return None
-    missed_unnoticed = explain_missing(replay, slips, range(current_stage, stage_of_act))
+    missed_unnoticed = explain_missing(replay, range(current_stage, stage_of_act))
     if missed_unnoticed is not None:
         return missed_unnoticed
     # A failed try at the right object is no reason to go on with a later act.
-    failed_try = judge_tries(replay, slips)
+    failed_try = judge_tries(replay)
     return failed_try if failed_try is not None and failed_try.kind == "grounding" else None
 
 
-def explain_missing(
-    replay: EpisodeReplay, slips: Sequence[Slip], skipped: range
-) -> FailureAttribution | None:
+def explain_missing(replay: EpisodeReplay, skipped: range) -> FailureAttribution | None:
     """Return the first of the unnoticed failed tries if these explain all acts that are missing.
 
     Two cubes are missing in the bin and two grasps were missed unnoticed: the first of them is the
@@ -130,9 +124,10 @@ def explain_missing(
     `skipped` has the indices of the stages whose acts are missing.
     """
     meant = _objects_meant_by_any(replay, skipped)
-    unnoticed = [
-        slip for slip in slips if slip.subjects <= meant and not is_noticed(replay, slip, slips)
-    ]
+    unnoticed: list[Slip] = []
+    for slip in find_slips(replay):
+        if slip.subjects <= meant and not is_noticed(replay, slip):
+            unnoticed.append(slip)
     if not unnoticed:
         return None
 
@@ -191,7 +186,7 @@ def _expected_roles(stage: Stage) -> set[FactRole]:
     return {fact.traits.role for fact in facts_of(stage.expects)}
 
 
-def judge_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> FailureAttribution | None:
+def judge_tries(replay: EpisodeReplay) -> FailureAttribution | None:
     """Return what the failed tries in the current stage show; None without any.
 
     | mostly tried was | is |
@@ -201,7 +196,8 @@ def judge_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> FailureAttribut
     | something else | ``wrong_object`` |
     | what the stage expects or another thing, which is not clear | ``ambiguous_act`` |
     """
-    tries = [slip for slip in slips if slip.step >= replay.acted_since]
+    stage_began = replay.acted_since
+    tries = [slip for slip in find_slips(replay) if slip.step >= stage_began]
     if not tries:
         return None
     right_objects = _objects_meant_at_end(replay)
@@ -216,10 +212,11 @@ def judge_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> FailureAttribut
     if not at_wrong:
         return describe_slip(replay, tries[-1], "ambiguous_act")
 
-    stages_left = range(replay.expected_stage, len(replay.stages))
-    if at_wrong[-1].subjects.isdisjoint(_objects_meant_by_any(replay, stages_left)):
-        return describe_slip(replay, at_wrong[-1], "wrong_object")
-    return describe_slip(replay, at_wrong[-1], "wrong_order")
+    last_try = at_wrong[-1]
+    due_later = _objects_meant_by_any(replay, replay.stages_left)
+    if last_try.subjects.isdisjoint(due_later):
+        return describe_slip(replay, last_try, "wrong_object")
+    return describe_slip(replay, last_try, "wrong_order")
 
 
 def _objects_meant_at_end(replay: EpisodeReplay) -> frozenset[str]:
@@ -473,11 +470,13 @@ def _approach_to_wrong(replay: EpisodeReplay) -> Slip | None:
     expected_roles = _expected_roles(replay.stages[replay.expected_stage])
     if not at_end or FactRole.RAISE not in expected_roles:
         return None
-    names = frozenset(str(above.fact.place) for above in at_end)
-    meant = _objects_meant_by_any(replay, range(len(replay.stages)))
     came = at_end[0].start
-    stays = came <= replay.last_step - _APPROACH_STEPS
-    return Slip(came, "missed_grasp", names) if stays and names.isdisjoint(meant) else None
+    if came > replay.last_step - _APPROACH_STEPS:
+        return None  # it may only pass
+    names = frozenset(str(above.fact.place) for above in at_end)
+    if names.isdisjoint(_objects_meant_by_any(replay, range(len(replay.stages)))):
+        return Slip(came, "missed_grasp", names)
+    return None
 
 
 def _has_begun(replay: EpisodeReplay) -> bool:

@@ -62,9 +62,11 @@ class Decision(NamedTuple):
     step: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EpisodeReplay:
     """One episode, step by step. Steps count since the world began.
+
+    Two replays are never equal, so that one can be a key, as of the cache of `find_slips`.
 
     Attributes:
         episode: the episode.
@@ -101,6 +103,11 @@ class EpisodeReplay:
         The first one if the episode ended in the demonstration.
         """
         return max(self.judge.index - len(self.episode.demonstration), 0)
+
+    @property
+    def stages_left(self) -> range:
+        """Indices of the policy's stages from the expected one to the last."""
+        return range(self.expected_stage, len(self.stages))
 
     @property
     def acted_since(self) -> int:
@@ -330,14 +337,7 @@ class Event(NamedTuple):
 
     def as_dict(self) -> dict[str, str | int | bool | None]:
         """Return the event as plain JSON values, for records."""
-        kind, subject, place = self.fact
-        return {
-            "step": self.step,
-            "kind": kind,
-            "subject": subject,
-            "place": place,
-            "holds": self.holds,
-        }
+        return {"step": self.step, **self.fact._asdict(), "holds": self.holds}
 
 
 def changes(step: int, before: AbstractSet[Fact], now: AbstractSet[Fact]) -> tuple[Event, ...]:

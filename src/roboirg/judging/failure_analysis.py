@@ -21,7 +21,7 @@ from roboirg.core.conditions import (
     Rule,
     facts_of,
 )
-from roboirg.core.episode import Episode
+from roboirg.core.episode import Episode, Stage
 from roboirg.core.fact_traits import FactRole
 from roboirg.core.failures import FailureName
 from roboirg.judging.declared_intent import DeclaredIntent
@@ -36,7 +36,7 @@ from roboirg.judging.fact_history import FactHistory
 from roboirg.judging.failure_attribution import FailureAttribution
 from roboirg.judging.grounding_errors import classify_grounding_error
 from roboirg.judging.judge import Status, describe_violation
-from roboirg.judging.slips import drop_before, find_slips, unsteady_visit
+from roboirg.judging.slips import Slip, drop_before, unsteady_visit
 
 MirroredObjects = Mapping[str, Collection[str]]
 """For each object that an instruction means, those that it would mean with left and right
@@ -94,25 +94,30 @@ def attribute_failure(
         intent: what the policy declared, which comes before what it did; None if it did not.
     """
     replay = rejudge(episode, events, policy_start_step, elapsed_steps, attempts)
-    has_failed = replay.judge.violation is not None or timed_out or cause is not None
-    if replay.judge.status is Status.SUCCESS or not has_failed:
+    if replay.judge.status is Status.SUCCESS:
+        return None
+    if replay.judge.violation is None and not timed_out and cause is None:
         return None
 
     # The first deviation comes before the end, as what follows it can no longer succeed.
     deviation = min(_deviations(replay), key=lambda deviation: deviation.step, default=None)
-    act = None if deviation is None else deviation.act
     if deviation is None:
         failure = _attribute_end(replay, timed_out=timed_out, cause=cause)
-    elif act is None:
-        failure = _attribute_time(replay, deviation)
     else:
-        failure = _attribute_act(replay, deviation, act)
-
-    place = None if act is None else act.place
-    failure = refine_wrong_object(failure, replay, mirrored or {}, place)
+        failure = _attribute_deviation(replay, deviation)
+    failure = refine_wrong_object(failure, replay, mirrored or {}, deviation)
     # Up to here, steps count since the world began; a declaration counts them in the policy's turn.
     failure = failure._replace(step=failure.step - policy_start_step)
-    return failure if intent is None else intent.revise(failure, episode)
+    if intent is None:
+        return failure
+    return intent.revise(failure, episode)
+
+
+def _attribute_deviation(replay: EpisodeReplay, deviation: _Deviation) -> FailureAttribution:
+    """Return the failure of an episode that could no longer succeed: of an act, or of the time."""
+    if deviation.act is None:
+        return _attribute_time(replay, deviation)
+    return _attribute_act(replay, deviation, deviation.act)
 
 
 def _attribute_end(
@@ -146,25 +151,13 @@ def _attribute_act(replay: EpisodeReplay, deviation: _Deviation, act: Fact) -> F
     hand meant to press at all.
     """
     step = deviation.step
-    slips = find_slips(replay)
-    dropped = drop_before(replay, slips, FactInterval(act, step, None))
-    if act.traits.role is FactRole.PLACING and dropped is not None:
-        return describe_slip(replay, dropped)
-
-    if act.traits.role is FactRole.CARRY:
-        unsteady = unsteady_visit(replay, slips, FactInterval(act, step, None))
-        if unsteady is not None:
-            return describe_slip(replay, unsteady)
-
-    failure = deviation.failure
-    if failure == "mistimed":
-        failure = judge_moment(replay, step)
-    if act.traits.role is FactRole.PRESS and _is_touched(replay, step):
-        failure = "touched_button"
-
+    slip = _slip_behind(replay, FactInterval(act, step, None))
+    if slip is not None:
+        return describe_slip(replay, slip)
+    failure = _failure_by_rule(replay, deviation, act)
     # Explanations look at the end of the replay, so they fit an act that ended it.
     if failure is None and step == replay.last_step:
-        explained = explain_early_act(replay, slips, act)
+        explained = explain_early_act(replay, act)
         if explained is not None:
             return explained
     if failure is None:
@@ -174,13 +167,28 @@ def _attribute_act(replay: EpisodeReplay, deviation: _Deviation, act: Fact) -> F
     return FailureAttribution.of(failure, act.subject, step, words)
 
 
-def _is_touched(replay: EpisodeReplay, step: int) -> bool:
-    """Return whether something else pressed a button than the fingertips of an empty hand.
+def _slip_behind(replay: EpisodeReplay, act: FactInterval) -> Slip | None:
+    """Return the failed try that led to a forbidden act: a drop, or an unsteady hand; else None."""
+    if act.role is FactRole.PLACING:
+        return drop_before(replay, act)
+    if act.role is FactRole.CARRY:
+        return unsteady_visit(replay, act)
+    return None
 
-    The hand holds something, or is not at the button: then it was its side, or the arm.
+
+def _failure_by_rule(replay: EpisodeReplay, deviation: _Deviation, act: Fact) -> FailureName | None:
+    """Return the failure that the violated rule names, but for presses; None if it names none.
+
+    A press is judged by its moment where a task asks for one. It is a touch if the hand holds
+    something or is not at the button: then its side pressed, or the arm.
     """
-    roles = replay.roles_at(step)
-    return FactRole.GRIP in roles or FactRole.APPROACH not in roles
+    roles = replay.roles_at(deviation.step)
+    is_by_fingertips = FactRole.GRIP not in roles and FactRole.APPROACH in roles
+    if act.traits.role is FactRole.PRESS and not is_by_fingertips:
+        return "touched_button"
+    if deviation.failure == "mistimed":
+        return judge_moment(replay, deviation.step)
+    return deviation.failure
 
 
 def _deviations(replay: EpisodeReplay) -> Iterator[_Deviation]:
@@ -303,31 +311,43 @@ def _describe_deviation(replay: EpisodeReplay, deviation: _Deviation) -> str:
 
 
 def refine_wrong_object(
-    found: FailureAttribution, replay: EpisodeReplay, mirrored: MirroredObjects, place: str | None
+    found: FailureAttribution,
+    replay: EpisodeReplay,
+    mirrored: MirroredObjects,
+    deviation: _Deviation | None,
 ) -> FailureAttribution:
     """Return a ``mirrored_pick`` if the wrong object or place is the mirrored one.
 
     *The left cube* means the red one, and with left and right exchanged the blue one: taking the
-    blue cube is a mirrored pick. What counts are the mirror images of the objects that the words
-    mean and the current stage expects, or of all that the words mean if it expects none of them.
+    blue cube is a mirrored pick.
 
     Args:
         found: the failure so far; its step counts since the world began.
         replay: of the episode.
         mirrored: the mirror images of each object that the words mean.
-        place: where the act was; None if it has no place.
+        deviation: the first one, whose act may have a place; None without any.
     """
     if found.failure not in ("wrong_object", "wrong_place"):
         return found
-    expected: set[str | None] = set()
-    for fact in facts_of(replay.stage_at(found.step).expects):
-        expected.update((fact.subject, fact.place))
-    meant_and_expected = [name for name in mirrored if name in expected]
-
-    mirror_images: set[str | None] = set()
-    for name in meant_and_expected or mirrored:
-        mirror_images.update(mirrored[name])
-    if mirror_images.isdisjoint((found.subject, place)):
+    names: list[str | None] = [found.subject]
+    if deviation is not None and deviation.act is not None:
+        names.append(deviation.act.place)
+    if _mirror_images(replay.stage_at(found.step), mirrored).isdisjoint(names):
         return found
     words = f"{found.sentence[:-1]}; the words mean it only with left and right exchanged"
     return FailureAttribution.of("mirrored_pick", found.subject, found.step, words)
+
+
+def _mirror_images(stage: Stage, mirrored: MirroredObjects) -> set[str | None]:
+    """Return the mirror images of the objects that the words mean and a stage expects.
+
+    Of all that the words mean if the stage expects none of them.
+    """
+    expected: set[str | None] = set()
+    for fact in facts_of(stage.expects):
+        expected.update((fact.subject, fact.place))
+    meant_and_expected = [name for name in mirrored if name in expected]
+    images: set[str | None] = set()
+    for name in meant_and_expected or mirrored:
+        images.update(mirrored[name])
+    return images

@@ -185,9 +185,8 @@ def _time_conditions(stage: Stage) -> Iterator[Elapsed]:
 
 def describe_violation(violation: Fact | Rule, stage: Stage, scene: Scene) -> str:
     """Return what was done and what the stage expects, in one line, as for a record's cause."""
-    if isinstance(violation, Rule):
-        return f"{violation.cause}; {describe_expected(stage)}"
-    return f"{describe_act(violation, scene)}; {describe_expected(stage)}"
+    act = violation.cause if isinstance(violation, Rule) else describe_act(violation, scene)
+    return f"{act}; {describe_expected(stage)}"
 
 
 def describe_expected(stage: Stage) -> str:

@@ -7,7 +7,7 @@ still meant depends on all stages that expect the same, since these may be done 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 
 from roboirg.core.conditions import Fact, facts_of
@@ -38,22 +38,24 @@ def meant_objects(
     if len(subjects) <= 1:
         return frozenset({*subjects, stage.primitive.subject})
 
-    looks = {name: _look(name, scene) for name in subjects}
-    # How many objects of each look the stages take, less those that are done for good.
+    looks = {name: (scene[name].kind, scene[name].color) for name in subjects}
     still_needed: Counter[_Look] = Counter()
-    for other in stages:
-        if other.primitive.kind == stage.primitive.kind and _subjects(other) == subjects:
-            still_needed[looks[other.primitive.subject]] += 1
+    for name in _taken_in_any_order(stages, stage):
+        still_needed[looks[name]] += 1
     for fact in facts:
         if fact.traits.lasts:
             still_needed[looks[fact.subject]] -= 1
     return frozenset(name for name, look in looks.items() if still_needed[look] > 0)
 
 
-def _look(name: str, scene: Scene) -> _Look:
-    """Return what an object looks like: ``("cube", "red")``."""
-    item = scene[name]
-    return item.kind, item.color
+def _taken_in_any_order(stages: Sequence[Stage], stage: Stage) -> Iterator[str]:
+    """Yield what the oracle takes in each stage with the same movement and objects as a stage.
+
+    The stage itself is among them; they may be done in any order. A name may come several times.
+    """
+    for other in stages:
+        if other.primitive.kind == stage.primitive.kind and _subjects(other) == _subjects(stage):
+            yield other.primitive.subject
 
 
 def _subjects(stage: Stage) -> set[str]:

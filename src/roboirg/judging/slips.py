@@ -11,6 +11,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -54,6 +55,8 @@ class Slip(NamedTuple):
     subjects: frozenset[str]
 
 
+# Cached: what explains a failure asks for the slips of one replay again and again.
+@functools.lru_cache(maxsize=1)
 def find_slips(replay: EpisodeReplay) -> tuple[Slip, ...]:
     """Return all failed tries of the policy's turn, in the order of their steps."""
     slips = [
@@ -66,12 +69,12 @@ def find_slips(replay: EpisodeReplay) -> tuple[Slip, ...]:
     return tuple(slips)
 
 
-def drop_before(replay: EpisodeReplay, slips: Sequence[Slip], act: FactInterval) -> Slip | None:
+def drop_before(replay: EpisodeReplay, act: FactInterval) -> Slip | None:
     """Return the drop by which an object came to lie at a place; None if it was put there.
 
     A hand at rest that opens low over the place has aimed at it.
     """
-    for slip in slips:
+    for slip in find_slips(replay):
         is_recent = act.start - SETTLED_STEPS <= slip.step <= act.start
         if slip.failure == "dropped" and act.subject in slip.subjects and is_recent:
             facts_before = replay.facts[slip.step - 1]
@@ -86,9 +89,7 @@ def _is_carry_over(fact: Fact, act: Fact) -> bool:
     return fact.traits.role is FactRole.CARRY and act._replace(kind=fact.kind) == fact
 
 
-def unsteady_visit(
-    replay: EpisodeReplay, slips: Sequence[Slip], visit: FactInterval
-) -> Slip | None:
+def unsteady_visit(replay: EpisodeReplay, visit: FactInterval) -> Slip | None:
     """Return how an unsteady hand came to carry an object over a place that was not due.
 
     It wobbled: the object was over this place within the last `WOBBLE_STEPS`. Or it had missed the
@@ -98,14 +99,14 @@ def unsteady_visit(
         if visit.fact in facts:
             return Slip(visit.start, "misplaced", frozenset({visit.subject}))
     due_stage = replay.expected_stages[visit.start]
-    for slip in slips:
+    for slip in find_slips(replay):
         is_pass = slip.failure == "misplaced" and visit.subject in slip.subjects
         if is_pass and slip.step < visit.start and replay.expected_stages[slip.step] == due_stage:
             return slip
     return None
 
 
-def is_noticed(replay: EpisodeReplay, slip: Slip, slips: Sequence[Slip]) -> bool:
+def is_noticed(replay: EpisodeReplay, slip: Slip) -> bool:
     """Return whether the hands, after they missed something, next tried the same again.
 
     Missed the red cube, then took it: noticed. Missed it, then opened an empty hand at the bin,
@@ -115,7 +116,7 @@ def is_noticed(replay: EpisodeReplay, slip: Slip, slips: Sequence[Slip]) -> bool
     """
     if slip.failure not in MISSES:
         return False
-    later_acts = [act for act in _acts_and_tries(replay, slips) if act.step > slip.step]
+    later_acts = [act for act in _acts_and_tries(replay) if act.step > slip.step]
     next_act = min(later_acts, key=lambda act: act.step, default=None)
     if next_act is None or next_act.subjects.isdisjoint(slip.subjects):
         return False
@@ -132,14 +133,14 @@ class _Act(NamedTuple):
     subjects: frozenset[str]
 
 
-def _acts_and_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> Iterator[_Act]:
+def _acts_and_tries(replay: EpisodeReplay) -> Iterator[_Act]:
     """Yield all that the hands did or tried, with the objects it was about, in no order.
 
     An empty hand that opens is an act about no object.
     """
     for act in replay.started(FactRole.RAISE, FactRole.PRESS):
         yield _Act(act.start, frozenset({act.subject}))
-    for slip in slips:
+    for slip in find_slips(replay):
         yield _Act(slip.step, slip.subjects)
     for emptied in replay.tried("emptied"):
         yield _Act(emptied.start, frozenset())
@@ -151,25 +152,18 @@ def _missed_grasps(replay: EpisodeReplay) -> Iterator[Slip]:
     The fingers closed on nothing next to it, they held it for a while without lifting it, or they
     were at what is expected and did not close.
     """
-    missed = [*replay.tried("clutched"), *_fruitless_holds(replay)]
-    closing_steps = [interval.start for interval in missed]
-    closing_steps += [grip.start for grip in replay.started(FactRole.GRIP, after=0)]
-    missed += _idle_touches(replay, closing_steps)
-
+    missed = list(replay.tried("clutched"))
+    for hold in _holds_let_go(replay):
+        if not _lifts_during(replay, hold):
+            missed.append(hold)
+    closed = [*missed, *replay.started(FactRole.GRIP, after=0)]
+    missed += _idle_touches(replay, [interval.start for interval in closed])
     # Several objects that were missed at the same step are one try: it is not clear at which.
     names_by_step: dict[int, set[str]] = {}
     for interval in missed:
-        names = names_by_step.setdefault(interval.start, set())
-        names.add(interval.subject)
+        names_by_step.setdefault(interval.start, set()).add(interval.subject)
     for step, names in names_by_step.items():
         yield Slip(step, "missed_grasp", frozenset(names))
-
-
-def _fruitless_holds(replay: EpisodeReplay) -> Iterator[FactInterval]:
-    """Yield when the fingers held something that did not come up."""
-    for hold in _holds_let_go(replay):
-        if not _lifts_during(replay, hold):
-            yield hold
 
 
 def _idle_touches(replay: EpisodeReplay, closing_steps: Sequence[int]) -> Iterator[FactInterval]:
@@ -290,10 +284,8 @@ def _releases(replay: EpisodeReplay) -> Iterator[_Release]:
 
 def _is_lowered(replay: EpisodeReplay, name: str, step: int) -> bool:
     """Return whether the hand has lowered an object, to put it down, when it lets go."""
-    for lowered in replay.tried("lowered", name):
-        if lowered.start < step and lowered.lasts_until(step):
-            return True
-    return False
+    attempts = replay.tried("lowered", name)
+    return any(lowered.start < step and lowered.lasts_until(step) for lowered in attempts)
 
 
 def _has_landed(replay: EpisodeReplay, release: _Release) -> bool:

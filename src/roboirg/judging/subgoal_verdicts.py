@@ -57,12 +57,9 @@ def judge_subgoal(
         # To put the right thing somewhere else is another act, too, but not an unrelated one.
         return "wrong_place" if is_placing and said.is_placing else "lost"
 
-    index = episode.stages.index(due) if due in episode.stages else 0
-    right_things = meant_objects(episode.stages, index, episode.scene, facts)
-    right_targets = _places(due) if is_placing else right_things
-    if pointed_at is not None and _points_elsewhere(pointed_at, due, right_targets):
+    right_things = _right_things(due, episode, facts)
+    if pointed_at is not None and _points_elsewhere(pointed_at, due, right_things):
         return "wrong_place" if is_placing else "wrong_thing"
-
     if said.words == right.words:
         return "right"
     # A stage may point at nothing; None would stand for all that is inside of nothing.
@@ -128,13 +125,24 @@ class _Subgoal:
         return ordinal[1] != right_ordinal[1] and self.colors == right.colors
 
 
+def _right_things(due: Stage, episode: Episode, facts: AbstractSet[Fact]) -> frozenset[str]:
+    """Return the names of the objects with which the due stage can still rightly be completed."""
+    index = episode.stages.index(due) if due in episode.stages else 0
+    return meant_objects(episode.stages, index, episode.scene, facts)
+
+
 def _points_elsewhere(
-    pointed_at: Collection[str], due: Stage, right_targets: AbstractSet[str | None]
+    pointed_at: Collection[str], due: Stage, right_things: AbstractSet[str]
 ) -> bool:
-    """Return whether a point is at none of the objects at which the stage may point."""
+    """Return whether a point is at none of the objects at which the stage may point.
+
+    To place something, that is one of its places; for any other act, one of the right things.
+    """
     if due.points_at is None or due.points_at in pointed_at:
         return False
-    return right_targets.isdisjoint(pointed_at)
+    if due.primitive.kind not in HANDLES_HELD:
+        return right_things.isdisjoint(pointed_at)
+    return all(fact.place not in pointed_at for fact in facts_of(due.expects))
 
 
 def _judge_words(said: _Subgoal, right: _Subgoal, meant: Sequence[SceneObject]) -> SubgoalVerdict:
@@ -160,11 +168,6 @@ def _without_point(subgoal: str) -> str:
     words = " ".join(words.lower().split()).rstrip(".")
     words, _ = split_steps(words)
     return words
-
-
-def _places(stage: Stage) -> frozenset[str | None]:
-    """Return the places in what a stage expects."""
-    return frozenset(fact.place for fact in facts_of(stage.expects))
 
 
 def _objects(scene: Scene, names: Collection[str | None]) -> list[SceneObject]:

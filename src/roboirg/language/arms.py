@@ -205,19 +205,17 @@ def _scramble(episode: Episode, instruction: Instruction) -> Instruction:
     """
     words_by_utterance = [_content_words(utterance_text) for utterance_text in instruction.turns]
     words = list(itertools.chain.from_iterable(words_by_utterance))
+    text = instruction.text
     if len(set(words)) < 2:  # noqa: PLR2004
-        text = instruction.text
         raise InvalidValueError(f"The text of {episode.key} has no other order: {text!r}.")
-    rng = np.random.default_rng([episode.seed, zlib.crc32(instruction.text.encode())])
+    rng = np.random.default_rng([episode.seed, zlib.crc32(text.encode())])
     new_order = words
     while new_order == words:
         new_order = shuffled(rng, words)
+    next_words = iter(new_order)
     texts: list[str] = []
-    start = 0
     for utterance_words in words_by_utterance:
-        end = start + len(utterance_words)
-        texts.append(" ".join(new_order[start:end]))
-        start = end
+        texts.append(" ".join(itertools.islice(next_words, len(utterance_words))))
     return _with_texts(instruction, texts)
 
 

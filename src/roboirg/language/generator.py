@@ -14,7 +14,8 @@ from roboirg.core.instruction_options import InstructionOptions, WordKeywords, a
 from roboirg.core.word_pools import outside_words
 from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
 from roboirg.language.landmarks import FRAMES
-from roboirg.language.phrases import speak
+from roboirg.language.phrases import capitalized, mentions_in
+from roboirg.language.phrases import words_of as phrase_text
 from roboirg.language.request import (
     DISTRACTORS,
     MOST_DISTRACTORS,
@@ -204,11 +205,13 @@ def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> In
     utterances: list[Utterance] = []
     mentions: list[Mention] = []
     for index, (stage, phrase) in enumerate(spec.utterances):
+        text = phrase_text(phrase)
         # Whole sentences of a wording file stay as their author wrote them.
         is_as_written = stage == "command" and "command" in spec.notes
-        spoken = speak(index, stage, phrase, capitalize=not is_as_written)
-        utterances.append(spoken.utterance)
-        mentions += spoken.mentions
+        if not is_as_written:
+            text = capitalized(text)
+        utterances.append(Utterance(stage, text))
+        mentions += mentions_in(phrase, index)
     return Instruction(
         task=request.task.name,
         episode=request.episode.key,

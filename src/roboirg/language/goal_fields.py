@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 from roboirg.core.episode import Goal, values_in
@@ -37,6 +38,19 @@ def fields_of(goal: Goal, slot: str) -> Iterator[tuple[str, str | int]]:
         return
     for position, value in enumerate(values_in(content)):
         yield f"{slot}.{position}", value
+
+
+def in_every_order(goal: Goal) -> Iterator[Goal]:
+    """Yield a goal once for each order of its colors with their counts, which means nothing.
+
+    *2 red and 1 blue* is also yielded as *1 blue and 2 red*. A goal without counts has one order.
+    """
+    if "counts" not in goal.as_mapping():
+        yield goal
+        return
+    for amounts in itertools.permutations(goal.amounts):
+        colors, counts = zip(*amounts, strict=True)  # of pairs such as ("red", 2)
+        yield Goal.of(colors=colors, counts=counts)
 
 
 def unordered(goal: Goal) -> Goal:

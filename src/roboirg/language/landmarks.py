@@ -48,21 +48,6 @@ PAIRED: tuple[ObjectKind, ...] = ("box", "tape")
 """Kinds of objects that always come in pairs."""
 
 
-class Landmark(NamedTuple):
-    """Words for a place that single out one object of its kind.
-
-    Attributes:
-        phrase: words after the noun: "the cube *farthest to your left*".
-        is_sided: whether the words name left or right, so that the frame matters.
-        is_in_depth: whether they order objects from near to far, *closest to you*: by depth, and
-            perhaps not by distance.
-    """
-
-    phrase: str
-    is_sided: bool = False
-    is_in_depth: bool = False
-
-
 class Ranking(NamedTuple):
     """An order of objects by a quantity, the largest first.
 
@@ -104,19 +89,22 @@ class Ranking(NamedTuple):
 
 
 class Selector(NamedTuple):
-    """A landmark and its meaning: which of some objects its words single out.
+    """A landmark, words for a place, and its meaning: which of some objects it singles out.
 
     Attributes:
-        landmark: the words, *second from your left*.
+        phrase: the words after the noun: "the cube *second from your left*".
         rankings: the orders that the words can mean; they single out an object only if all agree.
         candidates: the objects that are compared.
         rank: which of the order is meant, from 0.
+        is_in_depth: whether the words order objects from near to far, *closest to you*: by depth,
+            and perhaps not by distance.
     """
 
-    landmark: Landmark
+    phrase: str
     rankings: tuple[Ranking, ...]
     candidates: tuple[SceneObject, ...]
     rank: int = 0
+    is_in_depth: bool = False
 
     def select(self) -> SceneObject | None:
         """Return the object that the landmark singles out; None if it is unclear."""
@@ -255,17 +243,16 @@ def _column(item: SceneObject) -> float:
 def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
     """Yield the words for the first thing in each of the four directions: *closest to you*."""
     for direction in directions(frame):
-        is_sided = bool(direction.side)
-        landmark = Landmark(direction.extreme, is_sided, is_in_depth=not is_sided)
-        yield Selector(landmark, (direction.ranking,), candidates)
+        is_in_depth = not direction.side
+        ranking = (direction.ranking,)
+        yield Selector(direction.extreme, ranking, candidates, is_in_depth=is_in_depth)
 
 
 def _sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
     """Yield the words for the two things of a pair by their sides: *on your left*."""
     owner = "your" if frame == "robot" else "the camera's"
     for direction in sideways(frame):
-        landmark = Landmark(f"on {owner} {direction.side}", is_sided=True)
-        yield Selector(landmark, (direction.ranking,), candidates)
+        yield Selector(f"on {owner} {direction.side}", (direction.ranking,), candidates)
 
 
 def corner_rankings(depth: str, side: str) -> tuple[Ranking, ...]:
@@ -290,9 +277,9 @@ def _far_sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Se
     if frame != "robot":
         return
     for direction in sideways(frame):
-        landmark = Landmark(f"at your far {direction.side}", is_sided=True)
+        phrase = f"at your far {direction.side}"
         corners = corner_rankings("far", direction.side)
-        yield Selector(landmark, (direction.ranking, *corners), candidates)
+        yield Selector(phrase, (direction.ranking, *corners), candidates)
 
 
 def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
@@ -310,7 +297,7 @@ def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sele
             else:
                 phrase = f"closest to the camera's {side} corner {depth_word} the robot"
                 rankings = corner_rankings(depth, robot_side)
-            yield Selector(Landmark(phrase, is_sided=True), rankings, candidates)
+            yield Selector(phrase, rankings, candidates)
 
 
 def _in_rows(
@@ -332,11 +319,10 @@ def _in_rows(
         if rank > len(candidates) - 2:
             continue
         for direction in directions(frame):
-            is_sided = bool(direction.side)
+            phrase = f"{ordinal} {direction.rank}"
             # *Fourth closest* is not counted as depth: `places` would leave it out.
-            is_in_depth = not is_sided and rank not in FOURTH
-            landmark = Landmark(f"{ordinal} {direction.rank}", is_sided, is_in_depth)
-            yield Selector(landmark, (direction.ranking,), candidates, rank)
+            is_in_depth = not direction.side and rank not in FOURTH
+            yield Selector(phrase, (direction.ranking,), candidates, rank, is_in_depth)
 
 
 def fixtures_in(scene: Scene) -> list[SceneObject]:
@@ -352,10 +338,8 @@ def _by_fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[
     """
     for fixture in fixtures_in(scene):
         near = nearness(fixture.position)
-        closest = Landmark(f"closest to the {fixture.kind}")
-        yield Selector(closest, (near,), candidates)
-        farthest = Landmark(f"farthest from the {fixture.kind}")
-        yield Selector(farthest, (near.opposite,), candidates)
+        yield Selector(f"closest to the {fixture.kind}", (near,), candidates)
+        yield Selector(f"farthest from the {fixture.kind}", (near.opposite,), candidates)
 
 
 def alone_in_color(things: Sequence[SceneObject]) -> list[SceneObject]:
@@ -367,8 +351,8 @@ def alone_in_color(things: Sequence[SceneObject]) -> list[SceneObject]:
 def _by_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
     """Yield words for the thing nearest to the only cube of a color, *the red cube*."""
     for anchor in alone_in_color(candidates):
-        landmark = Landmark(f"closest to the {anchor.color} cube")
-        yield Selector(landmark, (nearness(anchor.position),), _without(candidates, anchor))
+        phrase = f"closest to the {anchor.color} cube"
+        yield Selector(phrase, (nearness(anchor.position),), _without(candidates, anchor))
 
 
 def _by_neighbors(
@@ -399,9 +383,8 @@ def _by_neighbors(
         # The last one in a row is not called "second nearest".
         if rank and rank >= len(others) - 1:
             continue
-        words = f"{nearest} to the {noun} {selector.landmark.phrase}"
-        landmark = Landmark(words, selector.landmark.is_sided)
-        yield Selector(landmark, (nearness(anchor.position),), others, rank)
+        phrase = f"{nearest} to the {noun} {selector.phrase}"
+        yield Selector(phrase, (nearness(anchor.position),), others, rank)
 
 
 def _without(candidates: Sequence[SceneObject], anchor: SceneObject) -> tuple[SceneObject, ...]:

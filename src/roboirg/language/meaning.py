@@ -10,16 +10,16 @@ with their margins; the goal of the episode is never read.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from roboirg.core.episode import Episode, Goal, SceneObject
 from roboirg.language.clues import event_clues, thing_clues
+from roboirg.language.goal_fields import in_every_order
 from roboirg.language.instruction import Described, Meaning, Term
 from roboirg.language.landmarks import candidates_in, things_of_color
 from roboirg.language.number_words import agreeing_number
 from roboirg.language.places import things_at
-from roboirg.language.request import GoalValues, values_of_goal
+from roboirg.language.request import values_of_goal
 from roboirg.tasks import get_task, goals_of
 
 Value = str | int
@@ -105,8 +105,8 @@ def _can_be_meant(goal: Goal, possible: Mapping[str, Values], meaning: Meaning) 
         return False
     # Without words about the goal, or with "Put them into the bin", any number of colors fits.
     may_have_other_fields = not meaning.terms or ("counts.0" in meaning.terms and not possible)
-    for values in _in_every_order(goal):
-        value_by_field = {value.field: value.value for value in values}
+    for ordered_goal in in_every_order(goal):
+        value_by_field = {value.field: value.value for value in values_of_goal(ordered_goal)}
         if not may_have_other_fields and value_by_field.keys() != meaning.terms.keys():
             continue  # it asks for two containers, and the words for one
         if _has_values(value_by_field, possible) and _agrees(value_by_field, meaning.agrees):
@@ -142,19 +142,6 @@ def _agrees(value_by_field: Mapping[str, Value], is_singular_by_slot: Mapping[st
         if number and goal_is_single != is_single:
             return False
     return True
-
-
-def _in_every_order(goal: Goal) -> Iterator[GoalValues]:
-    """Yield the values of a goal once for each order of its amounts, which means nothing.
-
-    *2 red and 1 blue* is also yielded as *1 blue and 2 red*. A goal without counts has one order.
-    """
-    if "counts" not in dict(goal.slots):
-        yield values_of_goal(goal)
-        return
-    for amounts in itertools.permutations(goal.amounts):
-        colors, counts = zip(*amounts, strict=True)  # of pairs such as ("red", 2)
-        yield values_of_goal(Goal.of(colors=colors, counts=counts))
 
 
 def _term_values(term: Term, field: str, episode: Episode) -> Values:

@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from roboirg.language.instruction import (
-    Expression,
-    Mention,
-    Role,
-    Utterance,
-    UtteranceStage,
-)
+from roboirg.language.instruction import Expression, Mention, Role
 
 _FIELD = re.compile(r"\{(?P<name>[a-z_.0-9]+)\}")
 
@@ -127,45 +121,26 @@ def listed(phrases: Sequence[Phrase], joint: str = "and") -> Phrase:
     return tuple(pieces)
 
 
-class Spoken(NamedTuple):
-    """An utterance written out, and the mentions of values in it, in order."""
-
-    utterance: Utterance
-    mentions: tuple[Mention, ...]
-
-
 def words_of(phrase: Phrase) -> str:
     """Return the words of a phrase as a text, without its tags."""
     return "".join(piece.text for piece in phrase)
 
 
-def speak(index: int, stage: UtteranceStage, phrase: Phrase, *, capitalize: bool = True) -> Spoken:
-    """Return a phrase as an utterance, with a mention for each piece of text that has a tag.
+def mentions_in(phrase: Phrase, utterance: int) -> Iterator[Mention]:
+    """Yield a mention for each piece of a phrase that has a tag, in order.
 
-    A mention has its first and last characters in the utterance. Of *Lift it*, in which *it* has a
-    tag, it starts at 5 and ends at 7.
-
-    Args:
-        index: number of the utterance in the instruction.
-        stage: its part in the text.
-        phrase: its words with their tags.
-        capitalize: whether each sentence gets a capital letter; no characters are added or removed,
-            so the mentions stay right.
+    A mention has its first and last characters in the text of the phrase. Of *Lift it*, in which
+    *it* has a tag, it starts at 5 and ends at 7. `utterance` is the number of the utterance.
     """
-    mentions: list[Mention] = []
     start = 0
     for piece in phrase:
         end = start + len(piece.text)
         if piece.tag is not None:
-            mentions.append(Mention(index, start, end, *piece.tag))
+            yield Mention(utterance, start, end, *piece.tag)
         start = end
-    text = words_of(phrase)
-    if capitalize:
-        text = _capitalized(text)
-    return Spoken(Utterance(stage, text), tuple(mentions))
 
 
-def _capitalized(text: str) -> str:
+def capitalized(text: str) -> str:
     """Return a text with a capital letter at the beginning of every sentence.
 
     It has as many characters as before, since mentions are positions in it.

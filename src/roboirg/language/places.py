@@ -127,11 +127,10 @@ def _landmarks(scene: Scene, kind: ObjectKind, frame: Frame) -> Iterator[SpokenP
     """
     is_paired = kind in PAIRED
     for selector in selectors(scene, kind, frame):
-        landmark = selector.landmark
-        if landmark.is_in_depth:
+        if selector.is_in_depth:
             continue  # it may be wrong by distance
-        spot = landmark.phrase if is_paired else None
-        yield from _place_if_any(PlaceClass.UNUSUAL, selector.select(), landmark.phrase, spot)
+        spot = selector.phrase if is_paired else None
+        yield from _place_if_any(PlaceClass.UNUSUAL, selector.select(), selector.phrase, spot)
 
 
 def _places_of(scene: Scene, things: Things, frame: Frame) -> Iterator[SpokenPlace]:
@@ -157,7 +156,7 @@ def things_at(scene: Scene, kind: ObjectKind, frame: Frame) -> Mapping[str, Scen
     """
     found: dict[str, SceneObject | None] = {}
     for selector in selectors(scene, kind, frame):
-        found[selector.landmark.phrase] = selector.select()
+        found[selector.phrase] = selector.select()
     for place in spoken_places(scene, kind, frame):
         for words in (place.attributive, place.spot):
             if words is not None:
@@ -353,21 +352,31 @@ def _in_direction(
     """
     yield from _place_if_any(PlaceClass.EXTREME, ranking.select(things, 0), words.most)
 
-    # The first one is "on the far left" if it is well ahead of all others, and far from the center.
-    wide_ranking = ranking._replace(margin=_CLEAR_MARGINS * ranking.margin)
     past_center = _distance_past(_center_of(things), ranking)
-    thing_ahead = wide_ranking.select(things, 0)
-    margins = _FAR_MARGINS if len(things) > 1 else _FAR_MARGINS_ALONE
-    if thing_ahead is not None and past_center.quantity(thing_ahead) >= ranking.margin * margins:
-        yield from _place_if_any(PlaceClass.EXTREME, thing_ahead, None, words.far)
+    thing_ahead = _far_ahead(things, ranking, past_center)
+    yield from _place_if_any(PlaceClass.EXTREME, thing_ahead, None, words.far)
 
     # The only one past the center is simply "on the left".
-    thing_alone = _only_beyond(things, past_center, wide_ranking.margin)
+    thing_alone = _only_beyond(things, past_center, _CLEAR_MARGINS * ranking.margin)
     if _is_past_work_center(thing_alone, ranking):
         yield from _place_if_any(PlaceClass.EXTREME, thing_alone, words.alone, words.spot)
 
     if words.row is not None:
         yield from _in_row(things, words, ranking)
+
+
+def _far_ahead(things: Things, ranking: Ranking, past_center: Ranking) -> SceneObject | None:
+    """Return the thing that is *on the far left*: well ahead of all others, far from the center.
+
+    None if there is none. Both rankings are from left to right; the quantity of `past_center` is
+    how far things are past the center.
+    """
+    wide_ranking = ranking._replace(margin=_CLEAR_MARGINS * ranking.margin)
+    thing = wide_ranking.select(things, 0)
+    margins = _FAR_MARGINS if len(things) > 1 else _FAR_MARGINS_ALONE
+    if thing is None or past_center.quantity(thing) < ranking.margin * margins:
+        return None
+    return thing
 
 
 def _in_row(things: Things, words: _DirectionWords, ranking: Ranking) -> Iterator[SpokenPlace]:
@@ -513,7 +522,13 @@ class _Corner(NamedTuple):
         The quantity is the lesser of two: how far a thing is past the center toward the corner's
         depth, and toward its side. It is negative outside of the quarter.
         """
-        return _lesser_of(_distance_past(center, self.along), _distance_past(center, self.across))
+        along = _distance_past(center, self.along)
+        across = _distance_past(center, self.across)
+        # A wide margin: what is hardly outside of a quarter may still pass for being in it.
+        return Ranking(
+            lambda thing: min(along.quantity(thing), across.quantity(thing)),
+            _CLEAR_MARGINS * MARGIN,
+        )
 
 
 def _corners(things: Things) -> Iterator[SpokenPlace]:
@@ -555,19 +570,6 @@ def _at_corner(things: Things, corner: _Corner) -> Iterator[SpokenPlace]:
         # One thing alone on the table stands in no corner.
         spot = words if len(things) > 1 else None
         yield SpokenPlace(PlaceClass.CORNER, nearest, words, spot)
-
-
-def _lesser_of(along: Ranking, across: Ranking) -> Ranking:
-    """Return the order of things by the lesser of two quantities, the largest first.
-
-    Its margin is twice as large, 6 cm, since what is hardly outside of a quarter may still pass for
-    being in it.
-    """
-
-    def lesser(thing: SceneObject) -> float:
-        return min(along.quantity(thing), across.quantity(thing))
-
-    return Ranking(lesser, _CLEAR_MARGINS * MARGIN)
 
 
 def _on_sides(things: Things, scene: Scene) -> Iterator[SpokenPlace]:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, cast
 
 from roboirg.core.episode import (
-    Color,
     Episode,
     Goal,
     Scene,
@@ -138,10 +137,6 @@ class InstructionRequest:
         """
         return _alternatives(self.task.name, self.episode.scene, self.episode.goal, slot)
 
-    def alternative_numbers(self, slot: str) -> tuple[tuple[int, ...], ...]:
-        """Return the alternatives of a slot of numbers: ``((1,), (2,), (3,))`` for ``repeats``."""
-        return tuple(tuple(map(int, content)) for content in self.alternatives(slot))
-
     @property
     def shows_color(self) -> bool:
         """Whether the video gives the goal's color away.
@@ -161,10 +156,6 @@ class InstructionRequest:
     def scene_colors(self) -> tuple[str, ...]:
         """The colors that goals of this scene can have, in the order of the task's vocabulary."""
         return _scene_colors(self.task.name, self.episode.scene)
-
-    def other_colors(self, color: str) -> tuple[Color, ...]:
-        """Return the colors that the task knows, in the scene or not, without this one."""
-        return tuple(other for other in self.task.things.colors if other != color)
 
     def objects_to_point_at(self, color: GoalValue) -> tuple[SceneObject, ...]:
         """Return the cubes of a color, or the containers over them, if the task has such."""

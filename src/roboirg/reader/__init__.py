@@ -11,7 +11,6 @@ scene's goals (`constraints`).
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -61,7 +60,7 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
     Raises:
         UnknownNameError: there is no such task.
     """
-    goals = _possible_goals(scene, task)
+    goals = get_task(task).goals(scene)
     command, remarks = _split_off_command(split_sentences(text))
     unread = [sentence for sentence in command if not sentence.is_command]
     clauses: list[Clause] = []
@@ -69,6 +68,16 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         clauses += sentence.clauses
     if unread or not _ask_for_something(clauses):
         return _without_goals(unread)
+    return _interpret_clauses(clauses, remarks, goals, scene)
+
+
+def _interpret_clauses(
+    clauses: Sequence[Clause], remarks: Iterable[Sentence], goals: Sequence[Goal], scene: Scene
+) -> Interpretation:
+    """Return which of some goals of a scene fit the clauses of a command, all of which were read.
+
+    `remarks` are the sentences before the command.
+    """
     # "Lift it." means once only if nothing before it says how often.
     once_by_default = not any(map(_speaks_of_number, remarks))
     try:
@@ -110,12 +119,6 @@ class _SplitText(NamedTuple):
     remarks: list[Sentence]
 
 
-@functools.lru_cache(maxsize=64)
-def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
-    # Cached, because a scene is read about in many settings.
-    return get_task(task).goals(scene)
-
-
 def _split_off_command(sentences: Sequence[Sentence]) -> _SplitText:
     """Return a text as its command, the last sentences that ask for something, and its remarks.
 
@@ -138,47 +141,31 @@ def _split_off_command(sentences: Sequence[Sentence]) -> _SplitText:
 
         # This sentence has words that are not read: the command begins after it or in it.
         remarks = list(sentences[:position])
-        if not command:
-            lead_in = _split_at_colon(words)
-            after_colon = parse_sentence(lead_in.command)
-            if lead_in.remark and after_colon.is_command:
-                return _SplitText([after_colon], [*remarks, lead_in.remark])
+        after_colon = None if command else _command_after_colon(words)
+        if after_colon is not None:
+            remark = words[: -len(after_colon) - 1]
+            return _SplitText([parse_sentence(after_colon)], [*remarks, remark])
         if not command or parsed.is_like_command:
             command.insert(0, parsed)
         return _SplitText(command, [*remarks, words])
     return _SplitText(command, [])
 
 
-class _LeadIn(NamedTuple):
-    """A sentence as the words before its last colon, empty without one, and the command after it.
+def _command_after_colon(words: Sentence) -> Sentence | None:
+    """Return the words after the last colon of a sentence if they are a command; else None.
 
-    *my task for you : lift the cube* has the remark *my task for you*.
+    *My task for you: lift the red cube* -> *lift the red cube*. None also if there is a color
+    before the colon that the command does not repeat, *the red one: lift it*, as the words before
+    would be part of what is asked.
     """
-
-    remark: Sentence
-    command: Sentence
-
-
-def _split_at_colon(words: Sentence) -> _LeadIn:
-    """Return a sentence as the words before its last colon, a remark, and the command after it.
-
-    *My task for you: lift the red cube* is split at the colon. A sentence without a colon is all
-    command. So is one with a color before the colon that the words after it do not repeat, *the red
-    one: lift it*, as the remark would be part of what is asked.
-    """
-    unsplit = _LeadIn((), words)
-    if ":" not in words:
-        return unsplit
-    colon = len(words) - 1
-    while words[colon] != ":":
-        colon -= 1
-    remark = words[:colon]
+    if ":" not in words[1:]:
+        return None
+    colon = len(words) - 1 - words[::-1].index(":")
     command = words[colon + 1 :]
-    colors = {color_of(word.removesuffix("'s")) for word in remark}
+    colors = {color_of(word.removesuffix("'s")) for word in words[:colon]}
     colors.discard(None)  # of words that are no color
-    if not colors.issubset(map(color_of, command)):
-        return unsplit
-    return _LeadIn(remark, command)
+    is_repeated = colors.issubset(map(color_of, command))
+    return command if is_repeated and parse_sentence(command).is_command else None
 
 
 def _speaks_of_number(words: Iterable[str]) -> bool:

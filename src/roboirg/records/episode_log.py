@@ -145,7 +145,7 @@ def logged_output(path: Path, limit: int = MAX_LOG_BYTES) -> Iterator[None]:
         RoboIRGError: the file cannot be created.
     """
     with EpisodeLog(path, limit) as log, contextlib.ExitStack() as undo:
-        _flush()
+        flush_streams()
         for descriptor in _DESCRIPTORS:
             original = os.dup(descriptor)
             undo.callback(_restore, original, descriptor)
@@ -155,11 +155,11 @@ def logged_output(path: Path, limit: int = MAX_LOG_BYTES) -> Iterator[None]:
             if isinstance(stream, io.TextIOWrapper):
                 undo.callback(_set_line_buffering, stream, stream.line_buffering)
                 _set_line_buffering(stream, True)
-        undo.callback(_flush)
+        undo.callback(flush_streams)
         yield
 
 
-def _flush() -> None:
+def flush_streams() -> None:
     """Write what Python still holds of stdout and stderr."""
     for stream in (sys.stdout, sys.stderr):
         # A policy may have closed or replaced them.

@@ -37,25 +37,9 @@ from roboirg.records.store import RecordStore, StoredRun, check_same
 from roboirg.util.regular_file import read_regular
 
 
-class MergeSummary(NamedTuple):
-    """Result of a merge.
-
-    Attributes:
-        added: number of records added to the folder.
-        duplicates: number of records whose episode was already there.
-        conflicts: duplicates with another verdict than the one kept.
-        warnings: what is mixed in the folder, in sentences.
-    """
-
-    added: int
-    duplicates: int
-    conflicts: tuple[Summary, ...]
-    warnings: tuple[str, ...] = ()
-
-
 @dataclass
-class _Destination:
-    """Which results a merge has kept so far, and counts of those that it has seen.
+class Merge:
+    """A merge: which results it has kept so far, and counts of those that it has seen.
 
     Attributes:
         kept: the results of the merged run, by identity of their episodes.
@@ -68,6 +52,11 @@ class _Destination:
     added: int = 0
     duplicates: int = 0
     conflicts: list[Summary] = field(default_factory=list)
+
+    def warnings(self) -> list[str]:
+        """Return what is mixed in the merged run, in sentences."""
+        # Other arms are controls, in which words or seeds differ on purpose.
+        return mixtures([result for result in self.kept.values() if result.arm == TOLD])
 
     def keep_new(self, results: Iterable[Summary]) -> list[Summary]:
         """Keep results of one run; return those that must be copied into the merged run.
@@ -93,7 +82,7 @@ class _Destination:
         return taken
 
 
-def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
+def merge_runs(folders: Sequence[Path], out: Path) -> Merge:
     """Copy the records, videos and logs of several runs into one folder.
 
     If several runs have the same episode, the first verdict (success or failure) is kept; a verdict
@@ -116,15 +105,11 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
     with RecordStore(out) as store:
         _keep_plans(folders, out)
         _check_versions([(out, store.stored.values()), *results])
-        merged = _Destination(dict(store.stored))
+        merged = Merge(dict(store.stored))
         for folder, run in runs:
             taken = merged.keep_new(run.newest)
             store.extend(_copied_lines(run, taken, folder, out))
-    # Other arms are controls, in which words or seeds differ on purpose.
-    usual = [result for result in merged.kept.values() if result.arm == TOLD]
-    return MergeSummary(
-        merged.added, merged.duplicates, tuple(merged.conflicts), tuple(mixtures(usual))
-    )
+    return merged
 
 
 def _keep_plans(folders: Sequence[Path], out: Path) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-import re
 import tempfile
 import zipfile
 from collections.abc import Collection, Iterator
@@ -24,9 +23,8 @@ from roboirg.records.film import VIDEO_FOLDER
 from roboirg.records.record_codec import StoreError
 from roboirg.records.run_files import (
     EARLIER_PLANS,
-    MOST_PATH_LETTERS,
     PLAN_FILE,
-    RELATIVE_PATH,
+    is_relative,
 )
 from roboirg.records.store import RECORDS_FILE
 from roboirg.util.regular_file import open_regular
@@ -144,12 +142,10 @@ def _unpack(archive: zipfile.ZipFile, path: Path, folder: Path, folders: Collect
     entries = [entry for entry in archive.infolist() if entry.filename != MANIFEST]
     if sorted(entry.filename for entry in entries) != sorted(digests):
         raise StoreError(f"{path} does not hold exactly the files that its manifest names.")
+    for name in digests:
+        _check_name(name, path)
     unwanted = {*PACKED_FOLDERS} - {*folders}
-    wanted: list[zipfile.ZipInfo] = []
-    for entry in entries:
-        _check_name(entry.filename, path)
-        if _top_folder(entry.filename) not in unwanted:
-            wanted.append(entry)
+    wanted = [entry for entry in entries if _top_folder(entry.filename) not in unwanted]
     if sum(entry.file_size for entry in wanted) > MOST_PACKED_BYTES:
         raise StoreError(f"{path} unpacks to more than {MOST_PACKED_BYTES >> 30} GiB.")
     for entry in wanted:
@@ -190,8 +186,7 @@ def _check_name(name: str, path: Path) -> None:
     """
     known_folders = (EARLIER_PLANS, *PACKED_FOLDERS)
     is_known = name in (RECORDS_FILE, PLAN_FILE) or _top_folder(name) in known_folders
-    is_safe = len(name) <= MOST_PATH_LETTERS and re.fullmatch(RELATIVE_PATH, name) is not None
-    if not is_known or not is_safe:
+    if not is_known or not is_relative(name):
         shown = printable(name[:_MOST_SHOWN])
         raise StoreError(f"{path} holds {shown!r}, which does not belong to a run.")
 

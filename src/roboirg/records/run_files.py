@@ -52,8 +52,7 @@ def run_file(folder: Path, name: str) -> Path:
         ForeignPathError: it is outside of the run's folder, perhaps by a symbolic link.
     """
     path = folder / name
-    is_valid = len(name) <= MOST_PATH_LETTERS and re.fullmatch(RELATIVE_PATH, name)
-    if not is_valid or not _is_below(path, folder):
+    if not is_relative(name) or not _is_below(path, folder):
         shown = printable(name[:MOST_PATH_LETTERS])
         raise ForeignPathError(
             f"{shown!r} is not a file below {folder}: its name is longer than "
@@ -61,6 +60,11 @@ def run_file(folder: Path, name: str) -> Path:
             "or a link leads elsewhere."
         )
     return path
+
+
+def is_relative(name: str) -> bool:
+    """Return whether a name can be that of a file below a folder: ``logs/a.txt``, not ``../x``."""
+    return len(name) <= MOST_PATH_LETTERS and re.fullmatch(RELATIVE_PATH, name) is not None
 
 
 def refuse_links(folder: Path) -> None:
@@ -72,14 +76,14 @@ def refuse_links(folder: Path) -> None:
         ForeignPathError: there is a symbolic link, a pipe or a device, or a file in the folder has
             another name, too (a hard link). The folder itself may be a link.
     """
-    for path in folder.glob("*"):  # nothing if there is no folder yet
-        is_written = path.is_file() and path.name != PLAN_FILE
-        if is_written and path.stat().st_nlink > 1:
+    for path in folder.rglob("*"):  # nothing if there is no folder yet
+        # Files below are replaced, and so is the plan: a hard link keeps what it has.
+        is_appended_to = path.parent == folder and path.name != PLAN_FILE and path.is_file()
+        if is_appended_to and path.stat().st_nlink > 1:
             raise ForeignPathError(
                 f"{path} has another name elsewhere (a hard link), where a run would change it, "
                 "too; put a copy in its place."
             )
-    for path in folder.rglob("*"):
         if path.exists() and not (path.is_file() or path.is_dir()):
             raise ForeignPathError(f"{path} is neither a file nor a folder; remove it.")
         if path.is_symlink():

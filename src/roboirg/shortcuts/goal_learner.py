@@ -16,7 +16,7 @@ from __future__ import annotations
 import itertools
 import warnings
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, cast, get_args
 
@@ -24,7 +24,12 @@ from roboirg.core.episode import Episode, Goal, values_in
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.extras import extra_needed
 from roboirg.language.instruction import Instruction, hidden_slots
-from roboirg.shortcuts.goal_vocabulary import SlotVocabulary, Value, goal_vocabulary
+from roboirg.shortcuts.goal_vocabulary import (
+    GoalVocabulary,
+    SlotVocabulary,
+    Value,
+    goal_vocabulary,
+)
 from roboirg.shortcuts.named_values import marked_text, named_values, stated_values
 from roboirg.shortcuts.scene_facts import SceneFacts, scene_facts
 from roboirg.shortcuts.surface_rules import Candidates, certain
@@ -91,18 +96,27 @@ class LearnerInput(NamedTuple):
         whose values are not all mentioned has no candidates.
         """
         episode, instruction = instructed
-        introduced = cast("Mapping[str, list[Value]]", instruction.metadata["candidates"])
-        # An antecedent introduces what the command refers back to.
-        antecedents = [
-            mention.value for mention in instruction.mentions if mention.role == "antecedent"
-        ]
-        candidates: dict[str, tuple[Value, ...]] = {}
-        for slot, values in introduced.items():
-            mentioned = [value for value in antecedents if value in values]
-            each_once = tuple(dict.fromkeys(mentioned))
-            if len(each_once) == len(values):
-                candidates[slot] = each_once
+        candidates = _candidates_in(instruction)
         return cls(instruction.text, open_slots(instructed), candidates, scene_facts(episode.scene))
+
+
+def _candidates_in(instruction: Instruction) -> dict[str, tuple[Value, ...]]:
+    """Return the values that a text introduces on equal terms, by slot, in the order of mention.
+
+    *Red or blue? …* -> ``{"color": ("red", "blue")}``. A slot whose values are not all mentioned is
+    left out.
+    """
+    introduced = cast("Mapping[str, list[Value]]", instruction.metadata["candidates"])
+    # An antecedent introduces what the command refers back to.
+    antecedents: dict[Value, None] = {}  # each once, in order
+    for mention in instruction.mentions:
+        if mention.role == "antecedent":
+            antecedents[mention.value] = None
+    candidates: dict[str, tuple[Value, ...]] = {}
+    for slot, values in introduced.items():
+        if antecedents.keys() >= set(values):
+            candidates[slot] = tuple(value for value in antecedents if value in values)
+    return candidates
 
 
 def open_slots(instructed: InstructedEpisode) -> frozenset[str]:
@@ -144,13 +158,9 @@ class GoalLearner:
         validation_examples = _examples(validation)
         # By slot, a learner for each value that the slot may hold: the first color, the second.
         self._learners: dict[str, list[_ValueLearner]] = {}
-        for slot, vocabulary in self._vocabulary.items():
-            self._learners[slot] = [
-                _ValueLearner(
-                    _SlotPosition(slot, index, vocabulary), training_examples, validation_examples
-                )
-                for index in range(vocabulary.longest)
-            ]
+        for position in _positions(self._vocabulary):
+            learner = _ValueLearner(position, training_examples, validation_examples)
+            self._learners.setdefault(position.slot, []).append(learner)
 
     def guesses(self, floor: LearnedFloor, inputs: Sequence[LearnerInput]) -> list[TextGuess]:
         """Return the goal that a floor guesses for each of some instructions of the task.
@@ -160,26 +170,28 @@ class GoalLearner:
         read from it, unless the floor sees no words; models predict all others.
         """
         guesses: list[dict[str, tuple[Candidates, ...]]] = [{} for _ in inputs]
-        for slot, learners in self._learners.items():
-            # The values of all instructions at once, which is faster: a list for each position.
-            predictions = [learner.predict(floor, inputs) for learner in learners]
-            for number, given in enumerate(inputs):
-                values = self._stated(floor, given, slot)
-                if not values:
-                    values = _without_none(position[number] for position in predictions)
-                guesses[number][slot] = tuple(certain(values))
+        for slot in self._learners:
+            slot_values = self._guessed_values(floor, inputs, slot)
+            for guess, values in zip(guesses, slot_values, strict=True):
+                guess[slot] = tuple(certain(values))
         return list(guesses)
+
+    def _guessed_values(
+        self, floor: LearnedFloor, inputs: Sequence[LearnerInput], slot: str
+    ) -> Iterator[tuple[Value, ...]]:
+        """Yield the values of a slot that a floor guesses for each instruction, in order."""
+        # All instructions at once, which is faster: a list for each position of the slot.
+        predictions = [learner.predict(floor, inputs) for learner in self._learners[slot]]
+        for given, predicted in zip(inputs, zip(*predictions, strict=True), strict=True):
+            stated = self._stated(floor, given, slot)
+            # None predicts that the goal has no such value.
+            yield stated or tuple(value for value in predicted if value is not None)
 
     def _stated(self, floor: LearnedFloor, given: LearnerInput, slot: str) -> tuple[Value, ...]:
         """Return the values of a slot that a command states; none if the floor sees no words."""
         if slot in given.open_slots or "words" not in _VIEWS_OF_FLOOR[floor]:
             return ()
         return stated_values(given.text, slot, self._vocabulary[slot])
-
-
-def _without_none(values: Iterable[Value | None]) -> tuple[Value, ...]:
-    """Return the values that are there, without None for those that a goal does not have."""
-    return tuple(value for value in values if value is not None)
 
 
 class _Example(NamedTuple):
@@ -217,6 +229,13 @@ class _SlotPosition(NamedTuple):
     def open_in(self, examples: Sequence[_Example]) -> list[_Example]:
         """Return the examples whose command does not state the slot."""
         return [example for example in examples if self.slot in example.given.open_slots]
+
+
+def _positions(vocabulary: GoalVocabulary) -> Iterator[_SlotPosition]:
+    """Yield every value that a goal may have, slot by slot: the first color, the second."""
+    for slot, slot_vocabulary in vocabulary.items():
+        for index in range(slot_vocabulary.longest):
+            yield _SlotPosition(slot, index, slot_vocabulary)
 
 
 class _ValueLearner:
@@ -280,7 +299,7 @@ class _ValueLearner:
         Its inputs are what the view of the model shows of them.
         """
         labels = [self._label(spec.view, example) for example in examples]
-        features = self._model_inputs(spec.view, [example.given for example in examples])
+        features = [self._model_input(spec.view, example.given) for example in examples]
         model = _unfitted_model(spec, is_constant=len(set(labels)) == 1)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that an iteration more would be better
@@ -291,12 +310,10 @@ class _ValueLearner:
 
         None predicts that the goal has no such value.
         """
-        labels = self._models[spec].predict(self._model_inputs(spec.view, inputs))
+        features = [self._model_input(spec.view, given) for given in inputs]
+        labels = self._models[spec].predict(features)
         pairs = zip(inputs, labels, strict=True)
         return [self._value_of_label(spec.view, given, label) for given, label in pairs]
-
-    def _model_inputs(self, view: View, inputs: Sequence[LearnerInput]) -> list[str | SceneFacts]:
-        return [self._model_input(view, given) for given in inputs]
 
     def _model_input(self, view: View, given: LearnerInput) -> str | SceneFacts:
         """Return what a model sees of an instruction: features of the scene, or a text.

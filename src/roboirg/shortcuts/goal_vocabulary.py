@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
-from roboirg.core.episode import Goal, SlotValue, Split, values_in
-from roboirg.tasks import get_task
+from roboirg.core.episode import SlotValue, Split, values_in
+from roboirg.tasks import goals_of
 from roboirg.tasks.splits.splits import split_episodes
 
 Value = str | int
@@ -23,13 +23,10 @@ class SlotVocabulary(NamedTuple):
     Attributes:
         values: every value, numbers by size and words by the alphabet.
         longest: the largest number of values that the slot holds at a time.
-        is_sequence: whether the slot holds a sequence of values, ``("blue", "red")``, and not a
-            single one, ``"red"``.
     """
 
     values: tuple[Value, ...]
     longest: int
-    is_sequence: bool
 
 
 GoalVocabulary = Mapping[str, SlotVocabulary]
@@ -45,7 +42,7 @@ def goal_vocabulary(task: str) -> GoalVocabulary:
     """
     contents: dict[str, set[SlotValue]] = {}
     for episode in split_episodes([task], [SPLIT]):
-        for goal in get_task(task).goals(episode.scene):
+        for goal in goals_of(episode):
             for slot, content in goal.slots:
                 contents.setdefault(slot, set()).add(content)
     return {slot: _vocabulary(found) for slot, found in contents.items()}
@@ -56,31 +53,8 @@ def _vocabulary(contents: set[SlotValue]) -> SlotVocabulary:
 
     ``("red",)`` and ``("blue", "red")`` -> the values blue and red, at most two at a time.
     """
-    values: set[Value] = set()
-    longest = 0
-    is_sequence = False
-    for content in contents:
-        found = values_in(content)
-        values.update(found)
-        longest = max(longest, len(found))
-        if isinstance(content, tuple):
-            is_sequence = True
+    found = [values_in(content) for content in contents]
+    values = set(itertools.chain.from_iterable(found))
     # A slot holds numbers or words, no mixture; numbers are sorted by their size.
     in_order = sorted(values, key=lambda value: (isinstance(value, str), value))
-    return SlotVocabulary(tuple(in_order), longest, is_sequence)
-
-
-def wordings_of(goal: Goal) -> Iterator[Mapping[str, SlotValue]]:
-    """Yield the slots of a goal in every order of values in which the goal can be said.
-
-    Two red cubes and a blue one -> ``colors`` red, blue with ``counts`` 2, 1, then blue, red with
-    1, 2. A goal without counts is yielded once, as the order of its values matters.
-    """
-    slots = goal.as_mapping()
-    if not {"colors", "counts"} <= set(slots):
-        yield slots
-        return
-    for amounts in itertools.permutations(goal.amounts):
-        colors = tuple(color for color, _ in amounts)
-        counts = tuple(count for _, count in amounts)
-        yield {**slots, "colors": colors, "counts": counts}
+    return SlotVocabulary(tuple(in_order), longest=max(map(len, found)))

@@ -22,9 +22,6 @@ from roboirg.reader.tokens import (
 )
 from roboirg.shortcuts.goal_vocabulary import GoalVocabulary, SlotVocabulary, Value
 
-ORDINAL_TYPES = ("visit", "placement")
-"""Types of slots whose values can be said as ordinals: *the second visit*."""
-
 POINTING = word_set("the that this those these which other each every any no")
 """Before a cardinal they make it a pronoun: *the one there*, *those two*."""
 PRONOUNS = word_set("them these those")
@@ -167,15 +164,18 @@ def thing_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
         thing: noun for what the task handles, in the singular: ``cube``.
         vocabulary: of the task's goals.
     """
-    counts = [1, len(command_ranks(text))]
+    counts = [1, len(command_ranks(text)), _noun_count(text, thing)]
     for slot, slot_vocabulary in vocabulary.items():
-        if slot_vocabulary.is_sequence:
+        if slot_vocabulary.longest > 1:
             counts.append(len(stated_values(text, slot, slot_vocabulary)))
-    nouns = (thing, f"{thing}s", f"{thing}es")
-    counts.append(sum(word in nouns for word in command_words(text)))
-
-    longest = max((slot.longest for slot in vocabulary.values()), default=1)
+    longest = max(slot.longest for slot in vocabulary.values())
     return min(longest, max(counts))
+
+
+def _noun_count(text: str, noun: str) -> int:
+    """Return how often a command has a noun, in the singular or plural: *cube* or *cubes*."""
+    forms = (noun, f"{noun}s", f"{noun}es")
+    return sum(word in forms for word in command_words(text))
 
 
 def command_ranks(text: str) -> tuple[int, ...]:
@@ -239,7 +239,7 @@ def _number_mentions(words: Sentence, slot: str) -> Iterator[_Mention]:
     *Three times* -> 3, *twice* -> 2; *two more times* -> none, as it is a difference. In slots for
     visits and placements ordinals count, too: *the second visit* -> 2, *the second one* -> none.
     """
-    has_ordinals = SLOT_TYPE_NAMES.get(slot) in ORDINAL_TYPES
+    has_ordinals = is_ordinal_slot(slot)
     for index, word in enumerate(words):
         following = words[index + 1 : index + 2]
         number: int | None = None
@@ -253,6 +253,11 @@ def _number_mentions(words: Sentence, slot: str) -> Iterator[_Mention]:
             number = ordinal_of(word)
         if number is not None:
             yield _Mention(index, number)
+
+
+def is_ordinal_slot(slot: str) -> bool:
+    """Return whether the values of a slot can be said as ordinals: *the second visit*."""
+    return SLOT_TYPE_NAMES.get(slot) in ("visit", "placement")
 
 
 def _is_factor(following: Sequence[str]) -> bool:
@@ -273,16 +278,16 @@ def _counts_things(words: Sentence, index: int, slot: str) -> bool:
     """
     word_before = _word_before(words, index)
     two_after = words[index + 1 : index + 3]
-    is_of_times = two_after[:1] == ("times",)  # "we tried this three times"
-    is_pronoun = word_before in POINTING and not is_of_times
-    if is_pronoun or ordinal_of(word_before) is not None:
+    if ordinal_of(word_before) is not None:
+        return False
+    if word_before in POINTING and two_after[:1] != ("times",):  # but "this three times"
         return False
     is_part = two_after[:1] == ("of",) and not PRONOUNS.isdisjoint(two_after)  # "one of them"
     if is_part and slot != "counts":
         return False
-    is_ordinal = SLOT_TYPE_NAMES.get(slot) in ORDINAL_TYPES
-    differences = COMPARISONS | STEPS if is_ordinal else COMPARISONS
-    return differences.isdisjoint(two_after)
+    if is_ordinal_slot(slot) and not STEPS.isdisjoint(two_after):
+        return False
+    return COMPARISONS.isdisjoint(two_after)
 
 
 def _is_stated_plainly(words: Sentence, mention: _Mention) -> bool:

@@ -70,18 +70,19 @@ def counted_positions(instructed: InstructedEpisode) -> Mapping[str, Sequence[in
     All are, unless the text names some of them: of *the container next to the button, and the one
     over the red cube* only the first color has to be found in the scene -> ``{"colors": [0]}``.
     """
+    return {slot: _positions_in(slot, instructed) for slot in counted_slots(instructed)}
+
+
+def _positions_in(slot: str, instructed: InstructedEpisode) -> Sequence[int]:
+    """Return which values of a slot are scored, by their index in it; see `counted_positions`."""
     episode, instruction = instructed
-    goal = episode.goal.as_mapping()
-    counted: dict[str, Sequence[int]] = {}
-    for slot in counted_slots(instructed):
-        positions = range(len(values_in(goal[slot])))
-        counted[slot] = positions
-        # Amounts may be said in another order than the goal has, so their indices do not match.
-        if len(positions) > 1 and "counts" not in goal:
-            meaning = instruction.meaning
-            described = [index for index in positions if _is_described(meaning, f"{slot}.{index}")]
-            counted[slot] = described or positions
-    return counted
+    positions = range(len(values_in(episode.goal[slot])))
+    # Amounts may be said in another order than the goal has, so their indices do not match.
+    if len(positions) == 1 or "counts" in episode.goal.as_mapping():
+        return positions
+    meaning = instruction.meaning
+    described = [index for index in positions if _is_described(meaning, f"{slot}.{index}")]
+    return described or positions
 
 
 def _is_described(meaning: Meaning | None, field: str) -> bool:
@@ -108,8 +109,8 @@ def score_chance(instructed: InstructedEpisode) -> ShortcutScore:
         raise InvalidValueError(f"{episode.key}: no meaning is known of {instruction.text!r}.")
     slots: dict[str, Fraction] = {}
     for slot, positions in counted_positions(instructed).items():
-        meant = values_in(episode.goal[slot])
-        slots[slot] = _slot_chance([values_in(goal[slot]) for goal in goals], meant, positions)
+        guesses = [values_in(goal[slot]) for goal in goals]
+        slots[slot] = _slot_chance(guesses, values_in(episode.goal[slot]), positions)
     return ShortcutScore(slots, share)
 
 
@@ -129,11 +130,19 @@ def _slot_chance(
     known = set(range(len(meant))).difference(positions)
     numbers_right: list[int] = []  # of scored values, for each possible guess
     for guess in guesses:
-        pairs = zip(guess, meant, strict=False)
-        right = {index for index, (value, wanted) in enumerate(pairs) if value == wanted}
+        right = _right_positions(guess, meant)
         if known <= right:
             numbers_right.append(len(right) - len(known))
     return Fraction(sum(numbers_right), len(numbers_right) * len(positions))
+
+
+def _right_positions(guess: Sequence[Value], meant: Sequence[Value]) -> set[int]:
+    """Return at which indices a guess has the right value; it may be of another length."""
+    right: set[int] = set()
+    for index, (value, wanted) in enumerate(zip(guess, meant, strict=False)):
+        if value == wanted:
+            right.add(index)
+    return right
 
 
 def score_guess(guess: TextGuess, instructed: InstructedEpisode) -> ShortcutScore:

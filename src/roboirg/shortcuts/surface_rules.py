@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.reader.tokens import Sentence, number_of
 from roboirg.shortcuts.goal_vocabulary import SlotVocabulary, Value
-from roboirg.shortcuts.named_values import EXCLUSIONS, ORDINAL_TYPES
+from roboirg.shortcuts.named_values import EXCLUSIONS, is_ordinal_slot
 
 Candidates = tuple[Value, ...]
 """Equally likely values for one position of a slot. ``("red",)`` is certain."""
@@ -75,7 +74,7 @@ class SlotWords:
     @property
     def is_ordinal(self) -> bool:
         """Whether the slot holds an ordinal, such as the number of a visit."""
-        return SLOT_TYPE_NAMES.get(self.slot) in ORDINAL_TYPES
+        return is_ordinal_slot(self.slot)
 
 
 def certain(values: Iterable[Value]) -> list[Candidates]:
@@ -164,28 +163,24 @@ def _changed_number(words: SlotWords) -> list[Candidates]:
     *Bob pressed it three times. Press it twice as often.* -> 6. A command that changes nothing
     leaves them as they are.
     """
-    change = _change(words)
-    if change is None:
-        return take_first(words)
-    return certain(change(int(value)) for value in words.named[: words.value_count])
+    named = words.named[: words.value_count]
+    return certain(_changed(int(value), words) for value in named)
 
 
-def _change(words: SlotWords) -> Callable[[int], int] | None:
-    """Return a function from the number that was named to the one that the command asks for.
+def _changed(number: int, words: SlotWords) -> int:
+    """Return the number that a command asks for, given the one that was named before.
 
-    *Twice as often* doubles it, *half as often* halves it, and *two times fewer* subtracts 2. None
-    if the command changes nothing.
+    *Twice as often* doubles it, *half as often* halves it, and *two times fewer* subtracts 2.
     """
     if "half" in words.command:
-        return lambda number: number // 2
+        return number // 2
     if "twice" in words.command or "double" in words.command:
-        return lambda number: 2 * number
-    difference = _difference(words)
-    return None if difference is None else lambda number: number + difference
+        return 2 * number
+    return number + _difference(words)
 
 
-def _difference(words: SlotWords) -> int | None:
-    """Return by how much a command changes a number; None if it names no difference.
+def _difference(words: SlotWords) -> int:
+    """Return by how much a command changes a number; 0 if it names no difference.
 
     *Two times more* -> 2, *one time fewer* -> -1, *the visit right before* -> -1. The first word of
     `MORE` or `FEWER` decides.
@@ -200,7 +195,7 @@ def _difference(words: SlotWords) -> int | None:
         size = numbers[-1] if numbers else 1  # "the visit before" is one before
         size = max(size, 1)  # "zero times fewer" is once fewer
         return size if word in MORE else -size
-    return None
+    return 0
 
 
 SURFACE_RULES: Mapping[str, SurfaceRule] = {

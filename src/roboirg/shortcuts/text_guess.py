@@ -14,12 +14,12 @@ import numpy as np
 
 from roboirg.core.episode import Episode, Goal, SlotValue, values_in
 from roboirg.core.errors import check_names
+from roboirg.language.goal_fields import in_every_order
 from roboirg.shortcuts.command_chance import is_right
 from roboirg.shortcuts.goal_vocabulary import (
     SlotVocabulary,
     Value,
     goal_vocabulary,
-    wordings_of,
 )
 from roboirg.shortcuts.named_values import (
     command_ranks,
@@ -57,7 +57,7 @@ def guess_goal(rule: str, text: str, task: str) -> TextGuess:
     thing_total = thing_count(text, get_task(task).things.handled, vocabulary)
     guess: dict[str, tuple[Candidates, ...]] = {}
     for slot, slot_vocabulary in vocabulary.items():
-        value_count = thing_total if slot_vocabulary.is_sequence else 1
+        value_count = min(thing_total, slot_vocabulary.longest)
         candidates = _candidates(rule, text, slot, slot_vocabulary, value_count)
         # Where a rule has nothing to go by, every value is as likely.
         candidates += [slot_vocabulary.values] * value_count
@@ -127,8 +127,8 @@ def goal_share(guess: TextGuess, episode: Episode) -> Fraction:
     total = Fraction(0)
     for goal in goals_of(episode):
         probability = Fraction(0)
-        for slots in wordings_of(goal):
-            probability += _probability(guess, slots)
+        for ordered_goal in in_every_order(goal):
+            probability += _probability(guess, ordered_goal)
         if probability and is_right(goal, episode):
             total += probability
     return total
@@ -150,21 +150,27 @@ def draw_goal(guess: TextGuess, goals: Iterable[Goal], rng: np.random.Generator)
         values = [candidates[int(rng.integers(len(candidates)))] for candidates in positions]
         drawn[slot] = tuple(values)
     for goal in goals:
-        for slots in wordings_of(goal):
-            goal_values = {slot: values_in(content) for slot, content in slots.items()}
-            if goal_values == drawn:
-                return goal
+        if _can_be_said_as(goal, drawn):
+            return goal
     return None
 
 
-def _probability(guess: TextGuess, slots: Mapping[str, SlotValue]) -> Fraction:
-    """Return the probability that a draw from a guess gives exactly these values.
+def _can_be_said_as(goal: Goal, values: Mapping[str, tuple[Value, ...]]) -> bool:
+    """Return whether a goal has some values by slot, in an order in which it can be said."""
+    for ordered_goal in in_every_order(goal):
+        if values == {slot: values_in(content) for slot, content in ordered_goal.slots}:
+            return True
+    return False
 
-    Red or blue, and certainly twice: ``{"color": "red", "repeats": 2}`` -> 1/2.
+
+def _probability(guess: TextGuess, goal: Goal) -> Fraction:
+    """Return the probability that a draw from a guess gives exactly the values of a goal.
+
+    Red or blue, and certainly twice: the goal *red, twice* -> 1/2.
     """
     probability = Fraction(1)
     for slot, positions in guess.items():
-        values = values_in(slots[slot])
+        values = values_in(goal[slot])
         if len(values) != len(positions):
             return Fraction(0)
         for candidates, value in zip(positions, values, strict=True):

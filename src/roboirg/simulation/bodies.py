@@ -389,12 +389,17 @@ def _build_button(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body
         cap.add_cylinder_visual(upright, material=_material(GRAY), **cap_size)
     articulation = builder.build(fix_root_link=True)
     articulation.set_name(item.name)
+    _add_spring(articulation)
+    base_link, cap_link = articulation.links
+    return Body(item, base_link.entity, cap_link, articulation)
+
+
+def _add_spring(articulation: sapien.physx.PhysxArticulation) -> None:
+    """Let a spring hold the joint of a button at rest."""
     articulation.set_qpos(np.zeros(1))
     joint = articulation.active_joints[0]
     joint.set_drive_properties(BUTTON_STIFFNESS, BUTTON_DAMPING, mode="force")
     joint.set_drive_target(0.0)
-    base_link, cap_link = articulation.links
-    return Body(item, base_link.entity, cap_link, articulation)
 
 
 _BUILDERS: dict[ObjectKind, BodyBuilder] = {

@@ -33,6 +33,7 @@ class EpisodeSession:
     """One episode, from its start.
 
     Attributes:
+        demonstrated: the recording of the demonstration as it was executed, once it has ended.
         world: the simulator.
         judge: follows all stages, those of the demonstration first.
         original: follows the stages to the scene's own goal in the same way, if the episode has
@@ -42,6 +43,8 @@ class EpisodeSession:
         attempts: the same of attempts, facts about what the hand tries; nothing is judged by them,
             but causes of failures are told from them.
     """
+
+    demonstrated: Recording
 
     def __init__(
         self,
@@ -83,18 +86,15 @@ class EpisodeSession:
         self.attempts += changes(self.world.elapsed, last_attempts, self.world.attempts)
         self._judge()
 
-    def play_demonstration(
-        self, after_step: StepHook = _do_nothing, recording: Recording | None = None
-    ) -> Recording:
-        """Execute the demonstration's stages, then one step at home.
+    def demonstrate(self, recording: Recording | None = None) -> Iterator[Stage]:
+        """Execute the demonstration's stages, then one step at home; set `demonstrated` at the end.
 
         Args:
-            after_step: called with the current stage after each control step that the video
-                contains; not after the step at home, which gives the policy's first observation.
             recording: the demonstration to replay; None plans it with the scripted expert.
 
-        Returns:
-            The recording of what was executed; an exact replay has the same `end` as `recording`.
+        Yields:
+            The current stage after each control step that the video contains; not after the step
+            at home, which gives the policy's first observation.
 
         Raises:
             MotionPlanningError: a stage was not completed; the scene cannot be used.
@@ -107,14 +107,29 @@ class EpisodeSession:
             self.step(step.action)
             executed.append(step)
             if stage.in_video:
-                after_step(stage)
+                yield stage
         if self.judge.index < len(stages):
             raise MotionPlanningError(
                 f"The demonstration of {self.episode.key} ended before stage {self.judge.index + 1}"
                 f" of {len(stages)} was complete."
             )
         self.step(HOME_ACTION)
-        return Recording.from_steps(executed, self.state_hash())
+        self.demonstrated = Recording.from_steps(executed, self.state_hash())
+
+    def play_demonstration(
+        self, after_step: StepHook = _do_nothing, recording: Recording | None = None
+    ) -> Recording:
+        """Play the demonstration as `demonstrate` does, with a call for each stage that it yields.
+
+        Returns:
+            The recording of what was executed; an exact replay has the same `end` as `recording`.
+
+        Raises:
+            MotionPlanningError: a stage was not completed; the scene cannot be used.
+        """
+        for stage in self.demonstrate(recording):
+            after_step(stage)
+        return self.demonstrated
 
     def state_hash(self) -> str:
         """Return the SHA-256, in hexadecimal, of all readable state."""

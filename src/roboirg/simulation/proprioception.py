@@ -33,8 +33,7 @@ class Proprioception:
 
     def update(self) -> None:
         """Update the unwrapped angles; call after every control step."""
-        pairs = zip(self._angles.tolist(), self._principal_angles().tolist(), strict=True)
-        self._angles = np.array([unwrap_angle(previous, angle) for previous, angle in pairs])
+        self._angles = unwrap_angles(self._angles, self._principal_angles())
 
     def read(self) -> ProprioceptiveState:
         """Return the robot's state at the last update."""
@@ -50,19 +49,17 @@ class Proprioception:
         return euler_angles(self._robot.tool_pose)
 
 
-def unwrap_angle(previous: float, angle: float) -> float:
-    """Return an angle plus full turns, at most half a turn from the previous one; rad.
+def unwrap_angles(
+    previous: NDArray[np.float64], angles: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return angles plus full turns, each at most half a turn from the previous one; rad.
 
-    For example 3.3 after 3.2 for an angle of -2.98. It is `numpy.unwrap`, to the last bit, but
-    faster.
+    For example 3.3 after 3.2 for an angle of -2.98. It is `numpy.unwrap`, to the last bit, which
+    is asked only if an angle jumps, as it is slow.
     """
-    change = angle - previous
-    if abs(change) < math.pi:
-        return angle + 0.0  # no negative zero
-    short_change = (change + math.pi) % TURN - math.pi
-    if short_change == -math.pi and change > 0.0:
-        short_change = math.pi
-    return angle + (short_change - change)
+    if np.abs(angles - previous).max() < math.pi:
+        return angles + 0.0  # no negative zero
+    return np.asarray(np.unwrap([previous, angles], axis=0)[1])
 
 
 def euler_angles(pose: sapien.Pose) -> NDArray[np.float64]:

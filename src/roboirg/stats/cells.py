@@ -44,9 +44,9 @@ class Counts(NamedTuple):
         return self.trials > 0 and not self.errors and not self.missing
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Cell:
-    """Trials of one task.
+    """Trials of one task, which grow with `add`; two cells are never equal.
 
     Attributes:
         verdicts: for each trial with a verdict, whether it succeeded.
@@ -136,14 +136,14 @@ def gather(frame: Columns, by: Sequence[str]) -> Mapping[Key, ByTask]:
     """
     groups: dict[Key, dict[str, Cell]] = {}
     last_key = None
+    cells: dict[str, Cell] = {}
     for row in rows_of(frame, *by, *TRIAL):
         *key, task, episode, policy_seed, outcome = row
         if key != last_key:  # rows of a group mostly follow each other, and its hash takes long
             cells = groups.setdefault(tuple(key), {})
             last_key = key
-        if task not in cells:
-            cells[task] = Cell()
-        cells[task].add(Trial(episode, policy_seed), outcome)
+        cell = cells.setdefault(task, Cell())
+        cell.add(Trial(episode, policy_seed), outcome)
     return groups
 
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from statistics import NormalDist
 from typing import NamedTuple
@@ -88,14 +89,15 @@ class Stratum(NamedTuple):
             weights: above 0, how much each episode counts in the mean; all alike by default.
         """
         numbers = np.asarray(values, dtype=np.float64)
-        parts = np.broadcast_to(np.asarray(weights, dtype=np.float64), numbers.shape)
-        parts = parts / parts.sum()
-        shares: dict[float, float] = {}
+        parts = np.ones_like(numbers) * np.asarray(weights, dtype=np.float64)
+        parts /= parts.sum()
+        shares: defaultdict[float, float] = defaultdict(float)
         for value, part in zip(numbers.tolist(), parts.tolist(), strict=True):
-            shares[value] = shares.get(value, 0.0) + part
-        values_in_order, shares_in_order = zip(*sorted(shares.items()), strict=True)
+            shares[value] += part
+        in_order = sorted(shares)
         episodes = 1 / float(parts @ parts)
-        return cls(values_in_order, shares_in_order, episodes, low, high)
+        shares_in_order = tuple(shares[value] for value in in_order)
+        return cls(tuple(in_order), shares_in_order, episodes, low, high)
 
     @property
     def mean(self) -> float:
@@ -203,31 +205,23 @@ def interval_of_values(
 def ratio_interval(tasks: Sequence[TaskRates]) -> Interval | None:
     """Return the 95 % score interval of a ratio of two mean rates; None with too few episodes.
 
-    It holds the ratios r for which the interval of the first rate less r times the second has 0. If
-    the second rate is 0 there is none.
+    Of the rates 40 and 80 % the ratio is 0.5. The interval has the ratios r for which the interval
+    of the first rate less r times the second has 0. If the second rate is 0 there is none. Its high
+    end is infinite if any large ratio would do.
 
     Args:
         tasks: for each task the two rates.
     """
     part = 1 / len(tasks)
 
-    # Ratios from 0 to infinity are searched as r / (1 + r), from 0 to 1, which is called balance.
-    def difference(balance: float) -> list[Stratum]:
-        return [task.combined(part * (1 - balance), -part * balance) for task in tasks]
+    def difference(ratio: float) -> list[Stratum]:
+        return [task.combined(part, -part * ratio) for task in tasks]
 
-    above, below = _excesses(difference)
-    first = sum(stratum.mean for stratum in difference(0))
-    second = -sum(stratum.mean for stratum in difference(1))
-    if second <= _ROUNDING or _has_too_few(difference(0)):
+    first, second = mean_rates(tasks)
+    if second <= _ROUNDING or _has_too_few(difference(1)):
         return None
-    estimate = first / (first + second)
-    low = 0.0
-    if first > _ROUNDING:
-        low = _root(below, estimate, 0.0)
-    high = _root(above, estimate, 1.0)
-    if high == 1:
-        return Interval(low / (1 - low), math.inf)
-    return Interval(low / (1 - low), high / (1 - high))
+    interval = _where_zero(difference, first / second)
+    return interval._replace(low=max(0.0, interval.low))
 
 
 def share_interval(tasks: Sequence[TaskRates]) -> Interval | None:
@@ -252,44 +246,46 @@ def share_interval(tasks: Sequence[TaskRates]) -> Interval | None:
     def difference(share: float) -> list[Stratum]:
         return [task.combined(part, part * (share - 1), -part * share) for task in tasks]
 
-    above, below = _excesses(difference)
-    of_none = sum(stratum.mean for stratum in difference(0))
-    of_all = sum(stratum.mean for stratum in difference(1))
-    estimate = of_none / (of_none - of_all)
-    return Interval(_end(below, estimate, -1.0), _end(above, estimate, 1.0))
+    first, second, third = mean_rates(tasks)
+    return _where_zero(difference, (first - second) / (third - second))
 
 
-class _Excesses(NamedTuple):
-    """Functions of a number, negative where the interval of a difference has 0.
-
-    Attributes:
-        above: positive where the interval ends below 0, so where the number is too large.
-        below: positive where it begins above 0, so where the number is too small.
-    """
-
-    above: Callable[[float], float]
-    below: Callable[[float], float]
+def mean_rates(tasks: Sequence[TaskRates]) -> list[float]:
+    """Return the means over tasks of their k rates, 0 to 1."""
+    rates = [task.weights @ task.contributions for task in tasks]
+    means: list[float] = np.mean(rates, axis=0).tolist()
+    return means
 
 
-def _excesses(difference: Callable[[float], list[Stratum]]) -> _Excesses:
-    """Return how far 0 is outside of the 95 % interval of a difference, by a number in it.
+def _where_zero(difference: Callable[[float], list[Stratum]], estimate: float) -> Interval:
+    """Return the numbers for which the 95 % interval of a difference has 0.
+
+    For a ratio r the difference is the first rate less r times the second.
 
     Args:
-        difference: returns the strata of the difference; its mean falls with the number.
+        difference: returns the tasks' parts of the difference, whose sum falls with the number.
+        estimate: the number for which the difference as observed is 0.
     """
     critical = critical_value()
 
-    def above(number: float) -> float:
+    # Both are negative where the interval has 0, and positive beyond one of its ends.
+    def is_too_large_by(number: float) -> float:
         return -_upper_end(difference(number), critical)
 
-    def below(number: float) -> float:
-        return -_upper_end([stratum.mirrored() for stratum in difference(number)], critical)
+    def is_too_small_by(number: float) -> float:
+        mirrored = [stratum.mirrored() for stratum in difference(number)]
+        return -_upper_end(mirrored, critical)
 
-    return _Excesses(above, below)
+    low = _end(is_too_small_by, estimate, -1.0)
+    high = _end(is_too_large_by, estimate, 1.0)
+    return Interval(low, high)
 
 
 def _end(function: Callable[[float], float], inside: float, step: float) -> float:
-    """Return where a function is 0, on the side of `step` from a place where it is negative."""
+    """Return where a function is 0, on the side of `step` from a place where it is negative.
+
+    The step is doubled until the function is positive; infinite if it never is.
+    """
     for _ in range(_MOST_DOUBLINGS):
         if function(inside + step) >= 0:
             return _root(function, inside, inside + step)
@@ -321,27 +317,34 @@ def _upper_end(strata: Sequence[Stratum], critical: float) -> float:
     most = sum(stratum.high for stratum in strata)
     if most - estimate <= _ROUNDING:
         return most
+    # About the tilt of a rate of one half, where the search begins.
+    first_tilt = 2 * critical * math.sqrt(sum(stratum.episodes for stratum in strata))
+    excess = functools.partial(_excess, strata, estimate, critical)
+    tilt = _end(excess, 0.0, first_tilt)
+    if tilt == math.inf:
+        return most
+    return min(most, _tilted(strata, tilt).mean)
 
-    def excess(tilt: float) -> float:
-        """Return by how many standard errors too many the estimate is below an expectation."""
-        moments = _tilted(strata, tilt)
-        distance = moments.mean - estimate
-        if distance <= _ROUNDING:
-            return -critical
-        error = max(math.sqrt(moments.variance), _ROUNDING)
-        # A sum with a long tail to the left is often further below its expectation than a normal
-        # one. The correction is used only here, where it makes the interval longer.
-        skewness = moments.third / error**3
-        correction = max(0.0, -skewness / 6) * (critical**2 - 1)
-        return distance / error - correction - critical
 
-    # About that of a rate of one half; the search doubles it as often as it needs to.
-    tilt = 2 * critical * math.sqrt(sum(stratum.episodes for stratum in strata))
-    for _ in range(_MOST_DOUBLINGS):
-        if excess(tilt) >= 0:
-            return min(most, _tilted(strata, _root(excess, 0.0, tilt)).mean)
-        tilt *= 2
-    return most
+def _excess(strata: Sequence[Stratum], estimate: float, critical: float, tilt: float) -> float:
+    """Return by how many standard errors too many an observed sum is below an expectation.
+
+    Args:
+        strata: of each task.
+        estimate: the sum as observed.
+        critical: standard errors by which it may be below.
+        tilt: from which the expectation follows, as of `_tilted`.
+    """
+    moments = _tilted(strata, tilt)
+    distance = moments.mean - estimate
+    if distance <= _ROUNDING:
+        return -critical
+    error = max(math.sqrt(moments.variance), _ROUNDING)
+    # A sum with a long tail to the left is often further below its expectation than a normal
+    # one. The correction is used only here, where it makes the interval longer.
+    skewness = moments.third / error**3
+    correction = max(0.0, -skewness / 6) * (critical**2 - 1)
+    return distance / error - correction - critical
 
 
 def _tilted(strata: Sequence[Stratum], tilt: float) -> _Moments:

@@ -184,22 +184,29 @@ def measure_gap(tasks: Sequence[Pairs]) -> Gap | None:
     rates = paired_rates(paired)
     if rates is None:
         return None
-    part = 1 / len(paired)
     rates_of_tasks = [pairs.rates for pairs in paired]
-    strata = [task.combined(part, -part) for task in rates_of_tasks]
     differences = np.concatenate([pairs.differences for pairs in paired])
     overlaps = np.sum([pairs.overlap for pairs in paired], axis=0)
+    retention = None
+    if rates.second:
+        retention = rates.first / rates.second
     return Gap(
         value=rates.first - rates.second,
-        interval=mean_interval(strata),
+        interval=_gap_interval(rates_of_tasks),
         p_value=sign_flip_test(differences),
-        retention=rates.first / rates.second if rates.second else None,
+        retention=retention,
         tasks=len(paired),
         episodes=len(differences),
         trials=sum(pairs.trials for pairs in paired),
         overlap=Overlap._make(overlaps.tolist()),
         rates_of_tasks=rates_of_tasks,
     )
+
+
+def _gap_interval(tasks: Sequence[TaskRates]) -> Interval | None:
+    """Return the 95 % interval of the first rate less the second, the mean over tasks."""
+    part = 1 / len(tasks)
+    return mean_interval([task.combined(part, -part) for task in tasks])
 
 
 def sign_flip_test(differences: NDArray[np.int64]) -> float:

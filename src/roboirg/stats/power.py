@@ -126,23 +126,29 @@ class _Rejections(NamedTuple):
 
 @functools.lru_cache(maxsize=64)
 def _rejections(episodes: int, discordance: float) -> _Rejections:
-    """Return with how few wins of the rarer side McNemar's exact test rejects, at the 5 % level.
+    """Return with how few wins of the rarer side McNemar's exact test rejects, at the 5 % level."""
+    counts = _likely_counts(episodes, discordance)
+    first_block = counts[0] // _BLOCK
+    blocks = range(first_block, counts[-1] // _BLOCK + 1)
+    most_wins = np.concatenate(list(map(_most_wins_in_block, blocks)))
+    start = counts[0] - first_block * _BLOCK
+    # One more below, as a count's chance is that of at most it less that of at most the one before.
+    counts_and_one_below = np.arange(counts[0] - 1, counts[-1] + 1)
+    chances = np.diff(_chance_of_at_most(counts_and_one_below, episodes, discordance))
+    return _Rejections(np.array(counts), most_wins[start : start + len(counts)], chances)
 
-    Numbers of discordant episodes (solved by exactly one of the two) that are too improbable to
-    matter, below 1e-20, are left out.
+
+def _likely_counts(episodes: int, discordance: float) -> range:
+    """Return numbers of discordant episodes, which exactly one of the two solves.
+
+    Those that are too improbable to matter, below 1e-20, are left out.
     """
     center = episodes * discordance
-    reach = _MAX_DEVIATIONS * math.sqrt(center * (1 - discordance)) + _MAX_DEVIATIONS
+    deviation = math.sqrt(center * (1 - discordance))
+    reach = _MAX_DEVIATIONS * deviation + _MAX_DEVIATIONS
     least = max(0, math.floor(center - reach))
     most = min(episodes, math.ceil(center + reach))
-    first_block = least // _BLOCK
-    blocks = map(_most_wins_in_block, range(first_block, most // _BLOCK + 1))
-    most_wins = np.concatenate(list(blocks))
-    start = least - first_block * _BLOCK
-    discordant = np.arange(least, most + 1)
-    most_wins = most_wins[start : start + len(discordant)]
-    chances_of_at_most = _chance_of_at_most(np.arange(least - 1, most + 1), episodes, discordance)
-    return _Rejections(discordant, most_wins, np.diff(chances_of_at_most))
+    return range(least, most + 1)
 
 
 @functools.cache

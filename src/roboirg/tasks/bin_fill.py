@@ -25,14 +25,14 @@ from roboirg.core.episode import (
     SceneObject,
     Stage,
 )
-from roboirg.core.footprints import Region
+from roboirg.core.footprints import Obstacle, Region
 from roboirg.core.motions import Away, Motion, Vanish
 from roboirg.core.plain_text import counted
 from roboirg.tasks.shared.fixtures import (
     BUTTON_REGION,
     ORDINALS,
     Bounds,
-    CubePlan,
+    ItemPlan,
     bin_keep_out,
     button_keep_out,
     draw_bin,
@@ -43,7 +43,7 @@ from roboirg.tasks.shared.fixtures import (
 )
 from roboirg.tasks.shared.stages import PRESSED, press_stage
 from roboirg.tasks.task import SceneAndGoal, Task
-from roboirg.util.random_draws import shuffled
+from roboirg.util.random_draws import draw, shuffled
 
 COLORS_PRESENT: dict[Difficulty, int] = {"easy": 1, "medium": 2, "hard": 3}
 CUBES: dict[Difficulty, Bounds] = {"easy": (4, 6), "medium": (8, 10), "hard": (10, 12)}
@@ -73,14 +73,12 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     `rng`: reordering them changes all episodes. Raises SceneRejectedError if something finds no
     room.
     """
-    is_late = bool(rng.integers(2))  # whether only one cube of each color is there at first
+    is_late = draw(rng, (False, True))  # whether only one cube of each color is there at first
     button = draw_button(rng, BUTTON_REGION)
     # RoboMME places the bin without looking at the button; here its walls stay off the base.
     bin_ = draw_bin(rng, BIN_REGION, [footprint(button)])
     wanted = _draw_wanted(rng, difficulty)
-    cube_colors = _draw_cube_colors(rng, difficulty, wanted)
-    obstacles = [button_keep_out(button), bin_keep_out(bin_)]
-    cubes = draw_cubes(rng, _numbered(cube_colors), CUBE_GAP, obstacles)
+    cubes = _draw_cubes(rng, difficulty, wanted, [button_keep_out(button), bin_keep_out(bin_)])
     scene = Scene(
         objects=(button, bin_, *cubes),
         motions=plan_motions(cubes, late=is_late),
@@ -124,17 +122,22 @@ def _draw_cube_colors(
     return shuffled(rng, colors)
 
 
-def _numbered(colors: list[Color]) -> list[CubePlan]:
-    """Return cubes of the given colors, numbered within their color.
+def _draw_cubes(
+    rng: np.random.Generator,
+    difficulty: Difficulty,
+    wanted: Mapping[Color, int],
+    obstacles: Sequence[Obstacle],
+) -> list[SceneObject]:
+    """Draw the cubes on the table, numbered within their color, away from all obstacles.
 
     Red, blue, red -> ``cube_red_0``, ``cube_blue_0``, ``cube_red_1``.
     """
-    plans: list[CubePlan] = []
+    plans: list[ItemPlan] = []
     numbers: Counter[Color] = Counter()
-    for color in colors:
-        plans.append(CubePlan(f"cube_{color}_{numbers[color]}", color, CUBE_REGION))
+    for color in _draw_cube_colors(rng, difficulty, wanted):
+        plans.append(ItemPlan(f"cube_{color}_{numbers[color]}", color, CUBE_REGION, CUBE_GAP))
         numbers[color] += 1
-    return plans
+    return draw_cubes(rng, plans, obstacles)
 
 
 def _named(wanted: Mapping[Color, int]) -> list[Color]:
@@ -164,11 +167,17 @@ def plan_motions(cubes: Sequence[SceneObject], *, late: bool) -> tuple[Motion, .
     vanishing: list[Motion] = []
     for color in COLORS:
         names = [cube.name for cube in cubes if cube.color == color]
-        for number, name in enumerate(names):
-            if late and number > 0:
-                appearing.append(Away(name, 0, APPEAR_STEPS * number))
-            vanishing.append(Vanish(name, Fact("binned", name, "bin")))
+        if late:
+            appearing += _appearing(names)
+        vanishing += [Vanish(name, Fact("binned", name, "bin")) for name in names]
     return (*appearing, *vanishing)
+
+
+def _appearing(names: Sequence[str]) -> Iterator[Away]:
+    """Yield the motions by which the cubes of a color but the first appear one after the other."""
+    for number, name in enumerate(names):
+        if number > 0:
+            yield Away(name, 0, APPEAR_STEPS * number)
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
@@ -193,27 +202,31 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     wrong numbers in the bin. In a subgoal, ``{at}`` stands for the point of the object `points_at`
     in the picture.
     """
+    before_press = [stage.forbidding(PRESSED) for stage in _filling(scene, goal)]
+    return (*before_press, press_stage().forbidding(*_wrong_counts(scene, goal)))
+
+
+def _filling(scene: Scene, goal: Goal) -> Iterator[Stage]:
+    """Yield the stages before the press: pick and put in, for each wanted cube in turn.
+
+    The oracle takes that cube; any other one completes the stages as well. They forbid nothing yet.
+    """
     cubes = [cube.name for cube in scene.of_kind("cube")]
     any_picked = FactCount(tuple(Fact("picked", cube) for cube in cubes))
     all_binned = _binned(cubes)
-    plan: list[Stage] = []
     for number, cube in enumerate(_wanted_cubes(scene, goal), start=1):
-        pick = Stage(
+        yield Stage(
             expects=any_picked,
-            forbids=(PRESSED,),
             primitive=Primitive("pick_cube", cube.name),
             subgoal=f"pick up the {cube.ordinal} {cube.color} cube {{at}}",
             points_at=cube.name,
         )
-        put_in = Stage(
+        yield Stage(
             expects=FactCount(all_binned, least=number),
-            forbids=(PRESSED,),
             primitive=Primitive("drop_into", cube.name, "bin"),
             subgoal="put it into the bin {at}",
             points_at="bin",
         )
-        plan += [pick, put_in]
-    return (*plan, press_stage().forbidding(*_wrong_counts(scene, goal)))
 
 
 class _WantedCube(NamedTuple):

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from roboirg.core.choices import Choice
 from roboirg.core.episode import ROBOT, Episode, ObjectKind, Primitive, Scene
-from roboirg.tasks import get_task
+from roboirg.tasks import get_task, goals_of
 
 _WORDS = {
     "pick_cube": "pick up the {subject}",
@@ -36,20 +36,10 @@ def choices_of(episode: Episode) -> tuple[Choice, ...]:
     A choice is a labeled motion that a program can ask for. PickXtimes -> a *pick up the cube*, b
     *place it on the target*, c *press the button*; with a, a point of the picture says which cube.
     """
-    scene = episode.scene
-    each_once = list(dict.fromkeys(_motions(scene, episode)))
-    motions = _with_buttons(each_once, scene)
-    stages = [stage.primitive for stage in episode.stages]
-    checkpoints = tuple(motion for motion in stages if motion.kind == "hold_until")
-    choices: list[Choice] = []
-    for label, motion in zip(string.ascii_lowercase, motions, strict=False):
-        words = _words_for(motion)
-        if motion.kind == "hold_until":
-            # One choice, which is made again for each checkpoint.
-            choices.append(Choice(label, words, checkpoints))
-        else:
-            choices.append(_choice(label, words, motion, scene))
-    return tuple(choices)
+    each_once = list(dict.fromkeys(_motions(episode)))
+    motions = _with_buttons(each_once, episode.scene)
+    labeled = zip(string.ascii_lowercase, motions, strict=False)
+    return tuple(_choice(label, motion, episode) for label, motion in labeled)
 
 
 def _with_buttons(motions: list[Primitive], scene: Scene) -> list[Primitive]:
@@ -71,7 +61,7 @@ def _with_buttons(motions: list[Primitive], scene: Scene) -> list[Primitive]:
     return ordered
 
 
-def _motions(scene: Scene, episode: Episode) -> Iterator[Primitive]:
+def _motions(episode: Episode) -> Iterator[Primitive]:
     """Yield the motions of all goals' stages, those for the same choice being equal.
 
     Names of objects become kinds: picking ``cube_red`` and ``cube_blue`` are both picking a
@@ -79,7 +69,8 @@ def _motions(scene: Scene, episode: Episode) -> Iterator[Primitive]:
     Callers drop repeats.
     """
     task = get_task(episode.task)
-    for goal in task.goals(scene):
+    scene = episode.scene
+    for goal in goals_of(episode):
         for stage in task.stages(scene, goal):
             motion = stage.primitive
             if motion.kind in _PRESSES:
@@ -108,15 +99,20 @@ def _words_for(motion: Primitive) -> str:
     return _WORDS[motion.kind].format(subject=subject, place=motion.place or "place")
 
 
-def _choice(label: str, words: str, motion: Primitive, scene: Scene) -> Choice:
+def _choice(label: str, motion: Primitive, episode: Episode) -> Choice:
     """Return the choice of a motion: with a point of its kind of object, if there are several.
 
     A pick always takes a point. With a single target in the scene, placing names that target; with
-    several, it takes a point of a target.
+    several, it takes a point of a target. Waiting is one choice, which is made again for each of
+    the episode's checkpoints.
     """
+    words = _words_for(motion)
+    if motion.kind == "hold_until":
+        stages = [stage.primitive for stage in episode.stages]
+        return Choice(label, words, tuple(stage for stage in stages if stage.kind == motion.kind))
     if motion.kind.startswith("pick_"):
         return Choice(label, words, (motion,), motion.subject)
-    places = scene.of_kind(motion.place) if motion.place else ()
+    places = episode.scene.of_kind(motion.place) if motion.place else ()
     if len(places) == 1:
         motion = motion._replace(place=places[0].name)
         return Choice(label, words, (motion,))

@@ -13,8 +13,16 @@ import numpy as np
 from roboirg.core.conditions import Elapsed, Fact, Rule
 from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.footprints import Region
-from roboirg.tasks.shared.fixtures import counted_goals, disc_area, draw_number, draw_target
-from roboirg.tasks.shared.real_table import draw_regions, draw_tape
+from roboirg.tasks.shared.fixtures import (
+    DiscPlan,
+    ItemPlan,
+    counted_goals,
+    disc_area,
+    draw_item,
+    draw_number,
+    draw_target,
+)
+from roboirg.tasks.shared.real_table import draw_regions
 from roboirg.tasks.shared.stages import placing_stages
 from roboirg.tasks.task import GoalThings, SceneAndGoal, Task
 from roboirg.util.random_draws import draw
@@ -22,8 +30,7 @@ from roboirg.util.random_draws import draw
 TAPES: tuple[Color, ...] = ("yellow", "gray")
 REPEATS = (1, 2)
 
-TARGET_REGION = Region(0.06, 0.0, 0.1, 0.1)
-TARGET_RADIUS = 0.05
+TARGET = DiscPlan("target", Region(0.06, 0.0, 0.1, 0.1), radius=0.05)
 LEFT_TAPE_REGION = Region(-0.09, 0.14, 0.11, 0.09)
 TAPE_GAP = 0.03
 WAIT_STEPS = 140
@@ -31,26 +38,24 @@ WAIT_STEPS = 140
 then. The longest pick in RoboMME's data takes 137."""
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
+def sample(rng: np.random.Generator, _difficulty: Difficulty) -> SceneAndGoal:
     """Draw the target and a tape on either side; sides, goal tape and number are uniform.
 
-    `difficulty` changes nothing.
+    The order of the draws decides which scene a seed gives.
     """
-    del difficulty
-    target = draw_target(rng, "target", TARGET_RADIUS, TARGET_REGION, 0.0, ())
-    tapes: list[SceneObject] = []
-    for color, region in draw_regions(rng, TAPES, LEFT_TAPE_REGION).items():
-        tape = draw_tape(
-            rng,
-            name=f"tape_{color}",
-            color=color,
-            region=region,
-            gap=TAPE_GAP,
-            obstacles=[disc_area(target)],
-        )
-        tapes.append(tape)
+    target = draw_target(rng, TARGET, ())
+    tapes = _draw_tapes(rng, target)
     goal = Goal.of(color=draw(rng, TAPES), repeats=draw_number(rng, REPEATS))
     return Scene((*tapes, target)), goal
+
+
+def _draw_tapes(rng: np.random.Generator, target: SceneObject) -> list[SceneObject]:
+    """Draw a tape of each color, ``tape_yellow`` and ``tape_gray``, one on either side."""
+    tapes: list[SceneObject] = []
+    for color, region in draw_regions(rng, TAPES, LEFT_TAPE_REGION).items():
+        plan = ItemPlan(f"tape_{color}", color, region, TAPE_GAP, "tape")
+        tapes.append(draw_item(rng, plan, [disc_area(target)]))
+    return tapes
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:

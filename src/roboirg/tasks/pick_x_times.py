@@ -10,11 +10,11 @@ from functools import partial
 
 import numpy as np
 
-from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.core.footprints import Region
 from roboirg.tasks.shared.fixtures import (
     Bounds,
+    DiscPlan,
     counted_goals,
     draw_button_and_cubes,
     draw_number,
@@ -22,6 +22,7 @@ from roboirg.tasks.shared.fixtures import (
 )
 from roboirg.tasks.shared.stages import (
     PRESSED,
+    facts_of_all,
     facts_of_others,
     placing_stages,
     press_stage,
@@ -34,8 +35,7 @@ MAX_REPEATS = 5
 
 WORK_REGION = Region(-0.1, 0.0, 0.2, 0.2)
 CUBE_GAP = 0.02
-TARGET_RADIUS = 0.04
-TARGET_GAP = 0.04
+TARGET = DiscPlan("target", WORK_REGION, radius=0.04, gap=0.04)
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
@@ -45,10 +45,11 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """
     repeats = draw_number(rng, REPEATS[difficulty])
     placed = draw_button_and_cubes(rng, difficulty, WORK_REGION, CUBE_GAP)
-    target = draw_target(rng, "target", TARGET_RADIUS, WORK_REGION, TARGET_GAP, placed.obstacles)
+    target = draw_target(rng, TARGET, placed.obstacles)
     chosen = draw(rng, placed.cubes)
+    scene = Scene((placed.button, *placed.cubes, target))
     goal = Goal.of(color=str(chosen.color), repeats=repeats)
-    return Scene((placed.button, *placed.cubes, target)), goal
+    return scene, goal
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
@@ -60,11 +61,12 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     color = goal.text("color")
     cubes = scene.of_kind("cube")
     wrong_picks = facts_of_others("picked", cubes, f"cube_{color}")
-    all_picks = [Fact("picked", cube.name) for cube in cubes]
-    plan = placing_stages("cube", color, goal.number("repeats"))
-    before_press = [stage.forbidding(*wrong_picks, PRESSED) for stage in plan]
+    plan: list[Stage] = []
+    for stage in placing_stages("cube", color, goal.number("repeats")):
+        plan.append(stage.forbidding(*wrong_picks, PRESSED))
     press = press_stage("press the button {at} to stop")
-    return (*before_press, press.forbidding(*all_picks))
+    plan.append(press.forbidding(*facts_of_all("picked", cubes)))
+    return tuple(plan)
 
 
 TASK = Task(

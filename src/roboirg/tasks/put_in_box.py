@@ -12,8 +12,8 @@ import numpy as np
 from roboirg.core.conditions import Fact, Rule
 from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.footprints import Region
-from roboirg.tasks.shared.fixtures import footprint
-from roboirg.tasks.shared.real_table import draw_box, draw_regions, draw_tape
+from roboirg.tasks.shared.fixtures import ItemPlan, draw_item, footprint
+from roboirg.tasks.shared.real_table import draw_box, draw_regions
 from roboirg.tasks.shared.stages import pick_stage
 from roboirg.tasks.task import GoalThings, SceneAndGoal, Task
 from roboirg.util.random_draws import draw
@@ -22,28 +22,25 @@ BOXES: tuple[Color, ...] = ("green", "purple")
 TAPE: Color = "yellow"
 
 LEFT_BOX_REGION = Region(0.03, 0.15, 0.05, 0.05)
-TAPE_REGION = Region(-0.13, 0.0, 0.08, 0.18)
-TAPE_GAP = 0.03
+TAPE_PLAN = ItemPlan("tape", TAPE, Region(-0.13, 0.0, 0.08, 0.18), gap=0.03, kind="tape")
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
+def sample(rng: np.random.Generator, _difficulty: Difficulty) -> SceneAndGoal:
     """Draw a box on either side, the tape in front of them; sides and goal box are uniform.
 
-    `difficulty` changes nothing.
+    The order of the draws decides which scene a seed gives.
     """
-    del difficulty
+    boxes = _draw_boxes(rng)
+    tape = draw_item(rng, TAPE_PLAN, [footprint(box) for box in boxes])
+    return Scene((*boxes, tape)), Goal.of(color=draw(rng, BOXES))
+
+
+def _draw_boxes(rng: np.random.Generator) -> list[SceneObject]:
+    """Draw a box of each color, ``box_green`` and ``box_purple``, one on either side."""
     boxes: list[SceneObject] = []
     for color, region in draw_regions(rng, BOXES, LEFT_BOX_REGION).items():
         boxes.append(draw_box(rng, f"box_{color}", color, region))
-    tape = draw_tape(
-        rng,
-        name="tape",
-        color=TAPE,
-        region=TAPE_REGION,
-        gap=TAPE_GAP,
-        obstacles=[footprint(box) for box in boxes],
-    )
-    return Scene((*boxes, tape)), Goal.of(color=draw(rng, BOXES))
+    return boxes
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:

@@ -48,20 +48,29 @@ def sample(rng: np.random.Generator, _difficulty: Difficulty) -> SceneAndGoal:
     seed gives: the cube's color and speed before the goal's visit.
     """
     button = draw_button(rng, BUTTON_REGION)
+    target = _draw_target(rng)
+    red, green, blue = rng.random(3).tolist()
+    interval = draw(rng, INTERVALS)
+    visit = draw(rng, VISITS)
+    run = _draw_run(rng, target.position, interval)
+    shuttle = SceneObject("shuttle", "shuttle", run.begin, rgb=(red, green, blue))
+    scene = Scene(
+        objects=(button, target, shuttle),
+        motions=(run,),
+    )
+    return scene, Goal.of(visit=visit)
+
+
+def _draw_target(rng: np.random.Generator) -> SceneObject:
+    """Draw the target, which is as high as the middle of the cube that moves over it."""
     middle = Point(*TARGET_REGION.draw(rng), HEIGHT)
-    target = SceneObject(
+    return SceneObject(
         "target",
         "target",
         middle,
         radius=TARGET_RADIUS,
         thickness=TARGET_THICKNESS,
     )
-    red, green, blue = rng.random(3).tolist()
-    interval = draw(rng, INTERVALS)
-    visit = int(rng.integers(VISITS.start, VISITS.stop))
-    run = _draw_run(rng, middle, interval)
-    shuttle = SceneObject("shuttle", "shuttle", run.begin, rgb=(red, green, blue))
-    return Scene((button, target, shuttle), motions=(run,)), Goal.of(visit=visit)
 
 
 def _draw_run(rng: np.random.Generator, middle: Point, interval: int) -> Shuttle:

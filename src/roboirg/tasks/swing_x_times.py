@@ -6,7 +6,7 @@ count. Facts: RoboMME.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -18,6 +18,7 @@ from roboirg.core.motions import Glow, Motion
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     Bounds,
+    DiscPlan,
     counted_goals,
     draw_button_and_cubes,
     draw_number,
@@ -39,14 +40,20 @@ MAX_REPEATS = 3
 
 CUBE_REGION = Region(-0.1, 0.0, 0.25, 0.25)
 CUBE_GAP = 0.02
-SIDES: dict[str, Region] = {
-    "right": Region(-0.1, -0.2, 0.1, 0.1),
-    "left": Region(-0.1, 0.2, 0.1, 0.1),
-}
-"""Regions of the two targets, in the order of visits; sides are the robot's."""
-TARGET_RADIUS = 0.04
-TARGET_GAP = 0.02
-TARGET_RGB = (128 / 255, 128 / 255, 128 / 255)
+SIDES = ("right", "left")
+"""Of the two targets, as the robot sees them, in the order of visits."""
+RIGHT_TARGET = DiscPlan(
+    "target_right",
+    Region(-0.1, -0.2, 0.1, 0.1),
+    radius=0.04,
+    gap=0.02,
+    rgb=(128 / 255, 128 / 255, 128 / 255),
+)
+TARGETS = (
+    RIGHT_TARGET,
+    RIGHT_TARGET._replace(name="target_left", region=Region(-0.1, 0.2, 0.1, 0.1)),
+)
+"""In the order of `SIDES`."""
 LINGER = 20
 """Control steps for which a target stays lit after the cube has left it."""
 
@@ -58,11 +65,11 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """
     repeats = draw_number(rng, REPEATS[difficulty])
     placed = draw_button_and_cubes(rng, difficulty, CUBE_REGION, CUBE_GAP)
-    regions = {f"target_{side}": region for side, region in SIDES.items()}
-    targets = draw_targets(rng, regions, TARGET_RADIUS, TARGET_GAP, placed.obstacles, TARGET_RGB)
+    targets = draw_targets(rng, TARGETS, placed.obstacles)
     chosen = draw(rng, placed.cubes)
     scene = make_scene(placed.button, placed.cubes, targets, chosen.name)
-    return scene, Goal.of(color=str(chosen.color), repeats=repeats)
+    goal = Goal.of(color=str(chosen.color), repeats=repeats)
+    return scene, goal
 
 
 def make_scene(
@@ -70,13 +77,12 @@ def make_scene(
 ) -> Scene:
     """Return the scene in which each target lights up while the cube of the goal is over it.
 
-    A target lights up as a marker, a disc over it, appears. `targets` are in the order of `SIDES`;
-    `cube` is the name of the goal's.
+    A target lights up as a marker, a disc over it, appears. `cube` is the name of the goal's.
     """
     markers: list[SceneObject] = []
     motions: list[Motion] = []
-    for side, target in zip(SIDES, targets, strict=True):
-        marker = marker_over(target, f"marker_{side}")
+    for target in targets:
+        marker = marker_over(target)
         is_over = Fact("over", cube, target.name)
         markers.append(marker)
         motions.append(Glow(marker.name, is_over, LINGER))
@@ -97,14 +103,24 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     cube = f"cube_{color}"
     wrong_picks = facts_of_others("picked", scene.of_kind("cube"), cube)
     too_often = _too_often(cube, len(SIDES) * repeats)
+    plan: list[Stage] = []
+    for stage in _carrying(color, repeats):
+        plan.append(stage.forbidding(*wrong_picks, PRESSED, too_often))
+    plan.append(press_stage().forbidding(*wrong_picks, too_often))
+    return tuple(plan)
 
-    plan = [pick_stage(cube, f"pick up the {color} cube {{at}}")]
+
+def _carrying(color: str, repeats: int) -> Iterator[Stage]:
+    """Yield the stages before the press: pick, the swings over both targets, put down.
+
+    They forbid nothing yet.
+    """
+    cube = f"cube_{color}"
+    yield pick_stage(cube, f"pick up the {color} cube {{at}}")
     for ordinal in ORDINALS[:repeats]:
-        plan += [_swing(cube, side, ordinal) for side in SIDES]
-    put_down = Primitive("put_down", cube)
-    plan.append(put_down_stage(put_down, f"put the {color} cube on the table"))
-    before_press = [stage.forbidding(*wrong_picks, PRESSED, too_often) for stage in plan]
-    return (*before_press, press_stage().forbidding(*wrong_picks, too_often))
+        for side in SIDES:
+            yield _swing(cube, side, ordinal)
+    yield put_down_stage(Primitive("put_down", cube), f"put the {color} cube on the table")
 
 
 def _too_often(cube: str, visits: int) -> Rule:

@@ -32,8 +32,9 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """
     table = video_place.draw_table(rng, difficulty, DISCS, SITE_RADIUS)
     shown = _draw_placings(rng, table)
-    placement = draw_number(rng, (1, len(shown)))
-    pressed_after = draw_number(rng, (1, len(shown)))
+    first_to_last = (1, len(shown))
+    placement = draw_number(rng, first_to_last)
+    pressed_after = draw_number(rng, first_to_last)
     past = (*shown[:pressed_after], PRESSED, *shown[pressed_after:])
     scene = video_place.draw_scene(rng, difficulty, table, past)
     goal = Goal.of(color=str(table.cube.color), placement=placement)

@@ -18,7 +18,7 @@ from roboirg.core.motions import Swap
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     Bounds,
-    CubePlan,
+    ItemPlan,
     button_keep_out,
     draw_button,
     draw_cubes,
@@ -27,6 +27,7 @@ from roboirg.tasks.shared.fixtures import (
 from roboirg.tasks.shared.layouts import layout_points
 from roboirg.tasks.shared.stages import (
     PRESSED,
+    facts_of_all,
     facts_of_others,
     go_home,
     hold_still,
@@ -73,7 +74,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     repeats = draw_number(rng, REPEATS)
     swaps = draw_number(rng, SWAPS[difficulty])
     button = draw_button(rng, BUTTON_REGION)
-    cubes = _draw_clutter(rng, button) if difficulty == "hard" else _draw_layout(rng, button)
+    cubes = _draw_cubes(rng, difficulty, button)
     # The cube of the video starts the first swap, the others follow in any order.
     order = [cube.name for cube in shuffled(rng, cubes)]
     scene = make_scene(button, cubes, order[0], order[:swaps])
@@ -101,34 +102,43 @@ def make_scene(
         stage=SWAP_STAGE,
         partners=partners,
     )
-    past = (Fact("picked", target), Fact("lying", target))
-    return Scene((button, *cubes), motions, past)
+    return Scene(
+        objects=(button, *cubes),
+        motions=motions,
+        past=(Fact("picked", target), Fact("lying", target)),
+    )
 
 
-def _draw_layout(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
-    """Draw three cubes of one color, each near its point of a layout.
+def _draw_cubes(
+    rng: np.random.Generator, difficulty: Difficulty, button: SceneObject
+) -> list[SceneObject]:
+    """Draw many cubes of all colors for hard episodes, and three of one color for the others."""
+    if difficulty == "hard":
+        plans = _clutter_plans(rng)
+    else:
+        plans = _layout_plans(rng)
+    return draw_cubes(rng, plans, [button_keep_out(button)])
+
+
+def _layout_plans(rng: np.random.Generator) -> Iterator[ItemPlan]:
+    """Yield three cubes of one color to be drawn, each near its point of a layout.
 
     They are called ``cube_red_0`` to ``cube_red_2``.
     """
     color = draw(rng, COLORS)
-    plans: list[CubePlan] = []
     for number, point in enumerate(layout_points(rng, LAYOUT_CUBES)):
-        name = f"cube_{color}_{number}"
         region = Region(*point, half_x=LAYOUT_HALF, half_y=LAYOUT_HALF)
-        plans.append(CubePlan(name, color, region))
-    return draw_cubes(rng, plans, GAP, [button_keep_out(button)])
+        yield ItemPlan(f"cube_{color}_{number}", color, region, GAP)
 
 
-def _draw_clutter(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
-    """Draw five cubes of each color; in each round one of each, in any order."""
-    return draw_cubes(rng, _clutter_plans(rng), GAP, [button_keep_out(button)])
+def _clutter_plans(rng: np.random.Generator) -> Iterator[ItemPlan]:
+    """Yield five cubes of each color to be drawn: in each round one of each, in any order.
 
-
-def _clutter_plans(rng: np.random.Generator) -> Iterator[CubePlan]:
-    """Yield the cubes of each round; its colors are drawn after the cubes of the one before."""
+    The colors of a round are drawn after the cubes of the one before.
+    """
     for number in range(CLUTTER_ROUNDS):
         for color in shuffled(rng, COLORS):
-            yield CubePlan(f"cube_{color}_{number}", color, CLUTTER_REGION)
+            yield ItemPlan(f"cube_{color}_{number}", color, CLUTTER_REGION, GAP)
 
 
 def demonstration(scene: Scene) -> tuple[Stage, ...]:
@@ -164,20 +174,27 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     target = scene.past[0].subject  # the cube that the video shows picked up
     cubes = scene.of_kind("cube")
     wrong_picks = facts_of_others("picked", cubes, target)
-    release = Primitive("put_down", target, height=OWN_RELEASE)
     plan: list[Stage] = []
-    for ordinal in ORDINALS[: goal.number("repeats")]:
-        subgoal = f"pick up the correct cube {{at}} for the {ordinal} time"
-        pick = pick_stage(target, subgoal, timer="pick")
-        put_down = put_down_stage(release, "put it down", timer="put down")
-        plan.append(pick.forbidding(*wrong_picks, _early_press("pick")))
-        plan.append(put_down.forbidding(*wrong_picks, _early_press("put down")))
-    all_picks = [Fact("picked", cube.name) for cube in cubes]
+    for stage in _picks(target, goal.number("repeats")):
+        plan.append(stage.forbidding(*wrong_picks, _early_press(stage.timer)))
     press = press_stage("press the button {at} to finish")
-    return (*plan, press.forbidding(*all_picks))
+    plan.append(press.forbidding(*facts_of_all("picked", cubes)))
+    return tuple(plan)
 
 
-def _early_press(timer: str) -> Rule:
+def _picks(target: str, repeats: int) -> Iterator[Stage]:
+    """Yield the stages in which the cube `target` is picked up and put down a number of times.
+
+    Both kinds of stages start a timer, ``pick`` and ``put down``; they forbid nothing yet.
+    """
+    release = Primitive("put_down", target, height=OWN_RELEASE)
+    for ordinal in ORDINALS[:repeats]:
+        subgoal = f"pick up the correct cube {{at}} for the {ordinal} time"
+        yield pick_stage(target, subgoal, timer="pick")
+        yield put_down_stage(release, "put it down", timer="put down")
+
+
+def _early_press(timer: str | None) -> Rule:
     """Return the rule against a premature press, given the name of its timer.
 
     A press fails only from step 50 to step 500 of that timer, as in RoboMME.

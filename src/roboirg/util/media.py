@@ -5,9 +5,10 @@ from __future__ import annotations
 import functools
 import io
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -162,21 +163,64 @@ def encode_jpeg(pixels: Pixels) -> bytes:
 def encode_mp4(clip: Clip) -> bytes:
     """Return a clip as an MP4 file, H.264; the same frames give the same bytes on one machine."""
     _check_pyav()
-    import av
-
     file = io.BytesIO()
-    with av.open(file, "w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=clip.rate.limit_denominator(1000))
-        stream.height, stream.width = clip.frames.shape[1:3]
-        stream.pix_fmt = "yuv420p"
-        stream.options = {"crf": str(QUALITY), "preset": "veryfast"}
-        # One thread, so that the same frames give the same bytes.
-        stream.codec_context.thread_count = 1
-        for pixels in clip.frames:
-            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(pixels), format="rgb24")
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
+    rate = clip.rate.limit_denominator(1000)
+    encoder = Mp4Encoder(file, clip.frames[0], rate, {"crf": str(QUALITY)})
+    for frame in clip.frames:
+        encoder.add(frame)
+    encoder.close()
     return file.getvalue()
+
+
+class Mp4Encoder:
+    """Encodes one video as H.264 in MP4: `add` each frame in order, then `close` once.
+
+    One thread encodes, so that the same frames give the same bytes on one machine.
+
+    Args:
+        target: path of the file, or a file in memory.
+        example: a frame, (height, width, 3); all have its size, in even numbers.
+        rate: frames per second.
+        options: of the encoder, such as ``{"crf": "23"}``, its constant rate factor.
+        codec: FFmpeg's name of the encoder.
+        pixels: FFmpeg's name of the format in which pixels are encoded.
+    """
+
+    def __init__(
+        self,
+        target: Path | io.BytesIO,
+        example: Pixels,
+        rate: Fraction,
+        options: Mapping[str, str],
+        codec: str = "libx264",
+        pixels: str = "yuv420p",
+    ) -> None:
+        import av
+
+        of_file = {}
+        if isinstance(target, Path):
+            # The index goes to the front, so that a player can start before it has read the whole
+            # file.
+            of_file["movflags"] = "+faststart"
+        self.container = av.open(target, "w", format="mp4", options=of_file)
+        stream: Any = self.container.add_stream(codec, rate=rate)
+        stream.height, stream.width = example.shape[:2]
+        stream.pix_fmt = pixels
+        stream.options = {"preset": "veryfast", **options}
+        stream.codec_context.thread_count = 1
+        self._stream = stream
+
+    def add(self, frame: Pixels) -> None:
+        """Encode a frame, uint8 (height, width, 3), RGB."""
+        import av
+
+        pixels = np.ascontiguousarray(frame)
+        self.container.mux(self._stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
+
+    def close(self) -> None:
+        """Write the frames that the encoder still holds, and complete the file."""
+        self.container.mux(self._stream.encode(None))
+        self.container.close()
 
 
 def _check_pyav() -> None:

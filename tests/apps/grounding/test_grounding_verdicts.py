@@ -12,12 +12,13 @@ from roboirg.apps.grounding.answer_scores import score_answers
 from roboirg.apps.grounding.items.answer_file import Answer
 from roboirg.apps.grounding.items.grounding_item import write_items
 from roboirg.apps.grounding.items.media_store import store_content
-from roboirg.apps.grounding.items.verdicts import right_reply
+from roboirg.apps.grounding.items.verdicts import judge_reply, right_reply
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.shortcuts.command_chance import is_right
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import Picture, encode_png
+from roboirg.util.reply_reading import CUT_OFF
 
 PICTURE = encode_png(Picture(np.zeros((256, 256, 3), np.uint8)))
 
@@ -73,14 +74,16 @@ def data(tmp_path_factory):
     return folder
 
 
-def run_inspect(data, replies_of, logs, question="slots", **options):
+def run_inspect(data, replies_of, logs, question="slots", stop_reason="stop", **options):
     inspect_ai = pytest.importorskip("inspect_ai")
     from inspect_ai.model import ModelOutput, ModelUsage, get_model
 
     from roboirg.apps.grounding.inspect_grounding import roboirg_grounding
 
     def reply(messages, tools, tool_choice, config):
-        found = ModelOutput.from_content("mockllm/model", replies_of(messages))
+        found = ModelOutput.from_content(
+            "mockllm/model", replies_of(messages), stop_reason=stop_reason
+        )
         found.usage = ModelUsage(input_tokens=1, output_tokens=1, total_tokens=2)
         return found
 
@@ -149,3 +152,39 @@ def test_inspect_says_what_is_wrong(data):
         roboirg_grounding(data=str(data), question="poem")
     with pytest.raises(InvalidValueError, match="has no items with the settings sung"):
         roboirg_grounding(data=str(data), settings="sung")
+
+
+@pytest.mark.parametrize(
+    ("question", "reply", "understood"),
+    [
+        ("choice", "Answer: A. But wait,", None),
+        ("slots", 'It may be {"color": "red"}, or', None),
+        ("slots", '{"color": "red", "repeats": 2}', '{"color": "red", "repeats": 2}'),
+    ],
+    ids=["a draft of a letter", "a draft of slots", "whole slots, cut off after them"],
+)
+def test_a_draft_that_was_cut_off_is_no_answer(question, reply, understood):
+    """Another answer may have followed, so it is unreadable instead of right or wrong."""
+    item = next(item for item in items() if item.task == "PickXtimes")
+
+    verdict = judge_reply(item, question, reply + CUT_OFF)
+
+    assert verdict.understood == understood
+
+
+def test_inspect_marks_replies_that_reached_the_limit_of_tokens(data, tmp_path):
+    pytest.importorskip("inspect_ai")
+    from roboirg.apps.grounding.inspect_grounding import log_answers
+
+    log = run_inspect(
+        data,
+        lambda _messages: "Answer: A. But",
+        tmp_path,
+        question="choice",
+        stop_reason="max_tokens",
+        settings="direct",
+        tasks="StopCube",
+    )
+
+    assert {answer.reply for answer in log_answers(log)} == {"Answer: A. But" + CUT_OFF}
+    assert log.results.scores[0].metrics["accuracy"].value == 0

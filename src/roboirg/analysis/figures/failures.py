@@ -8,15 +8,17 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from roboirg.analysis.figures.figure_style import paper
-from roboirg.analysis.figures.panels import RowLabel, panels
+from roboirg.analysis.figures.panels import Panel, RowLabel, panels
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.option_labels import options_label, options_sort_key
+from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.analysis.tables.diagnostic_tables import (
     FAILURE_KINDS,
     count_failures,
     occurring_failures,
 )
 from roboirg.analysis.tables.table_notes import where_played
+from roboirg.core.instruction_options import InstructionOptions
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -64,22 +66,42 @@ def draw_failures(content: RunData) -> Figure | None:
     causes = occurring_failures(counts_by_bar.values())
     if not causes:
         return None
-
     runs = list(dict.fromkeys(run for run, _ in counts_by_bar))
     settings = sorted({options for _, options in counts_by_bar}, key=options_sort_key)
-    figure, drawn = panels(
+    figure, drawn = _empty_panels(content, runs, settings, causes)
+    for panel, run in zip(drawn, runs, strict=True):
+        bars = [counts_by_bar.get((run, options), Counter()) for options in settings]
+        _draw_bars(panel, bars, causes)
+    return figure
+
+
+def _empty_panels(
+    content: RunData,
+    runs: Sequence[PolicyRun],
+    settings: Iterable[InstructionOptions],
+    causes: Iterable[str],
+) -> tuple[Figure, list[Panel]]:
+    """Lay out a panel for each policy run, with a row for each setting and the legend below."""
+    return panels(
         titles=list(map(content.name, runs)),
         labels=[RowLabel(options_label(options)) for options in settings],
         most_across=MOST_COLUMNS,
         keys=_keys(causes),
         notes=[NOTE, where_played(runs)],
     )
-    for panel, run in zip(drawn, runs, strict=True):
-        for place, options in zip(panel.places, settings, strict=True):
-            counts = counts_by_bar.get((run, options), Counter())
-            _draw_bar(panel.axes, place, counts, causes)
-        panel.set_scale(100, 25, "share of the episodes with a verdict, %")
-    return figure
+
+
+def _draw_bars(panel: Panel, bars: Sequence[Counter[str]], causes: Sequence[str]) -> None:
+    """Draw a bar for each row of a panel, with the scale below.
+
+    Args:
+        panel: of a policy.
+        bars: for each row the number of trials with a verdict, and failures by cause.
+        causes: the parts of the bars from left to right.
+    """
+    for place, counts in zip(panel.places, bars, strict=True):
+        _draw_bar(panel.axes, place, counts, causes)
+    panel.set_scale(100, 25, "share of the episodes with a verdict, %")
 
 
 def _keys(causes: Iterable[str]) -> dict[str, Artist]:

@@ -19,7 +19,7 @@ from roboirg.analysis.comparability import (
     differences_of,
 )
 from roboirg.analysis.figures.rates import Rate, RateRow, RateWords, draw_rates
-from roboirg.analysis.measures.measure import Measured, measure_groups
+from roboirg.analysis.measures.measure import mean_rate, pair
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.published import TRIALS, PublishedRow, RateTable, published_rows
 from roboirg.analysis.results.frame import RunNames
@@ -29,7 +29,8 @@ from roboirg.analysis.results.run_cells import CellKey, Cells
 from roboirg.analysis.tables.table_kinds import PAPER_TABLES, row_order, stages_text
 from roboirg.analysis.tables.table_notes import where_played
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.stats.cells import NOTHING, ByTask, Cell
+from roboirg.stats.cells import NOTHING, ByTask, Cell, rate_interval
+from roboirg.stats.paired_tests import measure_gap
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -129,7 +130,7 @@ class _Columns:
         The reference is drawn in each column, over the column's tasks. Cells without a verdict are
         left out.
         """
-        drawn: set[tuple[InstructionOptions, str]] = set()
+        drawn = set()
         for options, names in self.tasks.items():
             for task in names:
                 drawn.add((options, task))
@@ -148,36 +149,18 @@ class _Columns:
         played = _played(self.which, content.cells)
         rates_of_runs = {}
         for policy_run in content.frame.names:
-            groups = {}  # by options alone, as a key of one value
+            at_reference = played.get(self.reference, {}).get(policy_run, NOTHING)
+            rates = {}
             for options, names in self.tasks.items():
                 by_task = played.get(options, {}).get(policy_run)
                 if by_task is not None:
-                    groups[(options,)] = {task: by_task[task] for task in names}
-            if groups:
-                at_reference = played.get(self.reference, {}).get(policy_run, NOTHING)
-                rates_of_runs[policy_run] = self._measured(groups, at_reference)
+                    cells = {task: by_task[task] for task in names}
+                    # The reference is not compared with itself.
+                    others = NOTHING if options == self.reference else at_reference
+                    rates[self.title(options)] = _rate(cells, others)
+            if rates:
+                rates_of_runs[policy_run] = rates
         return rates_of_runs
-
-    def _measured(
-        self, groups: Mapping[tuple[InstructionOptions], ByTask], others: ByTask
-    ) -> dict[str, Rate]:
-        """Measure the rates of a policy run, each next to its reference; return them by title.
-
-        Args:
-            groups: the cells of each column, by options.
-            others: the policy run's cells at the reference, such as explicit, by task.
-        """
-
-        def reference(key: tuple[InstructionOptions]) -> ByTask:
-            if key == (self.reference,):
-                return NOTHING  # it is not compared with itself
-            return others
-
-        rates = {}
-        for measured in measure_groups(groups, reference):
-            (options,) = measured.key
-            rates[self.title(options)] = _rate(measured)
-        return rates
 
     def rows_of_paper(self) -> list[RateRow]:
         """Return the rows of published models below a heading, that with the best reference first.
@@ -215,10 +198,12 @@ def _signed_notes(differences: AllDifferences, names: RunNames) -> list[str]:
 def _compared_tasks(which: RateTable, cells: Cells) -> Tasks:
     """Return the columns of the figure, one for each set of options, with the tasks of each.
 
+    For example ``{options of temporal: ["BinFill", "StopCube"]}``: two tasks in a column.
+
     The reference, such as explicit, is drawn in every column and has none of its own unless it is
     alone. Without results the columns are the paper's. Contexts need several, else there are none.
     """
-    tasks: dict[InstructionOptions, list[str]] = _published_tasks(which)
+    tasks = _published_tasks(which)
     if cells:
         tasks = _shared_tasks(which, _played(which, cells))
     if len(tasks) > 1:
@@ -274,12 +259,17 @@ def _published_tasks(which: RateTable) -> dict[InstructionOptions, list[str]]:
     return tasks
 
 
-def _rate(measured: Measured[tuple[InstructionOptions]]) -> Rate:
-    """Return a success rate to draw, 0 to 1, and its reference's on the same episodes if known."""
-    rate = float(measured.rate or 0)
-    gap = measured.gap
+def _rate(cells: ByTask, others: ByTask) -> Rate:
+    """Return a success rate to draw, 0 to 1, and its reference's on the same episodes if known.
+
+    Args:
+        cells: the trials by task.
+        others: those of the reference; none if there is none.
+    """
+    rate = float(mean_rate(cells) or 0)
+    gap = measure_gap(pair(cells, others))
     if gap is None:
-        return Rate(rate, interval=measured.interval)
+        return Rate(rate, interval=rate_interval(cells.values()))
     # The reference follows from the gap; the interval is then that of the gap.
     return Rate(rate, rate - gap.value, gap.interval)
 

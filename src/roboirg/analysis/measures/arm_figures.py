@@ -149,9 +149,7 @@ def _figure(key: ArmKey, trials: Iterable[Arms]) -> ArmFigure | None:
     gap = measure_gap(pair(first, second))
     if gap is None:
         return None
-    interval = rate_interval(first.values())
-    other_interval = rate_interval(second.values())
-    return Measured(key, first, second, interval, gap, other_interval=other_interval)
+    return Measured(key, first, second, rate_interval(first.values()), gap)
 
 
 def _count(results: Iterable[Summary], cells: dict[str, Cell]) -> None:

@@ -80,15 +80,12 @@ def labeled(frame: Frame, breakdown: Breakdown) -> Frame:
     label. Explicit instructions have none unless the breakdown is of them, too.
     """
     judged = frame.take([outcome in ("success", "failure") for outcome in frame["outcome"]])
-    labels_of_rows: list[list[str]] = []
+    labels_of_rows = []
     for value, options in zip(judged[breakdown.name], judged["options"], strict=True):
-        labels: list[str] = []
-        is_broken_down = breakdown.in_explicit or options != REFERENCE_OPTIONS
-        if is_broken_down and isinstance(value, tuple):
-            labels += map(str, value)
-        elif is_broken_down and value is not None:
-            labels.append(str(value))
-        labels_of_rows.append(labels)
+        values = value if isinstance(value, tuple) else (value,)
+        if options == REFERENCE_OPTIONS and not breakdown.in_explicit:
+            values = ()
+        labels_of_rows.append([str(label) for label in values if label is not None])
     return judged.spread("label", labels_of_rows)
 
 
@@ -101,20 +98,19 @@ def break_down(frame: Frame, breakdown: Breakdown) -> tuple[Measured[LabelKey], 
     """
     by_options = gather(frame, ("run", "options"))
     by_label = gather(labeled(frame, breakdown), LabelKey._fields)
-    keys = list(map(LabelKey._make, by_label))
     runs = list(frame.names)
 
     def sort_key(key: LabelKey) -> SortKey:
         return runs.index(key.run), options_sort_key(key.options), natural(key.label)
 
+    # Of explicit instructions, whatever their labels, a gap takes only the episodes of its row.
     def explicit(key: LabelKey) -> ByTask:
         if key.options == REFERENCE_OPTIONS:
             return NOTHING
-        if breakdown.in_explicit:  # explicit instructions have labels, too: the same one counts
-            return groups.get(key._replace(options=REFERENCE_OPTIONS), NOTHING)
         return by_options.get((key.run, REFERENCE_OPTIONS), NOTHING)
 
-    groups = {key: by_label[key] for key in sorted(keys, key=sort_key)}
+    keys = sorted(map(LabelKey._make, by_label), key=sort_key)
+    groups = {key: by_label[key] for key in keys}
     return measure_groups(groups, explicit, family=lambda key: key.run)
 
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboirg.analysis.measures.measured_floors import measured_floors, settings_at_chance
 from roboirg.analysis.results.frame import RunNames
@@ -20,7 +19,7 @@ from roboirg.analysis.results.run_cells import Cells
 from roboirg.core.plain_text import counted
 from roboirg.language.settings import EXPLICIT
 from roboirg.stats.cells import Cell
-from roboirg.stats.intervals import Interval, Rows, TaskRates, mean_interval
+from roboirg.stats.intervals import Interval, Rows, Stratum, TaskRates, mean_interval
 from roboirg.stats.paired_tests import Pairs
 from roboirg.stats.rates import interval_note, points
 
@@ -110,14 +109,9 @@ def measure_headline(
     """
     tasks = list(_tasks_in_settings(cells, policy_run, settings))
     rows_of_tasks = [rows for rows in map(_paired_rows, tasks) if len(rows)]
-    if not rows_of_tasks:
+    strata = _strata(rows_of_tasks)
+    if not strata:
         return None
-    factors = _factors(rows_of_tasks)
-    if factors is None:
-        return None
-    strata = []
-    for rows, factors_of_task in zip(rows_of_tasks, factors, strict=True):
-        strata.append(TaskRates.of(rows).combined(*factors_of_task))
     return Headline(
         settings=tuple(settings),
         gap=sum(stratum.mean for stratum in strata),
@@ -178,8 +172,8 @@ def _paired_rows(task: _TaskCells) -> Rows:
     return rows[rows.any(axis=1)]
 
 
-def _factors(tasks: Sequence[Rows]) -> NDArray[np.float64] | None:
-    """Return how much each task's rates count in the headline number, shape (tasks, 2 k).
+def _strata(tasks: Sequence[Rows]) -> list[Stratum]:
+    """Return what each task adds to the headline number.
 
     The number is the mean over k settings of the gap to explicit, each the mean over the tasks that
     have the setting. With two settings, of which a task alone has the first one, that task's rates
@@ -189,14 +183,19 @@ def _factors(tasks: Sequence[Rows]) -> NDArray[np.float64] | None:
         tasks: for each task its results, as of `_paired_rows`.
 
     Returns:
-        None if a setting has no trials in any task.
+        None of them if a setting has no trials in any task.
     """
+    if not tasks:
+        return []
     trials = np.array([rows.sum(axis=0)[1::2] for rows in tasks])
-    tasks_with_trials = np.count_nonzero(
-        trials, axis=0
-    )  # of each setting, and of explicit next to it
+    # Of each setting, and of explicit next to it.
+    tasks_with_trials = np.count_nonzero(trials, axis=0)
     if not tasks_with_trials.all():
-        return None
+        return []
     gaps = np.resize([1.0, -1.0], trials.shape)
     settings = trials.shape[1] / 2
-    return np.asarray(gaps / tasks_with_trials / settings)
+    factors = gaps / tasks_with_trials / settings
+    strata = []
+    for rows, factors_of_task in zip(tasks, factors, strict=True):
+        strata.append(TaskRates.of(rows).combined(*factors_of_task))
+    return strata

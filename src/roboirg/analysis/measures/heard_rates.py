@@ -44,7 +44,7 @@ def heard_notes(frame: Frame, names: RunNames) -> list[str]:
     counts = count_heard(frame, ())
     episodes = Counter(frame["run"])
     guesses = Counter(itertools.compress(frame["run"], frame["guessed"]))
-    notes: list[str] = []
+    notes = []
     for run, name in names.items():
         heard = counts.get((run,), Counter())
         if heard["cut"] or heard["unknown"]:

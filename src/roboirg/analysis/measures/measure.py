@@ -7,7 +7,8 @@ its reference: the gap pairs trials of the same episode. A scope is a task, a su
 
 from __future__ import annotations
 
-from collections import defaultdict
+import functools
+from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -69,7 +70,6 @@ class Measured(Generic[K]):
         interval: 95 %, of the rate; None if it was not measured, or with too few episodes.
         gap: to the first reference on the same episodes; None without pairs.
         second_gap: to the second reference, if there is one.
-        other_interval: 95 %, of the rate of the first reference; None if it was not measured.
         p_holm: p-value of the gap after Holm's correction over its family.
     """
 
@@ -79,7 +79,6 @@ class Measured(Generic[K]):
     interval: Interval | None = None
     gap: Gap | None = None
     second_gap: Gap | None = None
-    other_interval: Interval | None = None
     p_holm: float | None = None
 
     @property
@@ -155,8 +154,9 @@ def _trials_of_groups(
         InvalidValueError: a group has several values in a column of `KEPT_APART` that is not
             pooled, or several rows of the same trial.
     """
-    unmixed = [name for name in KEPT_APART if name in frame and name not in (*by, *pool)]
-    rows = _known_rows(frame, (*by, *unmixed, *pool, *TRIAL))
+    named = (*by, *pool)
+    unmixed = [name for name in KEPT_APART if name in frame and name not in named]
+    rows = _known_rows(frame, (*named, *unmixed, *TRIAL))
     _check_unmixed(rows, by, unmixed)
     # What is pooled distinguishes trials of an episode, as the policy seed does, so it becomes part
     # of the seed: a trial of the resolved form has the seed (0, "resolved").
@@ -274,13 +274,18 @@ def _check(
     """
     columns = list(map(str, frame))
     check_names("column", (*by, *family, *against, *pool, *TRIAL), columns)
-    for name in columns:
-        if columns.count(name) > 1:
+    for name, count in Counter(columns).items():
+        if count > 1:
             raise InvalidValueError(f"The frame has several columns {name!r}; keep one.")
     for name in (*family, *against):
         if name not in by:
             raise InvalidValueError(f"The column {name!r} is not in by: {', '.join(by)}.")
-    for name, value in against.items():
+    _check_values(frame, against)
+
+
+def _check_values(frame: Columns, wanted: Mapping[str, object]) -> None:
+    """Check that some row of a frame has each wanted value in its column."""
+    for name, value in wanted.items():
         known = set(frame[name])
         if value not in known:
             raise UnknownNameError(f"row with the {name}", value, sorted(map(str, known)))
@@ -288,22 +293,6 @@ def _check(
 
 def _no_reference(_key: Key) -> ByTask:
     return NOTHING
-
-
-class _KnownPairs:
-    """Pairs cells, each two only once: a task is in several groups, alone and in averages."""
-
-    def __init__(self) -> None:
-        self._pairs: dict[tuple[int, int], Pairs] = {}
-        self._cells: list[Cell] = []  # kept, as the keys are their identities
-
-    def __call__(self, first: Cell, second: Cell) -> Pairs:
-        """Return the trials of two cells, paired by episode."""
-        key = (id(first), id(second))
-        if key not in self._pairs:
-            self._pairs[key] = Pairs.of(first, second)
-            self._cells += (first, second)
-        return self._pairs[key]
 
 
 def measure_groups(
@@ -324,7 +313,8 @@ def measure_groups(
             are corrected over all of them.
         with_intervals: whether rates have intervals.
     """
-    pairs_of = _KnownPairs()
+    # A task is in several groups, alone and in averages, and is paired once.
+    pairs_of = functools.cache(Pairs.of)
     measured = []
     for key, cells in groups.items():
         interval = rate_interval(cells.values()) if with_intervals else None
@@ -424,26 +414,35 @@ def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
     if wanted is not None:
         groups = {key: by_task for key, by_task in scopes.items() if key.scope in wanted}
 
-    tasks: dict[str, set[str]] = defaultdict(set)
-    for key, by_task in scopes.items():
-        tasks[key.scope].update(by_task)
-
-    def is_task(key: ScopeKey) -> bool:
-        return key.scope in scopes[key]  # the cells of a scope are by the names of its tasks
-
     def with_options(key: ScopeKey, options: InstructionOptions) -> ByTask:
         if options == key.options:
             return NOTHING
         return scopes.get(key._replace(options=options), NOTHING)
 
-    def read_together(key: ScopeKey) -> object:
-        has_several_tasks = len(tasks[key.scope]) > 1
-        return key.policy_run, is_task(key), key.scope == ALL_TASKS, has_several_tasks
-
+    families = _families(scopes)
     found = measure_groups(
         groups,
         lambda key: with_options(key, REFERENCE_OPTIONS),
         lambda key: with_options(key, replace(key.options, form="resolved")),
-        family=read_together,
+        family=lambda key: (key.policy_run, families[key.scope]),
     )
     return {summary.key: summary for summary in found}
+
+
+def _families(scopes: Mapping[ScopeKey, ByTask]) -> dict[str, str]:
+    """Return for each scope with which others it is read: tasks, suites, or all tasks.
+
+    A suite with a single task is ``alone``.
+    """
+    tasks: defaultdict[str, set[str]] = defaultdict(set)
+    for key, by_task in scopes.items():
+        tasks[key.scope].update(by_task)
+    families = {}
+    for scope, names in tasks.items():
+        if scope == ALL_TASKS:
+            families[scope] = ALL_TASKS
+        elif scope in names:  # the cells of a scope are by the names of its tasks
+            families[scope] = "tasks"
+        else:
+            families[scope] = "suites" if len(names) > 1 else "alone"
+    return families

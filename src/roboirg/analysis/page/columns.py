@@ -6,7 +6,7 @@ A page of ten thousand episodes must open and filter at once.
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple, get_args
 
@@ -16,6 +16,7 @@ from roboirg.analysis.results.option_labels import options_label, options_sort_k
 from roboirg.analysis.tables.diagnostic_tables import FAILURE_KINDS, UNATTRIBUTED
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language import FORMS
 from roboirg.records.mixing import FAIRNESS
 from roboirg.records.record import ERROR_KINDS, Outcome, Summary
 
@@ -52,28 +53,37 @@ def make_filters(episodes: PageEpisodes) -> dict[str, Filter]:
     has them, and the value of each episode.
     """
     records = episodes.records
-    tasks = task_order({record.task for record in records})
-    suites = {task: suite(task) or "other tasks" for task in tasks}
-    options = sorted({record.column for record in records}, key=options_sort_key)
-    settings = {column: setting_label(column) for column in options}
-    forms = [column.form for column in options]
-    seeds = sorted({record.policy_seed for record in records})
+
+    def values_of(name: str) -> list[str]:
+        return [getattr(record, name) for record in records]
+
+    seeds = [record.policy_seed for record in records]
+    seed_order = map(str, sorted(set(seeds)))
     return {
         "policy": _policy_filter(episodes),
-        "task": _filter("task", records, lambda record: record.task, tasks, suites),
-        "setting": _filter(
-            "setting", records, lambda record: settings[record.column], settings.values()
-        ),
-        "form": _filter("form", records, lambda record: record.form, forms),
-        "difficulty": _filter(
-            "difficulty", records, lambda record: record.difficulty, DIFFICULTIES
-        ),
-        "outcome": _filter("outcome", records, lambda record: record.outcome, get_args(Outcome)),
-        "failure": _filter("why it failed", records, _failure, _KINDS, _KINDS),
-        "seed": _filter(
-            "policy seed", records, lambda record: str(record.policy_seed), map(str, seeds)
-        ),
+        "task": _task_filter(values_of("task")),
+        "setting": _setting_filter(records),
+        "form": _filter("form", values_of("form"), FORMS),
+        "difficulty": _filter("difficulty", values_of("difficulty"), DIFFICULTIES),
+        "outcome": _filter("outcome", values_of("outcome"), get_args(Outcome)),
+        "failure": _filter("why it failed", list(map(_failure, records)), _KINDS, _KINDS),
+        "seed": _filter("policy seed", list(map(str, seeds)), seed_order),
     }
+
+
+def _task_filter(tasks: Sequence[str]) -> Filter:
+    """Return the filter by task, below the names of the suites."""
+    in_order = task_order(set(tasks))
+    suites = {task: suite(task) or "other tasks" for task in in_order}
+    return _filter("task", tasks, in_order, suites)
+
+
+def _setting_filter(records: Iterable[Summary]) -> Filter:
+    options = [record.column for record in records]
+    in_order = sorted(set(options), key=options_sort_key)
+    labels = {column: setting_label(column) for column in in_order}
+    values = [labels[column] for column in options]
+    return _filter("setting", values, labels.values())
 
 
 def _policy_filter(episodes: PageEpisodes) -> Filter:
@@ -85,8 +95,7 @@ def _policy_filter(episodes: PageEpisodes) -> Filter:
 
 def _filter(
     label: str,
-    records: Iterable[Summary],
-    read: Callable[[Summary], str | None],
+    values: Sequence[str | None],
     order: Iterable[str],
     groups: Mapping[str, str] | None = None,
 ) -> Filter:
@@ -97,20 +106,17 @@ def _filter(
 
     Args:
         label: of the filter.
-        records: of the episodes.
-        read: returns the value of an episode; None if it has none.
+        values: of the episodes; None if one has no value.
         order: values that come first; others follow by name.
         groups: the heading above each value; None without headings.
     """
-    values = list(map(read, records))
     occurring = {value for value in values if value is not None}
-    choices: list[str] = []
-    places: dict[str | None, int] = {None: _NO_VALUE}
-    for value in (*order, *sorted(occurring)):
-        if value in occurring and value not in places:
-            places[value] = len(choices)
+    choices = []
+    for value in dict.fromkeys((*order, *sorted(occurring))):
+        if value in occurring:
             choices.append(value)
-    column = [places[value] for value in values]
+    places = {value: place for place, value in enumerate(choices)}
+    column = [_NO_VALUE if value is None else places[value] for value in values]
     headings = []
     if groups is not None:
         headings = [groups[value] for value in choices]

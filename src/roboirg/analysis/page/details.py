@@ -289,14 +289,9 @@ class _PlayedScene:
             return []
         steps = [event.step for event in record.events]
         video_steps = max(0, -min(steps))
-        last_step = max(record.steps, *steps)
-        events = []
-        for event in record.events:
-            fact = self.facts.get((event.kind, event.subject, event.place))
-            if fact is not None:
-                events.append(Event(event.step + video_steps, fact, event.holds))
+        end = video_steps + max(record.steps, *steps)
         try:
-            completed = completed_stages(self.episode, events, video_steps + last_step)
+            completed = completed_stages(self.episode, self._events(record, video_steps), end)
         except KeyError:
             return []  # incomplete events
         stages = []
@@ -306,6 +301,15 @@ class _PlayedScene:
                 step -= video_steps
             stages.append(_PlayedStage(plain_subgoal(stage), step))
         return stages
+
+    def _events(self, record: Record, video_steps: int) -> list[Event]:
+        """Return the events of facts that stages depend on, with steps from the video's start."""
+        events = []
+        for event in record.events:
+            fact = self.facts.get((event.kind, event.subject, event.place))
+            if fact is not None:
+                events.append(Event(event.step + video_steps, fact, event.holds))
+        return events
 
 
 _UNKNOWN_SCENE = _PlayedScene(None, {}, {})
@@ -325,7 +329,7 @@ def _played_scene(task: str, split: str, number: int, arm: str) -> _PlayedScene:
     facts: dict[tuple[str, str, str | None], Fact] = {}
     for stage in (*episode.demonstration, *episode.stages):
         for condition in (stage.expects, *stage.forbids):
-            facts |= {fact: fact for fact in facts_of(condition)}
+            facts.update((fact, fact) for fact in facts_of(condition))
     return _PlayedScene(episode, _object_names(episode.scene), facts)
 
 

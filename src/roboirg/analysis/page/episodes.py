@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -112,21 +113,18 @@ def _episodes(runs: SourceByName, frame: Frame, *, videos: bool) -> Iterator[Pag
     logs = {name: logged_slugs(source.folder) for name, source in sources.items()}
     for policy_run, record in _played_by_scene(frame):
         folder = sources[policy_run.run].folder
-        slug = record.slug
-        # Its last part is a hash of all that identifies the episode in its run.
-        key = slug.rpartition("-")[2]
+        # The last part of its slug is a hash of all that identifies the episode in its run.
+        key = record.slug.rpartition("-")[2]
         number = names.index(policy_run.run)
         if number > 0:
             key += f"-{number + 1}"  # as the other run may have the same episode
-        film = None
+        film = _existing(folder, record.video) if videos else None
         poster = None
-        if videos and record.video is not None:
-            film = _existing(folder, record.video)
-            if film is not None:
-                poster = _existing(folder, poster_name(record.video))
+        if film is not None:
+            poster = _existing(folder, poster_name(str(record.video)))
         log = None
-        if slug in logs[policy_run.run]:
-            log = log_path(folder, slug)
+        if record.slug in logs[policy_run.run]:
+            log = log_path(folder, record.slug)
         yield PageEpisode(key, record, policy_run, film, poster, log)
 
 
@@ -136,15 +134,18 @@ def _played_by_scene(frame: Frame) -> Iterator[tuple[PolicyRun, Summary]]:
     So the episodes of the same scene, in several settings, follow one another. Policy runs, and the
     tasks of each, stay in the order of the frame.
     """
-    groups: dict[tuple[PolicyRun, str], list[Summary]] = {}
+    groups = defaultdict(list)
     for policy_run, result in zip(frame["run"], frame["result"], strict=True):
         if isinstance(result, Summary):
-            groups.setdefault((policy_run, result.task), []).append(result)
+            groups[policy_run, result.task].append(result)
     for (policy_run, _), results in groups.items():
         for result in sorted(results, key=lambda result: result.episode):
             yield policy_run, result
 
 
-def _existing(folder: Path, name: str) -> Path | None:
+def _existing(folder: Path, name: str | None) -> Path | None:
+    """Return a file of a run; None without a name, or if there is no such file."""
+    if name is None:
+        return None
     path = run_file(folder, name)
     return path if path.is_file() else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 from roboirg.analysis.measures.measure import (
@@ -100,9 +101,9 @@ def _rows(cells: Cells) -> dict[str, JsonObject]:
     and that of a suite if it has all tasks.
     """
     tasks = task_order({key.task for key in cells})
-    suites: dict[str | None, list[str]] = {}
+    suites = defaultdict(list)
     for task in tasks:
-        suites.setdefault(suite(task), []).append(task)
+        suites[suite(task)].append(task)
     rows: dict[str, JsonObject] = {}
     if len(tasks) > 1:
         rows[ALL_TASKS] = {"task": None, "suite": None}
@@ -181,7 +182,7 @@ def _gap_notes(summary: ScopeSummary) -> list[str]:
     what it means. The gap to explicit is tested only if explicit has a success to lose, that is, if
     there is a retention, the share of it that is kept.
     """
-    lines: list[str] = []
+    lines = []
     gap = summary.gap
     if gap is not None:
         text = f"{points(gap.value)} points to explicit"

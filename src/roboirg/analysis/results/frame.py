@@ -257,8 +257,8 @@ class Frame(Mapping[str, Any]):
             name: of the new column.
             values: for each row none, one or several; rows without a value are left out.
         """
-        rows: list[int] = []
-        column: list[object] = []
+        rows = []
+        column = []
         for row, values_of_row in enumerate(values):
             for value in values_of_row:
                 rows.append(row)
@@ -333,7 +333,7 @@ def make_frame(runs: Runs, planned: Sequence[Job] = (), *, run_name: str = "") -
     """
     policies_apart = _played_twice(runs)
     missing = {identity_key(job): job for job in planned}
-    rows: list[_FrameRow] = []
+    rows = []
     for name, results in runs:
         for result in results:
             policy_run = PolicyRun.of(result, run_name)
@@ -388,11 +388,9 @@ class _Groups(NamedTuple):
     @classmethod
     def of(cls, values: Sequence[Any], key: Callable[[Any], SortKey]) -> _Groups:
         """Return the groups of rows with some values, which are sorted by a key."""
-        places: dict[Any, int] = {}  # of the values, in the order in which they occur
-        places_of_rows = [places.setdefault(value, len(places)) for value in values]
-        distinct = sorted(places, key=key)
-        numbers = {places[value]: number for number, value in enumerate(distinct)}
-        return cls(as_column(distinct), [numbers[place] for place in places_of_rows])
+        distinct = sorted(dict.fromkeys(values), key=key)
+        numbers = {value: number for number, value in enumerate(distinct)}
+        return cls(as_column(distinct), [numbers[value] for value in values])
 
     def column(self, rows: Iterable[int]) -> Values:
         """Return the values of some rows; equal ones are the same object, found faster later."""
@@ -413,9 +411,8 @@ def _sorted(rows: Sequence[_FrameRow], policies: Sequence[str]) -> Frame:
     tasks = _Groups.of([job.task for job in jobs], _task_key)
     options = _Groups.of([job.column for job in jobs], options_sort_key)
     groups = zip(runs.numbers, tasks.numbers, options.numbers, strict=True)
-    order = _order(groups, jobs)  # numbers of the given rows
-
-    columns = _columns_of([rows[row] for row in order])
+    order = _order(groups, jobs)
+    columns = _columns_of([rows[number] for number in order])
     columns["place"] = np.array(order, dtype=np.int64)
     columns["run"] = runs.column(order)
     columns["options"] = options.column(order)
@@ -424,10 +421,10 @@ def _sorted(rows: Sequence[_FrameRow], policies: Sequence[str]) -> Frame:
 
 def _order(groups: Iterable[tuple[int, ...]], jobs: Sequence[Job]) -> list[int]:
     """Return the numbers of the rows, sorted by group and within it by episode and policy seed."""
-    places = []
-    for row, (group, job) in enumerate(zip(groups, jobs, strict=True)):
-        places.append((group, job.episode, job.policy_seed, row))
-    return [row for *_, row in sorted(places)]
+    keys = []
+    for group, job in zip(groups, jobs, strict=True):
+        keys.append((group, job.episode, job.policy_seed))
+    return sorted(range(len(keys)), key=keys.__getitem__)
 
 
 def _columns_of(rows: Sequence[_FrameRow]) -> dict[str, Values]:

@@ -6,6 +6,7 @@ environment, are another policy run and never averaged with the rest.
 
 from __future__ import annotations
 
+import functools
 import operator
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -13,7 +14,7 @@ from typing import NamedTuple
 from roboirg.core.arms import TOLD
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS, EnvironmentOptions
 from roboirg.core.subgoal_text import BETWEEN_VERSIONS, SCRIPTED_HANDS
-from roboirg.core.versions import Versions
+from roboirg.core.versions import Makeup, Versions
 from roboirg.core.word_pools import words_label
 from roboirg.records.record import Job, Summary
 
@@ -76,14 +77,7 @@ class PolicyRun(NamedTuple):
 
     @classmethod
     def of(cls, result: Summary, run: str = "") -> PolicyRun:
-        versions = Versions(
-            result.ref.makeup,
-            environment_version=result.environment_version,
-            language_version=result.language_version,
-            policy_version=result.played_version,
-        )
-        conditions = EvalConditions.of(result)
-        return cls(result.policy, conditions, versions, run, result.privileged, result.robot)
+        return _policy_run(run, *_read_facts(result))
 
     @property
     def language(self) -> str:
@@ -107,6 +101,39 @@ class PolicyRun(NamedTuple):
             return ""
         has_scripted_hands = SCRIPTED_HANDS in str(self.versions.policy_version)
         return HANDS_MARK if has_scripted_hands else PRIVILEGED_MARK
+
+
+_read_facts = operator.attrgetter(
+    "policy", "split", "environment", "options.wordings", "arm", "ref.makeup",
+    "environment_version", "language_version", "played_version", "privileged", "robot",
+)  # fmt: skip
+"""What of a result its policy run is made of, in the order of `_policy_run`."""
+
+
+@functools.lru_cache(maxsize=1024)
+def _policy_run(
+    run: str,
+    policy: str,
+    split: str,
+    environment: EnvironmentOptions,
+    wordings: str | None,
+    arm: str,
+    makeup: Makeup,
+    environment_version: int,
+    language_version: str,
+    played_version: str,
+    is_privileged: bool,
+    robot: str | None,
+) -> PolicyRun:
+    """Return a policy run; the same object for all results that agree in these facts."""
+    versions = Versions(
+        makeup,
+        environment_version=environment_version,
+        language_version=language_version,
+        policy_version=played_version,
+    )
+    conditions = EvalConditions(split, environment, wordings, arm)
+    return PolicyRun(policy, conditions, versions, run, is_privileged, robot)
 
 
 def labels(policy_runs: Iterable[PolicyRun]) -> dict[PolicyRun, str]:
@@ -145,7 +172,7 @@ def _version_labels(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> 
 
     For example ``["language 5"]`` if another policy run heard the language's version 4.
     """
-    labels_by_trait: dict[str, str] = {}
+    labels_by_trait = {}
     for other in policy_runs:
         other_versions = other.versions
         if other.policy != policy_run.policy:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from roboirg.analysis.results.frame import COLUMNS, Frame, FrameColumn, as_column, make_frame
@@ -138,9 +139,9 @@ def with_columns(
     """
     results = frame["result"]
     # A result and its record have the same key; several rows may have the same result.
-    rows_by_play: dict[object, list[int]] = {}
+    rows_by_play = defaultdict(list)
     for row, result in enumerate(results):
-        rows_by_play.setdefault(_play_key(result), []).append(row)
+        rows_by_play[_play_key(result)].append(row)
 
     columns: dict[str, list[object]] = {}
     for name in reads:

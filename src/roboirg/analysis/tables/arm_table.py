@@ -22,7 +22,7 @@ from roboirg.analysis.results.policy_run import labels
 from roboirg.analysis.tables.table import Row, Table, named_columns
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.stats.cells import NOTHING, ByTask
+from roboirg.stats.cells import NOTHING, ByTask, rate_interval
 from roboirg.stats.intervals import TOO_FEW, Interval
 from roboirg.stats.rates import (
     NOT_APPLICABLE,
@@ -131,7 +131,7 @@ def _words(figure: ArmFigure) -> Sequence[str]:
     return (
         str(episodes),
         _rate_text(figure.cells, figure.interval),
-        _rate_text(figure.others, figure.other_interval),
+        _rate_text(figure.others, rate_interval(figure.others.values())),
         chance,
         *gap_words(figure.gap, figure.p_holm),
     )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import functools
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
-from roboirg.analysis.measures.breakdowns import Breakdown, break_down
+from roboirg.analysis.measures.breakdowns import Breakdown, LabelKey, break_down
 from roboirg.analysis.measures.comparison_text import incomplete_note
 from roboirg.analysis.measures.failure_rates import (
     EndRates,
@@ -57,6 +57,7 @@ from roboirg.core import failures
 from roboirg.core.errors import InvalidValueError
 from roboirg.language.settings import settings_of
 from roboirg.stats.cells import NOTHING, Key, rows_of
+from roboirg.stats.paired_tests import Gap
 from roboirg.stats.rates import (
     NOT_APPLICABLE,
     gap_words,
@@ -130,33 +131,20 @@ def make_forms_table(data: RunData) -> Table:
     Raises:
         InvalidValueError: no episode was played in both forms.
     """
+    averages = _implicit_averages(data)
     rows = []
-    notes = [_FORMS_NOTE]
-    for average in _implicit_averages(data):
-        gap = average.gap
-        if gap is None:
-            continue  # no episode of these was played in both forms
-        # Trials are compared in pairs: the implicit form is the first, the resolved one the second.
-        overlap = gap.overlap
-        counts = (
-            overlap.trials,
-            overlap.both,
-            overlap.only_second,
-            overlap.only_first,
-            overlap.neither,
-        )
-        cells = (*map(str, counts), *gap_words(gap, average.p_holm))
-        key = average.key
-        scope = key.scope
-        if gap.tasks < len(_tasks_with(key)) or not average.counts.is_complete:
-            scope += f" {PARTIAL_MARK}"
-            notes = [_FORMS_NOTE, PARTIAL_NOTE]
-        group = f"{data.frame.names[key.policy_run]}, {scope}"
-        rows.append(Row(group, key.options.setting, cells))
+    for average in averages:
+        group = f"{data.frame.names[average.key.policy_run]}, {average.key.scope}"
+        if _is_partial(average):
+            group += f" {PARTIAL_MARK}"
+        rows.append(Row(group, average.key.options.setting, _form_cells(average)))
     if not rows:
         raise InvalidValueError(
             "The runs have no episode in both forms; play them with --forms implicit,resolved."
         )
+    notes = [_FORMS_NOTE]
+    if any(map(_is_partial, averages)):
+        notes.append(PARTIAL_NOTE)
     return Table(
         key="forms",
         title="Implicit and resolved form",
@@ -170,43 +158,60 @@ def make_forms_table(data: RunData) -> Table:
     )  # fmt: skip
 
 
-def _tasks_with(key: ScopeKey) -> list[str]:
-    """Return the tasks of a suite, or of all suites, that have a setting."""
-    found = []
-    for name, task in all_tasks().items():
+def _form_cells(average: ScopeSummary) -> RowCells:
+    """Return the cells of a row of the table of forms: numbers of trials, and the gap.
+
+    Trials are compared in pairs: the implicit form is the first, the resolved one the second.
+    """
+    gap = cast("Gap", average.gap)
+    both, only_implicit, only_resolved, neither = gap.overlap
+    counts = (gap.overlap.trials, both, only_resolved, only_implicit, neither)
+    return (*map(str, counts), *gap_words(gap, average.p_holm))
+
+
+def _is_partial(average: ScopeSummary) -> bool:
+    """Return whether an average lacks a task that has the setting, or trials of a task."""
+    key = average.key
+    tasks = 0
+    for task in all_tasks().values():
         if key.scope in (task.suite, ALL_TASKS) and key.options.setting in settings_of(task):
-            found.append(name)
-    return found
+            tasks += 1
+    compared = cast("Gap", average.gap).tasks
+    return compared < tasks or not average.counts.is_complete
 
 
 def _implicit_averages(data: RunData) -> Sequence[ScopeSummary]:
     """Return success in implicit instructions, with its gap to their resolved form.
 
     The resolved form names what the implicit one only refers to. All are averages over a suite or
-    over all tasks, sorted by policy run, suite and setting.
+    over all tasks, sorted by policy run, suite and setting. Those of which no episode was played in
+    both forms are left out.
     """
-    suites = {suite(key.task) for key in data.cells}
-    suites.discard(None)  # of tasks that are in no suite
+    suites = {suite(key.task) for key in data.cells} - {None}  # of tasks that are in no suite
     averages = []
     for key, summary in data.summaries.items():
         is_task = key.scope in summary.cells
-        if is_task or not has_default_options(key.options):
-            continue
-        if key.scope == ALL_TASKS and len(suites) <= 1:
-            continue  # it would only repeat the suite
-        # The first gap is to explicit, the second one to the resolved form.
-        averages.append(replace(summary, gap=summary.second_gap))
+        is_repeated = key.scope == ALL_TASKS and len(suites) <= 1  # it would only repeat the suite
+        is_shown = has_default_options(key.options) and not is_task and not is_repeated
+        if is_shown and summary.second_gap is not None:
+            # The first gap is to explicit, the second one to the resolved form.
+            averages.append(replace(summary, gap=summary.second_gap))
 
+    in_order = _in_row_order(averages, data)
+    return with_holm(in_order, lambda key: key.policy_run)
+
+
+def _in_row_order(averages: Iterable[ScopeSummary], data: RunData) -> list[ScopeSummary]:
+    """Sort averages by policy run, suite and setting, each in its usual order."""
     runs = list(data.frame.names)
-    scopes = list(dict.fromkeys(average.key.scope for average in averages))
+    scopes = list(dict.fromkeys(key.scope for key in data.summaries))
 
-    def row_order(average: ScopeSummary) -> SortKey:
+    def place(average: ScopeSummary) -> SortKey:
         key = average.key
         setting = setting_sort_key(key.options.setting)
         return runs.index(key.policy_run), scopes.index(key.scope), setting
 
-    averages.sort(key=row_order)
-    return with_holm(averages, lambda key: key.policy_run)
+    return sorted(averages, key=place)
 
 
 def count_failures(frame: Frame, by: Sequence[str]) -> Mapping[Key, Counter[str]]:
@@ -332,14 +337,17 @@ def make_failure_name_table(data: RunData) -> Table:
 
     cells = {}
     for key, counts in counts_by_scope.items():
-        failed = [counts[name] for name in names]  # in the order of the columns
-        cells[key] = list(map(str, (counts["trials"], sum(failed), *failed)))
-    failure_columns = [Column(name.replace("_", " "), FAILURE_KINDS[name]) for name in names]
+        failed = [counts[name] for name in names]
+        numbers = (counts["trials"], sum(failed), *failed)
+        cells[key] = list(map(str, numbers))
+    columns = list(named_columns("trials", "failures"))
+    for name in names:
+        columns.append(Column(name.replace("_", " "), FAILURE_KINDS[name]))
     return Table(
         key="failure_names",
         title="Failures by name",
         heads=OF_CELLS,
-        columns=(*named_columns("trials", "failures"), *failure_columns),
+        columns=columns,
         rows=_rows(cells, data.frame),
         notes=(f"Failed episodes, and how many of them failed in each way. {_KINDS_NOTE}",),
     )
@@ -362,16 +370,11 @@ def make_heard_table(data: RunData) -> Table:
     Raises:
         InvalidValueError: no policy declares how many tokens it reads.
     """
-    counts = count_heard(data.frame, ("options", "task"))
-    if not counts:
+    counts_by_scope = _prompts_by_scope(data.frame)
+    if not counts_by_scope:
         raise InvalidValueError(
             "No policy of the runs declares how many tokens it reads; prompt_tokens=N does."
         )
-    # A row's share of cut prompts is the mean over its tasks: one task, or all of them.
-    counts_by_scope: defaultdict[ScopeKey, list[HeardCounts]] = defaultdict(list)
-    for (run, options, task), counts_of_task in counts.items():
-        counts_by_scope[ScopeKey(run, task, options)].append(counts_of_task)
-        counts_by_scope[ScopeKey(run, ALL_TASKS, options)].append(counts_of_task)
     played = by_scope(data.cells)
     heard = by_scope(cells_of(data.frame.where(prompt="heard")))
     cells = {}
@@ -387,6 +390,15 @@ def make_heard_table(data: RunData) -> Table:
         rows=_rows(cells, data.frame),
         notes=(_HEARD_NOTE,),
     )
+
+
+def _prompts_by_scope(frame: Frame) -> dict[ScopeKey, list[HeardCounts]]:
+    """Return the numbers of prompts of each task in a scope: a single task, or all tasks."""
+    counts_by_scope: defaultdict[ScopeKey, list[HeardCounts]] = defaultdict(list)
+    for (run, options, task), counts in count_heard(frame, ("options", "task")).items():
+        for scope in (task, ALL_TASKS):
+            counts_by_scope[ScopeKey(run, scope, options)].append(counts)
+    return counts_by_scope
 
 
 def _heard_cells(
@@ -445,31 +457,30 @@ def make_breakdown_table(breakdown: Breakdown, frame: Frame) -> Table:
         breakdown: the column of the frame with the kinds, and its headings.
         frame: the results.
     """
+    found = break_down(frame, breakdown)
     rows = []
-    lacks_gap = False
-    for measured in break_down(frame, breakdown):
+    for measured in found:
         key = measured.key
-        group = frame.group_label(key.run, key.options)
         gap = gap_words(measured.gap, measured.p_holm)
         cells = (str(measured.counts.episodes), _rate(measured), *gap)
-        rows.append(Row(group, key.label, cells))
-        if measured.gap is None and key.options != REFERENCE_OPTIONS:
-            lacks_gap = True
-    without_verdict = sum(outcome not in _WITH_VERDICT for outcome in frame["outcome"])
-
-    notes = [f"{_BREAKDOWN_NOTE} {breakdown.note}"]
-    if lacks_gap:
-        notes.append(f"{NOT_APPLICABLE} without explicit on the same episodes.")
-    if without_verdict:
-        notes.append(incomplete_note(without_verdict))
+        rows.append(Row(frame.group_label(key.run, key.options), key.label, cells))
     return Table(
         key=f"by_{breakdown.name}",
         title=f"Gap to explicit by {breakdown.title}",
         heads=(OF_CELLS[0], breakdown.title),
         columns=named_columns("episodes", "success", "gap", "95 % interval", "p"),
         rows=rows,
-        notes=notes,
+        notes=[f"{_BREAKDOWN_NOTE} {breakdown.note}", *_gap_notes(found, frame)],
     )
+
+
+def _gap_notes(found: Iterable[Measured[LabelKey]], frame: Frame) -> Iterator[str]:
+    """Yield sentences on what a breakdown lacks: gaps of some rows, or verdicts of trials."""
+    if any(row.gap is None and row.key.options != REFERENCE_OPTIONS for row in found):
+        yield f"{NOT_APPLICABLE} without explicit on the same episodes."
+    without_verdict = sum(outcome not in _WITH_VERDICT for outcome in frame["outcome"])
+    if without_verdict:
+        yield incomplete_note(without_verdict)
 
 
 def _rate(measured: Measured[Any]) -> Entry:

@@ -152,8 +152,8 @@ def _run_conditions(results: Sequence[Summary]) -> Facts:
         yield name, map(operator.attrgetter(field), results)
     step_limits = [result.environment.max_steps for result in results]
     yield "step limit", [f"{steps} at {CONTROL_RATE} a second" for steps in step_limits]
-    options = {result.column for result in results}
-    yield "settings", map(options_label, sorted(options, key=options_sort_key))
+    options = sorted({result.column for result in results}, key=options_sort_key)
+    yield "settings", map(options_label, options)
     yield "words", [words_label(result.options.wordings) for result in results]
     yield "delivery", [result.options.delivery for result in results]
 
@@ -169,10 +169,8 @@ def _run_counts(results: Sequence[Summary], data: RunData) -> Facts:
     yield "trials played", [len(results)]
     errors = Counter(result.error for result in results if result.outcome == "error")
     yield "errors, in no rate", [errors or 0]
-    missing = sum(cell.missing for cell in data.cells.values())
-    yield "trials planned and not played", [missing]
-    begun_again = sum(result.attempt > 1 for result in results)
-    yield "trials begun again", [begun_again]
+    yield "trials planned and not played", [sum(cell.missing for cell in data.cells.values())]
+    yield "trials begun again", [sum(result.attempt > 1 for result in results)]
 
 
 def _of_policy(record: Record) -> Facts:

@@ -8,11 +8,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from roboirg.analysis.comparability import AllDifferences, differences_of
+from roboirg.analysis.comparability import differences_of
 from roboirg.analysis.measures.chance import floor_level
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.published import (
-    PublishedRow,
     published_lines,
     published_rows,
 )
@@ -21,6 +20,7 @@ from roboirg.analysis.results.option_labels import (
     SortKey,
     setting_sort_key,
 )
+from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.analysis.results.run_cells import CellKey, Cells
 from roboirg.analysis.tables.table import (
     ERROR_MARK,
@@ -94,16 +94,24 @@ def make_table(
         for floor in floors:
             rows += _floor_rows(floor, columns, results)
     if shows_published:
-        for published_row in published_rows(table.name):
-            rows.append(_published_row(table, columns, published_row))
-    if not table.is_by_stages:
-        rows.sort(key=lambda row: setting_sort_key(row.group))
-    rows = list(with_best(_compared_rows(table, columns, rows)))
-    notes = notes_of(table, columns, rows, results, floors)
-    # Last, because the best policy was sought among a setting's rows, which this divides.
-    if table.heads == (POLICY, "setting"):
-        rows = _by_policy(rows)
-    return Table(table.name, table.title, table.heads, columns, rows, notes)
+        rows += _published_rows(table, columns)
+    rows = list(with_best(_compared_rows(table, columns, _in_order(table, rows))))
+    return Table(
+        key=table.name,
+        title=table.title,
+        heads=table.heads,
+        columns=columns,
+        # Last, because the best policy was sought among a setting's rows, which this divides.
+        rows=_by_policy(rows) if table.heads == (POLICY, "setting") else rows,
+        notes=notes_of(table, columns, rows, results, floors),
+    )
+
+
+def _in_order(table: PaperTable, rows: Sequence[Row]) -> Sequence[Row]:
+    """Return rows sorted by setting; those of stages stay as they are."""
+    if table.is_by_stages:
+        return rows
+    return sorted(rows, key=lambda row: setting_sort_key(row.group))
 
 
 def _results_of(table: PaperTable, data: RunData, *, with_differences: bool) -> TableResults:
@@ -116,7 +124,7 @@ def _results_of(table: PaperTable, data: RunData, *, with_differences: bool) -> 
             of the published rate.
     """
     shown = table.shown(data.cells)
-    differences: AllDifferences = {}
+    differences = {}
     if with_differences:
         differences = {key: differences_of(key, cell) for key, cell in shown.items()}
     tasks = table.tasks(data.cells)
@@ -149,15 +157,25 @@ def _policy_rows(table: PaperTable, columns: Sequence[Column], results: TableRes
 
     Averages over tasks are added where the table has columns for them.
     """
+    options_of_runs = defaultdict(set)
+    for key in results.shown:
+        options_of_runs[key.policy_run].add(key.options)
     rows = []
-    for policy_run, options, label in table.subjects(results.shown, results.names):
-        entries = {}
-        for task in results.tasks:
-            key = CellKey(policy_run, task, options)
-            entries[task] = _entry(key, results)
-        row = table.row(options, label, with_averages(columns, entries))
-        rows.append(replace(row, conditions=_read_fairness(policy_run)))
+    for policy_run, name in results.names.items():
+        label = table.label(policy_run, name)
+        for options in sorted(options_of_runs[policy_run], key=row_order):
+            entries = _entries(policy_run, options, results)
+            row = table.row(options, label, with_averages(columns, entries))
+            rows.append(replace(row, conditions=_read_fairness(policy_run)))
     return rows
+
+
+def _entries(
+    policy_run: PolicyRun, options: InstructionOptions, results: TableResults
+) -> dict[str, Entry]:
+    """Return the entries of a policy run's row, by task."""
+    keys = [CellKey(policy_run, task, options) for task in results.tasks]
+    return {key.task: _entry(key, results) for key in keys}
 
 
 def _entry(key: CellKey, results: TableResults) -> Entry:
@@ -206,16 +224,16 @@ def _floor_rows(floor: str, columns: Sequence[Column], results: TableResults) ->
     """
     judged = {key: cell for key, cell in results.shown.items() if cell.verdicts}
     language = _only_language(judged)
-    jobs = _jobs_by_instructions(judged)
-    splits = {instructions.split for instructions in jobs}
-    for instructions in sorted(jobs, key=_instruction_order):
-        options = instructions.options
-        entries = _floor_entries(floor, options, results.tasks, jobs[instructions], language)
+    jobs_by_words = _jobs_by_instructions(judged)
+    has_several_splits = len({words.split for words in jobs_by_words}) > 1
+    for words in sorted(jobs_by_words, key=_instruction_order):
         name = floor
-        if len(splits) > 1:
-            name += f", split {instructions.split}"
+        if has_several_splits:
+            name += f", split {words.split}"
+        jobs = jobs_by_words[words]
+        entries = _floor_entries(floor, words.options, results.tasks, jobs, language)
         if any(entry.percent is not None for entry in entries.values()):
-            yield Row(options.setting, name, with_averages(columns, entries), "chance")
+            yield Row(words.options.setting, name, with_averages(columns, entries), "chance")
 
 
 def _only_language(cells: Iterable[CellKey]) -> str:
@@ -281,19 +299,20 @@ def _jobs_by_instructions(cells: Cells) -> dict[_Instructions, list[Job]]:
     return jobs
 
 
-def _published_row(table: PaperTable, columns: Sequence[Column], published: PublishedRow) -> Row:
-    """Return the rates of a published policy as a row of the table, next to played policies.
+def _published_rows(table: PaperTable, columns: Sequence[Column]) -> Iterator[Row]:
+    """Yield the rates of published policies as rows of the table, next to played policies.
 
     Averages over suites, which the paper lacks, are computed from its rates.
     """
-    entries = {}
-    for task, rate in published.rates.items():
-        entries[task] = Entry(percent=rate, applies=rate is not None)
-    cells = list(with_averages(columns, entries))
-    # The last column is the overall average; it is kept as the paper prints it.
-    cells[-1] = Entry(percent=published.average)
-    row = table.row(published.options, published.model, cells)
-    return replace(row, source="published")
+    for published in published_rows(table.name):
+        entries = {}
+        for task, rate in published.rates.items():
+            entries[task] = Entry(percent=rate, applies=rate is not None)
+        cells = list(with_averages(columns, entries))
+        # The last column is the overall average; it is kept as the paper prints it.
+        cells[-1] = Entry(percent=published.average)
+        row = table.row(published.options, published.model, cells)
+        yield replace(row, source="published")
 
 
 def _by_policy(rows: Sequence[Row]) -> list[Row]:

@@ -20,7 +20,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.policy_ref import BEHIND, RESOLVE
 from roboirg.core.versions import POLICY, makeup_text
 from roboirg.stats.cells import ByTask, Cell, Key, gather
-from roboirg.stats.intervals import Rows, TaskRates, share_interval
+from roboirg.stats.intervals import Rows, TaskRates, mean_rates, share_interval
 from roboirg.stats.rates import NOT_APPLICABLE, whole_percent
 
 NO_SHARE = "no clear gap"
@@ -49,15 +49,15 @@ def make_rewriter_table(data: RunData) -> Table:
     frame = data.without_control_arms.frame
     cells = gather(frame, ("run", "options"))
     names = frame.names
-    rows: list[Row] = []
+    rows = []
     for behind, alone in _pairs(list(names)):
         explicit = cells.get((alone, REFERENCE_OPTIONS))
         for options in _shared_options(cells, behind, alone):
             said = cells[alone, options]
             rewritten = cells[behind, options]
             if explicit is not None and options != REFERENCE_OPTIONS:
-                words = _words(rewritten, said, explicit)
-                rows.append(Row(options_label(options), names[behind], words))
+                tasks = _rates_of_tasks([rewritten, said, explicit])
+                rows.append(Row(options_label(options), names[behind], _words(tasks)))
     if not rows:
         raise InvalidValueError(
             "No policy was played alone and behind a rewriter, in the same settings and in "
@@ -98,44 +98,38 @@ def _shared_options(
     return sorted(shared, key=options_sort_key)
 
 
-def _words(rewritten: ByTask, said: ByTask, explicit: ByTask) -> list[str]:
-    """Return the cells of a row: episodes, the three rates, the share and its interval."""
-    tasks: list[Rows] = []
-    for task in rewritten:
-        if task in said and task in explicit:
-            rows = _joint_rows([rewritten[task], said[task], explicit[task]])
-            if len(rows):
-                tasks.append(rows)
+def _words(tasks: Sequence[TaskRates]) -> list[str]:
+    """Return the cells of a row: episodes, the three rates, the share and its interval.
+
+    Args:
+        tasks: of each task the rates rewritten, as said, and in explicit words.
+    """
     if not tasks:
         return ["0", *[NOT_APPLICABLE] * 5]
-
-    episodes = str(sum(map(len, tasks)))
-    rates = _mean_rates(tasks)
-    shown_rates = [whole_percent(rates.said), whole_percent(rates.rewritten)]
-    shown_rates.append(whole_percent(rates.explicit))
-    interval = share_interval([TaskRates.of(rows) for rows in tasks])
+    episodes = str(sum(len(task.weights) for task in tasks))
+    rewritten, said, explicit = mean_rates(tasks)
+    shown_rates = list(map(whole_percent, (said, rewritten, explicit)))
+    interval = share_interval(tasks)
     if interval is None:
         return [episodes, *shown_rates, NO_SHARE, NOT_APPLICABLE]
-    share = (rates.rewritten - rates.said) / (rates.explicit - rates.said)
-    ends = f"{whole_percent(interval.low)} to {whole_percent(interval.high)}"
-    return [episodes, *shown_rates, whole_percent(share), ends]
+    share = (rewritten - said) / (explicit - said)
+    low, high = map(whole_percent, interval)
+    return [episodes, *shown_rates, whole_percent(share), f"{low} to {high}"]
 
 
-class _Rates(NamedTuple):
-    """Success rates, 0 to 1, as means over tasks."""
+def _rates_of_tasks(groups: Sequence[ByTask]) -> list[TaskRates]:
+    """Return the success rates of three groups in each task, on the episodes that all have.
 
-    rewritten: float
-    said: float
-    explicit: float
-
-
-def _mean_rates(tasks: Sequence[Rows]) -> _Rates:
-    """Return the mean rates of some tasks, given the rows of `_joint_rows` of each."""
-    rates = []
-    for rows in tasks:
-        totals = rows.sum(axis=0)
-        rates.append(totals[0::2] / totals[1::2])
-    return _Rates._make(np.mean(rates, axis=0).tolist())
+    Tasks without such an episode are left out.
+    """
+    found = []
+    for task in groups[0]:
+        cells = [by_task[task] for by_task in groups if task in by_task]
+        if len(cells) == len(groups):
+            rows = _joint_rows(cells)
+            if len(rows):
+                found.append(TaskRates.of(rows))
+    return found
 
 
 def _joint_rows(cells: Sequence[Cell]) -> Rows:
@@ -152,7 +146,7 @@ def _joint_rows(cells: Sequence[Cell]) -> Rows:
         shared &= set(episodes)
     rows = []
     for episode in sorted(shared):
-        row: list[int] = []
+        row = []
         for episodes in by_episode:
             verdicts = episodes[episode]
             row += [sum(verdicts.values()), len(verdicts)]

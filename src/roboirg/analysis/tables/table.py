@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
@@ -215,9 +216,9 @@ class Table:
 
 def grouped(rows: Iterable[Row], key: Callable[[Row], object]) -> list[list[Row]]:
     """Return the rows of each key; groups are in the order of their first rows."""
-    groups: dict[object, list[Row]] = {}
+    groups = defaultdict(list)
     for row in rows:
-        groups.setdefault(key(row), []).append(row)
+        groups[key(row)].append(row)
     return list(groups.values())
 
 

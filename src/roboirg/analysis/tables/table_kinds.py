@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -58,20 +59,6 @@ class TableResults(NamedTuple):
     differences: AllDifferences
 
 
-class RowSubject(NamedTuple):
-    """What a row is about.
-
-    Attributes:
-        policy_run: that played it.
-        options: of the instructions.
-        label: of the policy.
-    """
-
-    policy_run: PolicyRun
-    options: InstructionOptions
-    label: str
-
-
 @dataclass(frozen=True)
 class PaperTable:
     """What a table of rates has columns and rows for.
@@ -118,10 +105,10 @@ class PaperTable:
         overall = Column(AVERAGE, averages=tuple(tasks))
         if not self.by_suite:
             return (*map(Column, tasks), overall)
-        suites: dict[str, list[str]] = {}
+        suites = defaultdict(list)
         for task in tasks:
             suite = all_tasks()[task].suite.capitalize()
-            suites.setdefault(suite, []).append(task)
+            suites[suite].append(task)
         columns = []
         for suite, tasks_of_suite in suites.items():
             for task in tasks_of_suite:
@@ -138,22 +125,11 @@ class PaperTable:
                 shown[key] = cell
         return shown
 
-    def subjects(self, shown: Cells, names: RunNames) -> Iterator[RowSubject]:
-        """Yield what each row of the table is about: a policy run and its instruction options.
-
-        Args:
-            shown: the cells of the table; those that were planned and not played have rows, too.
-            names: labels of the policy runs, in the order of their rows.
-        """
-        options_of_runs: dict[PolicyRun, set[InstructionOptions]] = {}
-        for policy_run, _, options in shown:
-            options_of_runs.setdefault(policy_run, set()).add(options)
-        for policy_run, name in names.items():
-            label = name
-            if self.of_paper == "real" and policy_run.robot is None:
-                label += TWIN_MARK
-            for options in sorted(options_of_runs.get(policy_run, ()), key=row_order):
-                yield RowSubject(policy_run, options, label)
+    def label(self, policy_run: PolicyRun, name: str) -> str:
+        """Return the name of a policy run in the table; a real robot's twin is marked."""
+        if self.of_paper == "real" and policy_run.robot is None:
+            return name + TWIN_MARK
+        return name
 
     def row(self, options: InstructionOptions, policy: str, cells: Sequence[Entry]) -> Row:
         """Return a row with its labels."""

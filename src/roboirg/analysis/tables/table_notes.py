@@ -62,25 +62,30 @@ def notes_of(
         results: behind the table.
         floors: names of listeners that do not understand, whose expected success is in the table.
     """
-    policy_runs = list(dict.fromkeys(key.policy_run for key in results.shown))
     entries: list[Entry] = []
     for row in rows:
         entries += row.entries
-
-    notes = [RATES_NOTE]
-    notes += _sign_notes(table, entries)
-    notes.append(where_played(policy_runs))
-    notes += _count_notes([cell.counts for cell in results.shown.values()], entries)
-    if len(policy_runs) == 1:
-        notes.append("Only one policy was played; nothing is compared.")
-    if table.name == "main":
-        notes += _omission_notes(results)
-        notes += headline_notes(results.played, results.names)
-    notes.append(_absent_tasks(results.shown))
-    notes += _origin_notes(table, rows, floors, policy_runs)
+    notes = [RATES_NOTE, *_sign_notes(table, entries)]
+    notes += _played_notes(table, results, entries)
+    notes += _origin_notes(table, rows, floors, results)
     notes += comparison_notes(results.differences, results.names)
     notes += _average_notes(columns, rows)
     return tuple(filter(None, notes))  # some have nothing to say and are empty
+
+
+def _played_notes(
+    table: PaperTable, results: TableResults, entries: Sequence[Entry]
+) -> Iterator[str]:
+    """Yield sentences on what was played, and on what is missing of it in the table."""
+    policy_runs = {key.policy_run for key in results.shown}
+    yield where_played(policy_runs)
+    yield from _count_notes([cell.counts for cell in results.shown.values()], entries)
+    if len(policy_runs) == 1:
+        yield "Only one policy was played; nothing is compared."
+    if table.name == "main":
+        yield from _omission_notes(results)
+        yield from headline_notes(results.played, results.names)
+    yield _absent_tasks(results.shown)
 
 
 def with_mixtures(tables: Sequence[Table], frame: Frame) -> list[Table]:
@@ -159,7 +164,7 @@ def _origin_notes(
     table: PaperTable,
     rows: Sequence[Row],
     floors: Sequence[str],
-    policy_runs: Iterable[PolicyRun],
+    results: TableResults,
 ) -> Iterator[str]:
     """Yield sentences on rows that no policy has played here.
 
@@ -171,7 +176,7 @@ def _origin_notes(
         yield _TWIN_NOTE
     if "chance" in sources:
         yield _FLOORS_NOTE
-    yield unmeasured_note(floors, [policy_run.language for policy_run in policy_runs])
+    yield unmeasured_note(floors, [key.policy_run.language for key in results.shown])
     if table.of_paper is not None and "published" in sources:
         yield from NOTES[table.of_paper]
 

@@ -162,11 +162,15 @@ def replay(
 
     Example: roboirg replay data
     """
-    from roboirg.apps.demonstrations.dataset_replay import TOLERANCE, replay_dataset
+    from roboirg.apps.demonstrations.dataset_reading import read_dataset
+    from roboirg.apps.demonstrations.dataset_replay import TOLERANCE
+    from roboirg.apps.demonstrations.dataset_replay import replay as replay_trajectory
+    from roboirg.util.parallel_map import parallel_map
     from roboirg.util.processor import worker_count
 
     results = []
-    for result in replay_dataset(dataset, worker_count()):
+    trajectories = read_dataset(dataset)
+    for _, result in parallel_map(replay_trajectory, trajectories, worker_count()):
         results.append(result)
         if not result.agrees:
             typer.echo(_difference_text(result))

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from roboirg.apps.demonstrations.dataset_part import DatasetPart
 from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.apps.demonstrations.picture_coding import LOSSY_QUALITY
-from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, load_facts
+from roboirg.apps.demonstrations.trajectory import TrajectoryFacts
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.version import __version__
 from roboirg.util.media import CONTROL_RATE
@@ -27,14 +25,11 @@ _MEANINGS = {
 }
 
 
-def card_text(
-    plan: ExportPlan, parts: Sequence[DatasetPart], facts: Sequence[TrajectoryFacts], root: Path
-) -> str:
+def card_text(plan: ExportPlan, facts: Sequence[TrajectoryFacts], root: Path) -> str:
     """Return the text of a dataset's README.md (its card), with the head that Hugging Face reads.
 
     Args:
         plan: what is exported.
-        parts: of the dataset.
         facts: on all trajectories, those that are left out, too.
         root: folder of the dataset.
     """
@@ -45,8 +40,7 @@ def card_text(
         # Without them, Hugging Face takes the tables of facts for frames.
         lines.append("configs: [{config_name: default, data_files: data/*/*.parquet}]")
     lines += ["---", "", "# Demonstrations of RoboIRGBench", "", _head_line(plan), ""]
-    lines += _count_lines(_counts(parts))
-    lines += ["", *_words_lines(plan, facts)]
+    lines += _words_lines(plan, facts)
     lines += ["", "## Content", "", *_content_lines(plan)]
     lines += ["", "## Training", "", plan.file_format.training_text(plan, root.resolve())]
     return "\n".join(lines) + "\n"
@@ -64,49 +58,6 @@ def _head_line(plan: ExportPlan) -> str:
     )
 
 
-@dataclass
-class _Counts:
-    """What is exported of a task: the frames of each trajectory, and what its words make of it."""
-
-    lengths: list[int] = field(default_factory=list)
-    episodes: int = 0
-    frames: int = 0
-
-    def add(self, length: int, instructions: int) -> None:
-        """Add a trajectory, which is an episode for each of its instructions."""
-        self.lengths.append(length)
-        self.episodes += instructions
-        self.frames += length * instructions
-
-    def line(self, label: str) -> str:
-        """Return a row of the table."""
-        lengths = f"{min(self.lengths)} to {max(self.lengths)}"
-        return f"| {label} | {len(self.lengths)} | {lengths} | {self.episodes} | {self.frames} |"
-
-
-def _counts(parts: Sequence[DatasetPart]) -> dict[str, _Counts]:
-    """Count trajectories, frames and episodes of each task, and as ``all`` those of all tasks.
-
-    ``{"PickXtimes": …, "all": …}``: tasks in the order of the parts, ``all`` last.
-    """
-    by_task: dict[str, _Counts] = {}
-    total = _Counts()
-    for part in parts:
-        for episode in part.episodes:
-            facts = load_facts(episode.path)
-            for counts in (by_task.setdefault(facts.task, _Counts()), total):
-                counts.add(facts.frames, len(episode.instructions))
-    return {**by_task, "all": total}
-
-
-def _count_lines(counts: Mapping[str, _Counts]) -> Iterator[str]:
-    """Yield a table of what there is of each task."""
-    yield "| task | trajectories | their frames | episodes | frames |"
-    yield "| --- | --- | --- | --- | --- |"
-    for label, of_task in counts.items():
-        yield of_task.line(label)
-
-
 def _words_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator[str]:
     """Yield two sentences of the card: on the instructions, and on the trajectories by outcome.
 
@@ -115,7 +66,7 @@ def _words_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator
     yield (
         f"Settings: {', '.join(plan.settings)}; forms: {', '.join(plan.forms)}. Each trajectory "
         "comes once with the words of each of them that can express it; "
-        "`meta/demonstrations.parquet` says which episode is which."
+        "`meta/demonstrations.parquet` says which episode is which, and how long each is."
     )
     outcomes = Counter(recorded.status for recorded in facts)
     counts = [f"{count} {status}" for status, count in outcomes.items()]

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from roboirg.apps.demonstrations.export_plan import ORACLE, ExportedInstruction
 from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedInstruction
+from roboirg.apps.demonstrations.parquet_tables import write_rows
 from roboirg.apps.demonstrations.trajectory import (
     Trajectory,
     TrajectoryFacts,
@@ -147,6 +148,14 @@ def episode_row(trajectory: Trajectory, placed: PlacedInstruction) -> dict[str, 
         "delivery": instruction.options.delivery,
         **instruction.facts,
     }
+
+
+def write_episode_table(root: Path, parts: Sequence[DatasetPart]) -> None:
+    """Write the table of a dataset's episodes, which every format has; see `episode_row`."""
+    rows = []
+    for _, episode, trajectory in read_episodes(parts):
+        rows += [episode_row(trajectory, placed) for placed in episode.instructions]
+    write_rows(root / EPISODE_TABLE, rows)
 
 
 def _trajectory_name(facts: TrajectoryFacts, options: InstructionOptions) -> str:

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.apps.demonstrations.replayable_trajectory import ReplayableTrajectory
 from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.envs.factory import make
 from roboirg.tasks.splits.splits import SIZES, get_episode
-from roboirg.util.parallel_map import parallel_map
 
 TOLERANCE = 1e-4
 """Largest difference (rad, m) of states that count as equal."""
@@ -49,21 +45,6 @@ class ReplayResult:
     def agrees(self) -> bool:
         """Whether the verdict is the same and the final state within 1e-4."""
         return self.status == self.recorded_status and self.final <= TOLERANCE
-
-
-def replay_dataset(path: Path, workers: int) -> Iterator[ReplayResult]:
-    """Replay every trajectory of a dataset, and yield the results as they come.
-
-    Args:
-        path: see `read_dataset`.
-        workers: processes; 0 uses this one.
-
-    Raises:
-        InvalidValueError: the path holds no dataset, or one of episodes that do not exist here.
-        MissingDependencyError: a package is not installed.
-    """
-    for _, result in parallel_map(replay, read_dataset(path), workers):
-        yield result
 
 
 def replay(recorded: ReplayableTrajectory) -> ReplayResult:

@@ -26,8 +26,8 @@ class ExportFormat:
             It is called with the `ExportPlan`, the folder of the dataset and the trajectories, each
             a `RecordedInstructions`.
         write_part: writes the frames of a part; runs in a worker process.
-        finish: writes what describes a dataset, whose last file makes it readable. It is called
-            with the folder and all parts.
+        finish: writes what describes a dataset, whose last file makes it readable, besides the
+            table of episodes, which every dataset gets. It is called with the folder and all parts.
         training_text: returns what to do with a dataset, as Markdown. It is called with the plan
             and the absolute path of the folder.
         read: yields each trajectory of the dataset at a path as a `ReplayableTrajectory`; none if
@@ -46,9 +46,9 @@ class ExportFormat:
     name: str
     make_parts: Callable[..., list[Any]]
     write_part: Callable[[Any], None]
-    finish: Callable[..., None]
     training_text: Callable[..., str]
     read: Callable[[Path], Iterable[Any]]
+    finish: Callable[..., None] = lambda _root, _parts: None
     check_support: Callable[[], None] = lambda: None
     begins_with_video: bool = False
     has_depth: bool = False

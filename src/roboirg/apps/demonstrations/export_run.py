@@ -19,7 +19,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.apps.demonstrations import data_card
-from roboirg.apps.demonstrations.dataset_part import DatasetPart, RecordedInstructions
+from roboirg.apps.demonstrations.dataset_part import (
+    DatasetPart,
+    RecordedInstructions,
+    write_episode_table,
+)
 from roboirg.apps.demonstrations.export_plan import (
     ORACLE,
     ExportPlan,
@@ -131,11 +135,11 @@ def _wanted(
     Raises:
         InvalidValueError: none is left.
     """
-    pairs = zip(jobs, facts, strict=True)
-    wanted = [spoken for spoken, recorded in pairs if _is_wanted(plan, recorded)]
-    found = [
-        RecordedInstructions(spoken.job.path(folder), spoken.instructions) for spoken in wanted
-    ]
+    found = []
+    for spoken, recorded in zip(jobs, facts, strict=True):
+        if _is_wanted(plan, recorded):
+            path = spoken.job.path(folder)
+            found.append(RecordedInstructions(path, spoken.instructions))
     if not found:
         raise InvalidValueError(
             f"None of the {len(jobs)} trajectories is a success; ask for `outcomes: all`."
@@ -341,7 +345,8 @@ def _finish(
         parts: of the dataset, all written.
         facts: of all trajectories, those that were left out, too.
     """
-    write_atomically(out / "README.md", data_card.card_text(plan, parts, facts, out))
+    write_atomically(out / "README.md", data_card.card_text(plan, facts, out))
+    write_episode_table(out, parts)
     plan.file_format.finish(out, parts)
     content = {"fingerprint": plan.fingerprint(), "roboirg": __version__, "format": plan.format}
     write_atomically(out / EXPORT_FILE, json.dumps(content, indent=2) + "\n")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.observations import Pixels
-from roboirg.util.media import CONTROL_RATE
+from roboirg.util.media import CONTROL_RATE, Mp4Encoder
 
 PictureCoding = Literal["png", "lossless-video", "lossy-video", "none"]
 
@@ -60,7 +60,7 @@ def _png(image: NDArray[Any]) -> bytes:
     return content.tobytes()
 
 
-class VideoEncoder:
+class VideoEncoder(Mp4Encoder):
     """Encodes one video in memory: `add` each picture in order, then `finish` once.
 
     Args:
@@ -70,36 +70,20 @@ class VideoEncoder:
 
     def __init__(self, coding: PictureCoding, size: int) -> None:
         """Open a video in memory; the codec follows from `coding`."""
-        import av
-
         codec = _CODECS[coding]
-        self._file = io.BytesIO()
-        self._container = av.open(self._file, "w", format="mp4")
-        stream: Any = self._container.add_stream(codec.name, rate=Fraction(CONTROL_RATE))
-        stream.pix_fmt = codec.pixels
-        stream.width = size
-        stream.height = size
-        # Options of the encoder: crf is the quality (0 is lossless), g the distance of key frames.
-        stream.options = {
+        options = {
             "crf": str(codec.quality),
-            "preset": "veryfast",
             "g": str(KEY_FRAMES),
             "bf": "0",  # frames that depend on later ones
         }
-        stream.codec_context.thread_count = 1
-        self._stream = stream
-
-    def add(self, picture: Pixels) -> None:
-        """Encode a picture, RGB (size, size, 3)."""
-        import av
-
-        frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-        self._container.mux(self._stream.encode(frame))
+        self._file = io.BytesIO()
+        example = np.empty((size, size, 3), np.uint8)
+        rate = Fraction(CONTROL_RATE)
+        super().__init__(self._file, example, rate, options, codec.name, codec.pixels)
 
     def finish(self) -> bytes:
         """Return the video as MP4; no picture can be added after this."""
-        self._container.mux(self._stream.encode(None))
-        self._container.close()
+        self.close()
         return self._file.getvalue()
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 import json
 import zlib
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -18,7 +19,6 @@ from roboirg.apps.grounding.items.answer_file import Answer
 from roboirg.apps.grounding.items.grounding_item import LETTERS, QUESTION_KINDS, GroundingItem
 from roboirg.apps.grounding.items.verdicts import right_reply
 from roboirg.core.episode import Episode, Goal
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import instruct_with
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.shortcuts import SURFACE_RULES, draw_goal, guess_goal
@@ -148,10 +148,10 @@ def _learn(items: Sequence[GroundingItem]) -> dict[str, TextGuess]:
     It is trained anew for each task and set of instruction options, as these say things
     differently.
     """
-    groups: dict[tuple[str, InstructionOptions], list[GroundingItem]] = {}
+    groups = defaultdict(list)
     for item in items:
-        groups.setdefault((item.task, item.options), []).append(item)
-    guess_by_id: dict[str, TextGuess] = {}
+        groups[item.task, item.options].append(item)
+    guess_by_id = {}
     for (task, options), group in groups.items():
         learner = learn_goals(task, options, scenes=0)  # no random ones besides the splits'
         heard = [LearnerInput(item.text, item.hidden_slots) for item in group]

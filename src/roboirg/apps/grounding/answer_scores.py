@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -176,7 +176,7 @@ def _score(
         run: describes the model and its conditions.
         kind: slots, choice or points.
     """
-    verdicts: dict[str, ReplyVerdict] = {}
+    verdicts = {}
     judged = []
     for item in items:
         if item.id in replies:
@@ -195,12 +195,13 @@ def _frame(
         verdicts: by the ids of the items that were answered; others are missing.
         run: describes the model and its conditions.
     """
-    columns: dict[str, list[Any]] = defaultdict(list)
+    rows = []
     for item in _sorted(items):
-        row = {"run": run, "item": item, **_frame_row(item, verdicts.get(item.id))}
-        for name, value in row.items():
-            columns[name].append(value)
-    return Frame({name: as_column(values) for name, values in columns.items()})
+        rows.append({"run": run, "item": item, **_frame_row(item, verdicts.get(item.id))})
+    columns = {}
+    for name in rows[0]:
+        columns[name] = as_column([row[name] for row in rows])
+    return Frame(columns)
 
 
 def _sorted(items: Sequence[GroundingItem]) -> list[GroundingItem]:
@@ -240,32 +241,41 @@ def _row(score: GroundingScore, summary: Measured[ScopeKey]) -> ScoreRow:
     """
     options = summary.key.options
     judged = [answered for answered in score.judged if answered.item.options == options]
-    chances: dict[str, list[float]] = defaultdict(list)
-    command_chances: dict[str, list[float]] = defaultdict(list)
-    for item, _ in judged:
-        chances[item.task].append(guess_chance(item, score.kind))
-        if item.command_chance is not None:
-            command_chances[item.task].append(item.command_chance)
+    hidden = None
+    if score.kind == "slots":
+        hidden = _hidden_share(judged)
     return ScoreRow(
         summary,
-        chance=_mean_over_tasks(chances),
-        command_chance=_mean_over_tasks(command_chances),
-        hidden=_hidden_share(judged) if score.kind == "slots" else None,
+        chance=_mean_over_tasks(judged, lambda item: guess_chance(item, score.kind)),
+        command_chance=_mean_over_tasks(judged, lambda item: item.command_chance),
+        hidden=hidden,
     )
 
 
-def _mean_over_tasks(by_task: Mapping[str, Sequence[float]]) -> float:
-    """Return the mean over tasks of each task's mean; 0 if there are no tasks.
+def _mean_over_tasks(
+    judged: Iterable[JudgedItem], read: Callable[[GroundingItem], float | None]
+) -> float:
+    """Return the mean over tasks of each task's mean of a value of its items; 0 without values.
 
-    ``{"PickXtimes": [1, 0], "BinFill": [1]}`` -> 0.75: tasks weigh the same, as in the rates.
+    Of the values 1 and 0 in PickXtimes and 1 in BinFill it is 0.75: tasks weigh the same, as in
+    the rates.
+
+    Args:
+        judged: the items.
+        read: returns the value of an item; None if it has none.
     """
-    means = [float(np.mean(of_task)) for of_task in by_task.values()]
+    values_by_task = defaultdict(list)
+    for item, _ in judged:
+        value = read(item)
+        if value is not None:
+            values_by_task[item.task].append(value)
+    means = [float(np.mean(values)) for values in values_by_task.values()]
     return float(np.mean(means)) if means else 0.0
 
 
 def _hidden_share(judged: Iterable[JudgedItem]) -> float | None:
     """Return the share of hidden slots that are right; None if nothing is hidden."""
-    shares: list[bool] = []
+    shares = []
     for item, verdict in judged:
         shares += [verdict.parts[field] for field in hidden_fields(item)]
     return float(np.mean(shares)) if shares else None

@@ -22,6 +22,7 @@ from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
     from roboirg.apps.grounding.answer_scores import GroundingScore
+    from roboirg.apps.grounding.dataset_export import DatasetFacts
     from roboirg.apps.grounding.items.grounding_item import GroundingItem
     from roboirg.apps.grounding.items.question_set import EpisodeName
 
@@ -76,10 +77,15 @@ def export_grounding(
     )
     with progress_bar("episodes") as progress:
         facts = export_grounding(request, out, worker_count(), progress)
+    _print_facts(facts, out)
+
+
+def _print_facts(facts: DatasetFacts, folder: Path) -> None:
+    """Print how large the dataset in a folder is, and its hash."""
     items = counted(facts.items, "item")
     pictures = counted(facts.pictures, "picture")
     videos = counted(facts.videos, "video")
-    typer.echo(f"{items}, {pictures}, {videos}, {facts.size / MIB:.1f} MiB: {out}")
+    typer.echo(f"{items}, {pictures}, {videos}, {facts.size / MIB:.1f} MiB: {folder}")
     typer.echo(f"sha256 {facts.sha256}")
 
 
@@ -95,7 +101,7 @@ def _episode_names(words: PlanWords, tasks: Iterable[str], splits: str) -> tuple
     from roboirg.runs.plan.option_parsing import parse_episodes, parse_splits
 
     chosen = words.fields.get("episodes", "all")
-    found: list[EpisodeName] = []
+    found = []
     for task in tasks:
         for split in parse_splits(words.given("split", splits)):
             numbers = parse_episodes(chosen, split, [task])
@@ -121,22 +127,16 @@ def score_grounding(
         Path | None, typer.Option(help="Folder to write the floors' answers to.")
     ] = None,
     report: Annotated[
-        Path | None, typer.Option(help="File for a report in Markdown, with confusions.")
+        Path | None, typer.Option(help="File for a report in Markdown, with mistakes.")
     ] = None,
 ) -> None:
     """Score answers to the grounding dataset; two files are also compared.
 
     Example: roboirg score grounding answers.jsonl --data grounding
     """
-    from rich.console import Console
-
-    from roboirg.analysis.tables.rendering.terminal import print_tables
     from roboirg.apps.grounding.answer_floors import FLOORS
-    from roboirg.apps.grounding.answer_scores import score_answers
-    from roboirg.apps.grounding.items.answer_file import read_answers
     from roboirg.apps.grounding.items.grounding_item import read_items
     from roboirg.apps.grounding.score_report import report_text
-    from roboirg.apps.grounding.score_tables import score_table
     from roboirg.cli.names import known_names
     from roboirg.util.atomic_write import write_atomically
 
@@ -145,20 +145,38 @@ def score_grounding(
     if not paths and not floors:
         raise InvalidValueError("There is nothing to score; give files of answers or --floor.")
     items = read_items(data)
-    scores: list[GroundingScore] = []
-    for path in paths:
-        scores += score_answers(items, read_answers(path, items), path.stem)
+    scores = _scores_of_files(paths, items)
     comparisons = _comparisons(scores) if len(paths) == COMPARED else []
     for name in floors:
         scores += _floor_scores(name, items, write_floors)
+    _print_scores(scores, comparisons)
+    if report is not None:
+        write_atomically(report, report_text(scores, data, report))
+        typer.echo(report)
+
+
+def _scores_of_files(paths: Iterable[Path], items: Sequence[GroundingItem]) -> list[GroundingScore]:
+    """Score files of answers to the items, each named after the model that answered."""
+    from roboirg.apps.grounding.answer_scores import score_answers
+    from roboirg.apps.grounding.items.answer_file import read_answers
+
+    scores: list[GroundingScore] = []
+    for path in paths:
+        scores += score_answers(items, read_answers(path, items), path.stem)
+    return scores
+
+
+def _print_scores(scores: Sequence[GroundingScore], comparisons: Iterable[str]) -> None:
+    """Print the table of scores, and below it comparisons of models, in sentences."""
+    from rich.console import Console
+
+    from roboirg.analysis.tables.rendering.terminal import print_tables
+    from roboirg.apps.grounding.score_tables import score_table
 
     console = Console()
     print_tables([score_table(scores)], console)
     for sentence in comparisons:
         console.print(sentence, highlight=False, markup=False)
-    if report is not None:
-        write_atomically(report, report_text(scores, data, report))
-        typer.echo(report)
 
 
 def _floor_scores(
@@ -190,7 +208,7 @@ def _comparisons(scores: Sequence[GroundingScore]) -> list[str]:
     from roboirg.analysis.measures.comparison import compare
     from roboirg.analysis.measures.comparison_text import sentences
 
-    lines: list[str] = []
+    lines = []
     for first, second in itertools.combinations(scores, 2):
         if first.kind == second.kind:
             result = compare(first.frame, second.frame)

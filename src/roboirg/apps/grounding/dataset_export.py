@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -16,7 +16,6 @@ from roboirg.apps.grounding.items.grounding_item import (
 )
 from roboirg.apps.grounding.items.question_set import ExportRequest, Progress, collect_items
 from roboirg.core.version import __version__
-from roboirg.language.settings import setting_names
 from roboirg.util.atomic_write import write_atomically
 
 CARD = "README.md"
@@ -46,8 +45,6 @@ masks.
 - SHA-256 of `{items_file}`, which names every file by its content: `{facts.sha256}`.
 - Videos have every {every}th control step (20 per second) of the front camera; `frames` are at \
 most {frames} of them, evenly spaced.
-
-{counts}
 
 ```python
 pandas.read_json("{items_file}", lines=True)
@@ -113,15 +110,15 @@ def export_grounding(
 
 def _by_split(items: Sequence[GroundingItem]) -> dict[str, list[GroundingItem]]:
     """Return the items of each split, in order."""
-    found: dict[str, list[GroundingItem]] = {}
+    found = defaultdict(list)
     for item in items:
-        found.setdefault(item.split, []).append(item)
+        found[item.split].append(item)
     return found
 
 
 def _pictures(items: Sequence[GroundingItem]) -> set[str]:
     """Return the paths of all pictures of the items: first pictures, and frames of videos."""
-    found: set[str] = set()
+    found = set()
     for item in items:
         found.add(item.picture)
         found.update(item.frames)
@@ -145,30 +142,8 @@ def _card(request: ExportRequest, items: Sequence[GroundingItem], facts: Dataset
         first=items[0],
         size=facts.size / _MIB,
         files="\n".join(files),
-        counts=_counts(items),
         package=__version__,
         items_file=ITEMS_FILE,
         frames=request.frames,
         every=request.frames_every,
     )
-
-
-def _counts(items: Sequence[GroundingItem]) -> str:
-    """Return a Markdown table of the numbers of items, tasks by settings; a dash for none.
-
-    Columns are the settings that occur, in the order in which the benchmark lists them.
-    """
-    count_by_task: dict[str, Counter[str]] = {}
-    for item in items:
-        count_by_task.setdefault(item.task, Counter())[item.setting] += 1
-    asked = {item.setting for item in items}
-    settings = [name for name in setting_names() if name in asked]
-    lines = [_table_line("task", settings), f"| --- |{' ---: |' * len(settings)}"]
-    for task, counts in count_by_task.items():
-        lines.append(_table_line(task, [str(counts[name] or "–") for name in settings]))
-    return "\n".join(lines)
-
-
-def _table_line(head: str, cells: Sequence[str]) -> str:
-    """Return for example ``| PickByColor | 4 | – |``."""
-    return f"| {head} | {' | '.join(cells)} |"

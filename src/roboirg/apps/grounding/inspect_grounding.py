@@ -23,6 +23,7 @@ from inspect_ai.model import (
     Content,
     ContentImage,
     ContentText,
+    ModelOutput,
 )
 from inspect_ai.scorer import Score, Scorer, Target, accuracy, grouped, scorer, stderr
 from inspect_ai.solver import Generate, Solver, TaskState, solver
@@ -41,7 +42,7 @@ from roboirg.policies.vlm.listener_query import PROMPTS, QuestionTexts
 from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.policies.vlm.vlm_query import SILENCE
 from roboirg.runs.plan.option_parsing import means_all, parse_names
-from roboirg.util.reply_reading import UnparsableReplyError
+from roboirg.util.reply_reading import CUT_OFF, UnparsableReplyError, check_whole
 
 EPISODE = "episode"
 
@@ -97,8 +98,10 @@ def ask(data: str, question: str) -> Solver:
         state = await generate(state)
         if question == "slots":
             item = _items(data)[str(state.sample_id)]
+            reply = _reply_text(state.output)
             try:
-                goal_schema(item.task).read(state.output.completion)
+                check_whole(reply)
+                goal_schema(item.task).read(reply)
             except UnparsableReplyError as error:
                 if not state.output.completion:
                     # Services refuse an empty message as part of the conversation.
@@ -123,7 +126,7 @@ def right(data: str, question: str) -> Scorer:
     async def score(state: TaskState, target: Target) -> Score:
         """Judge the model's last answer as `roboirg score grounding` does."""
         item = _items(data)[str(state.sample_id)]
-        verdict = judge_reply(item, kind, state.output.completion)
+        verdict = judge_reply(item, kind, _reply_text(state.output))
         return Score(
             value=float(verdict.right),
             answer=verdict.understood,
@@ -138,7 +141,17 @@ def log_answers(log: EvalLog) -> list[Answer]:
     """Return the answers of a log, for `write_answers` and `roboirg score grounding`."""
     asked = str((log.eval.metadata or {}).get("question"))
     kind = known_name("question", asked, QUESTION_KINDS)
-    return [Answer(str(sample.id), kind, sample.output.completion) for sample in log.samples or ()]
+    answers = []
+    for sample in log.samples or ():
+        answers.append(Answer(str(sample.id), kind, _reply_text(sample.output)))
+    return answers
+
+
+def _reply_text(output: ModelOutput) -> str:
+    """Return what a model replied, marked if the limit of tokens cut it off."""
+    if output.stop_reason == "max_tokens":
+        return output.completion + CUT_OFF
+    return output.completion
 
 
 def _sample(item: GroundingItem, kind: QuestionKind, folder: Path) -> Sample:

@@ -105,27 +105,18 @@ def score_shortcuts(
 
     Example: roboirg language shortcuts --settings reasoning --by pattern
     """
-    from roboirg.runs.plan.option_parsing import parse_splits
-    from roboirg.shortcuts.shortcut_tables import (
-        GROUPINGS,
-        LEARNING_SCENES,
-        shortcut_rows,
-        shortcut_table,
-    )
+    from roboirg.shortcuts.shortcut_tables import GROUPINGS, shortcut_rows, shortcut_table
 
     # What is not given here stands in the plan, if one is named.
     words = PlanWords(context, plan)
     split = words.given("split", split)
-    splits: Sequence[str] = ()
-    if split.strip().lower() != "none":
-        splits = parse_splits(split)
+    splits = _scored_splits(split)
     grouping = None
     if by is not None:
         grouping = known_name("row", by, GROUPINGS)
     scenes = None
     if learned:
-        _check_learning(split, splits)
-        scenes = LEARNING_SCENES
+        scenes = _scenes_to_learn_from(split, splits)
     options = replace(words.options(), form=words.form())
     names = words.tasks(tasks, options.wordings)
     chosen = words.settings(settings, names)
@@ -134,32 +125,41 @@ def score_shortcuts(
         raise InvalidValueError(
             f"There is nothing to score: no episode of {', '.join(names)} in {', '.join(chosen)}."
         )
-    title = f"Shortcuts, {options.form} form, {_sources(splits, seeds)}"
-    _print(shortcut_table(rows, title, grouping))
+    _print(shortcut_table(rows, _title(options.form, splits, seeds), grouping))
 
 
-def _sources(splits: Sequence[str], seeds: int) -> str:
-    """Return which scenes are scored, for a title: ``test and 200 random scenes per task``.
+def _scored_splits(split: str) -> Sequence[str]:
+    """Return the splits for the text of an option: ``all`` gives all, ``none`` none."""
+    from roboirg.runs.plan.option_parsing import parse_splits
+
+    return () if split.strip().lower() == "none" else parse_splits(split)
+
+
+def _title(form: str, splits: Sequence[str], seeds: int) -> str:
+    """Return the title of a table: ``Shortcuts, implicit form, test and 200 random scenes …``.
 
     Args:
-        splits: names.
+        form: of the instructions.
+        splits: names of those whose scenes are scored.
         seeds: number of random scenes for each task; 0 for none.
     """
     sources = list(splits)
     if seeds:
         sources.append(f"{seeds:,} random scenes per task")
-    return " and ".join(sources)
+    return f"Shortcuts, {form} form, {' and '.join(sources)}"
 
 
-def _check_learning(split: str, splits: Sequence[str]) -> None:
-    """Raise if scikit-learn is missing, or learners would be tested on what they learn from.
+def _scenes_to_learn_from(split: str, splits: Sequence[str]) -> int:
+    """Return how many random scenes of each task learners learn from.
+
+    Raises if scikit-learn is missing, or learners would be tested on what they learn from.
 
     Args:
         split: what was typed, for the error.
         splits: that it stands for.
     """
     from roboirg.shortcuts.goal_learner import check_learning_support
-    from roboirg.shortcuts.shortcut_tables import JUDGING_SPLIT, TRAINING_SPLIT
+    from roboirg.shortcuts.shortcut_tables import JUDGING_SPLIT, LEARNING_SCENES, TRAINING_SPLIT
 
     check_learning_support()
     if TRAINING_SPLIT in splits or JUDGING_SPLIT in splits:
@@ -167,6 +167,7 @@ def _check_learning(split: str, splits: Sequence[str]) -> None:
             f"--learned trains on the splits {TRAINING_SPLIT} and {JUDGING_SPLIT}, so --split "
             f"{split} would test it on what it has seen; choose --split test."
         )
+    return LEARNING_SCENES
 
 
 @language_app.command("check-scenarios")

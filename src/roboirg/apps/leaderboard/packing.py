@@ -78,7 +78,7 @@ def _names_below(folder: Path, name: str) -> list[str]:
 
     ``"actions"`` -> ``["actions/1a/2b.npz", …]``; hidden ones are left out.
     """
-    names: list[str] = []
+    names = []
     for path in (folder / name).rglob("[!.]*"):
         if path.is_file():
             names.append(path.relative_to(folder).as_posix())

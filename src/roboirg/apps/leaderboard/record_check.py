@@ -171,38 +171,51 @@ def _check_unplayed(record: Record, *, has_actions: bool) -> RecordCheck:
 
 
 def _check_played(record: Record, log: ActionLog) -> RecordCheck:
-    """Play the actions of a record again, and check all that follows from job and actions.
-
-    The order matters: whether another kind of processor may excuse differences is decided from the
-    findings before the motion is compared.
-    """
+    """Play the actions of a record again, and check all that follows from job and actions."""
     again, played = replay(record, log)
     _excuse_words(record, again)
-    findings = list(_differences(record, again, WORD_FIELDS))
-    # On another kind of processor contacts can end differently. That excuses what follows from
-    # the motion, but no other finding, so it is decided before the motion is compared.
-    is_elsewhere = record.processor != again.processor
-    may_move_differently = is_elsewhere and not findings
-    findings += _differences(record, again, PLAYED_FIELDS)
+    word_findings = list(_differences(record, again, WORD_FIELDS))
+    findings = [*word_findings, *_differences(record, again, PLAYED_FIELDS)]
     if played is None:
         findings.append("actions: when played again, the episode takes none.")
         return RecordCheck(record.slug, tuple(findings), "different", float("inf"))
 
+    is_elsewhere = record.processor != again.processor
     deviation = _deviation(log, played)
     has_same_hash = record.end_state == again.end_state
     verdict = _verdict(deviation, has_same_hash=has_same_hash, is_elsewhere=is_elsewhere)
     if verdict == "different":
-        # The hash covers more than the numbers, so it is compared after them.
-        stored_end = (*log.end_state.tolist(), record.end_state)
-        played_end = (*played.end_state.tolist(), again.end_state)
-        findings.append(_difference("end_state", stored_end, played_end))
+        findings.append(_end_finding(record, log, again, played))
+    findings += _surplus_findings(log, played)
+    # On another kind of processor contacts can end differently. That excuses what follows from
+    # the motion, but no finding about words.
+    may_move_differently = is_elsewhere and not word_findings
+    return RecordCheck(record.slug, tuple(findings), verdict, deviation, may_move_differently)
+
+
+def _end_finding(record: Record, log: ActionLog, again: Record, played: ActionLog) -> str:
+    """Return the finding that the end state of a record is not that of playing it again.
+
+    Args:
+        record: as stored, with the hash of its end state.
+        log: its actions, with the numbers of its end state.
+        again: the record of playing it again.
+        played: the actions of playing it again.
+    """
+    # The hash covers more than the numbers, so it is compared after them.
+    stored_end = (*log.end_state.tolist(), record.end_state)
+    played_end = (*played.end_state.tolist(), again.end_state)
+    return _difference("end_state", stored_end, played_end)
+
+
+def _surplus_findings(log: ActionLog, played: ActionLog) -> Iterator[str]:
+    """Yield a finding if the episode takes other actions than are stored, such as fewer."""
     is_as_long = len(played.rows) == len(log.rows)
     if not (is_as_long and np.array_equal(played.requests, log.requests)):
-        findings.append(
+        yield (
             "actions: some of them come after the end of the episode, which takes "
             f"{len(played.rows)} of {len(log.rows)}."
         )
-    return RecordCheck(record.slug, tuple(findings), verdict, deviation, may_move_differently)
 
 
 def _excuse_words(record: Record, expected: Record) -> None:

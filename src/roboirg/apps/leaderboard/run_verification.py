@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import functools
 import random
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 from roboirg.apps.leaderboard.record_check import (
     LineToCheck,
@@ -113,20 +112,26 @@ def _summed_up(
         checks: of each record, in any order.
     """
     kept: Plans = {plan.fingerprint: plan for plan in read_kept_plans(folder)}
-    completeness = _completeness(read_plans(folder), kept, entries)
-    failed = [result for result in checks if result.findings]
-    tolerated = [result.deviation for result in checks if result.replayed == "tolerant"]
-    outcomes = [entry.outcome for entry in entries]
+    planned = _slugs(read_plans(folder))
+    recorded = {identity_key(entry) for entry in entries}
+    missing = {slug for key, slug in planned.items() if key not in recorded}
+    failed = sorted(result for result in checks if result.findings)
     return Verification(
         records=len(entries),
-        checks=tuple(sorted(failed)),
-        missing=completeness.missing,
+        checks=tuple(failed),
+        missing=tuple(sorted(missing)),
         verdicts=Counter(result.replayed for result in checks),
-        deviation=max(tolerated, default=0.0),
+        deviation=_largest_tolerated(checks),
         faults=tuple(_faults(kept, entries)),
-        errors=outcomes.count("error"),
-        notes=(*completeness.notes, *_excuses(failed, entries)),
+        errors=sum(entry.outcome == "error" for entry in entries),
+        notes=(*_plan_notes(planned, kept, entries), *_excuses(failed, entries)),
     )
+
+
+def _largest_tolerated(checks: Iterable[RecordCheck]) -> float:
+    """Return the largest difference of an end state that was tolerated; 0 if none was."""
+    tolerated = [result.deviation for result in checks if result.replayed == "tolerant"]
+    return max(tolerated, default=0.0)
 
 
 def _excuses(failed: Sequence[RecordCheck], entries: Sequence[Summary]) -> Iterator[str]:
@@ -160,7 +165,7 @@ def _lines(run: StoredRun[Summary], sample: float, seed: int | None) -> Sequence
     if sample > 0:
         count = max(count, 1)  # a small share of a small run plays one, not none
     drawn = set(random.Random(seed).sample(range(total), count))
-    lines: list[LineToCheck] = []
+    lines = []
     for index, line in enumerate(run.lines(run.newest)):
         lines.append(LineToCheck(index + 1, line, index in drawn))
     return lines
@@ -177,7 +182,7 @@ def _check_lines(
         workers: number of processes; 0 uses this one only.
         progress: is called with the number of checked lines, and of all.
     """
-    checks: list[RecordCheck] = []
+    checks = []
     check = functools.partial(check_line, folder=folder)
     for _, result in parallel_map(check, lines, workers):
         checks.append(result)
@@ -186,44 +191,34 @@ def _check_lines(
     return checks
 
 
-class _Completeness(NamedTuple):
-    """Which episodes of the newest plans are missing, and notes about earlier plans."""
-
-    missing: tuple[str, ...]
-    notes: tuple[str, ...]
-
-
-def _completeness(plans: Sequence[Plan], kept: Plans, entries: Sequence[Summary]) -> _Completeness:
-    """Return the episodes of the newest plans that have no record, and notes about earlier plans.
+def _plan_notes(
+    planned: Mapping[RecordKey, str], kept: Plans, entries: Sequence[Summary]
+) -> Iterator[str]:
+    """Yield notes about earlier plans.
 
     A plan may be changed and the run continued. So records that only an earlier plan names, and
     episodes of an earlier plan that were never played, are no faults: the notes count them.
 
     Args:
-        plans: the newest ones of the run; without any, nothing is missing.
+        planned: the slugs of the newest plans' episodes, such as ``mine-PickXtimes-test-0-1a2b``,
+            by what identifies them; empty without plans.
         kept: all plans of the run by fingerprint, which records name.
         entries: all records.
     """
-    # Episodes are compared by their keys, what identifies them, and named by their slugs.
-    planned = _slugs(plans)
     recorded = {identity_key(entry) for entry in entries}
-    missing = {slug for key, slug in planned.items() if key not in recorded}
-
-    notes: list[str] = []
     unplanned = recorded.difference(planned)
-    if plans and unplanned:
-        notes.append(f"From an earlier plan: {counted(len(unplanned), 'record')}.")
+    if planned and unplanned:
+        yield f"From an earlier plan: {counted(len(unplanned), 'record')}."
     named_plans = {entry.plan for entry in entries} & kept.keys()
     planned_at_some_time = _slugs([kept[name] for name in named_plans])
     unplayed = planned_at_some_time.keys() - recorded - planned.keys()
     if unplayed:
-        notes.append(f"Earlier plans name {counted(len(unplayed), 'more episode')}, not played.")
-    return _Completeness(tuple(sorted(missing)), tuple(notes))
+        yield f"Earlier plans name {counted(len(unplayed), 'more episode')}, not played."
 
 
-def _slugs(plans: Sequence[Plan]) -> dict[RecordKey, str]:
+def _slugs(plans: Iterable[Plan]) -> dict[RecordKey, str]:
     """Return the names (slugs) of the episodes of some plans, by what identifies them."""
-    slugs: dict[RecordKey, str] = {}
+    slugs = {}
     for plan in plans:
         for job in plan.jobs():
             slugs[identity_key(job)] = job.slug
@@ -238,14 +233,14 @@ def _faults(kept: Plans, entries: Sequence[Summary]) -> Iterator[str]:
     """
     unplanned = 0  # records whose plan is not kept
     unnamed = 0  # records with words that their plan does not name
-    words_by_owner: dict[str, set[str]] = {}
+    words_by_owner = defaultdict(set)
     for entry in entries:
         plan = kept.get(entry.plan)
         if entry.plan not in kept:
             unplanned += 1
         if plan and plan.words and entry.words not in plan.words:
             unnamed += 1
-        words_by_owner.setdefault(entry.words_owner, set()).add(entry.words)
+        words_by_owner[entry.words_owner].add(entry.words)
 
     if unplanned:
         yield f"{counted(unplanned, 'record')} from no plan that is kept."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -66,9 +67,9 @@ def describe_motions(scene: Scene) -> list[str]:
 
     ``["cube_1, cube_2: away until step 80"]``, in the order of the scene.
     """
-    movers: dict[str, list[str]] = {}
+    movers = defaultdict(list)
     for motion in scene.motions:
-        movers.setdefault(_motion_words(motion), []).append(_mover(motion))
+        movers[_motion_words(motion)].append(_mover(motion))
     return [f"{', '.join(names)}: {words}" for words, names in movers.items()]
 
 

@@ -34,21 +34,8 @@ NUMBERS: Mapping[str, str] = {"amounts": "counts", "reference": "reference", "ke
 """What words point back at that has numbers of things in their colors, with the slot of these."""
 SLOTS = frozenset({"amounts", "colors", "colors.0", "colors.1", "counts", "counts.0", "counts.1"})
 """Slots of a task whose goals are amounts."""
-_NOUNS = ("cube", "one", "one")
-"""Of up to three colors that are listed."""
-
-
-def amount_texts(numbers: str, size: int) -> list[Text]:
-    """Return the texts that name some colors with their numbers: *two red cubes*, *one blue one*.
-
-    Args:
-        numbers: the slot of the numbers, ``counts``.
-        size: how many colors.
-
-    Returns:
-        A text with slots for each, ``{counts.0} {colors.0} [counts.0: cube|cubes]``.
-    """
-    return [amount_text(numbers, at, _NOUNS[at]) for at in range(size)]
+NOUNS = ("cube", "one", "one")
+"""Of up to three colors that are listed: *two red cubes and one blue one*."""
 
 
 @functools.cache  # the same few for every episode

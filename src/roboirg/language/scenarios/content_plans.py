@@ -79,22 +79,25 @@ def _plan_by_place(
 ) -> ContentPlan:
     """Return the content plan that names a place: *the cube on the left* gives that cube's color.
 
+    For the goal *red*, whose cube is on the left: the pronoun field ``color``, and the words *on
+    the left* in the slots ``place`` and ``place.0``, as sentences may name either.
+
     Args:
         request: the episode.
-        at: index of the color among those of the goal, 0 or 1; the slots are ``place`` and
-            ``place.0``.
+        at: index of the color among those of the goal, 0 or 1; the number of the second slot.
         place: where a thing of this color stands.
         form: how the place is said, ``spot``, or None for after a noun.
     """
     colors = request.color_values
+    color = colors[at]
     words = place.said(form)
-    value = (Filler(colors[at].slot, "place", colors[at].value, words, form),)
+    value = (Filler(color.slot, "place", color.value, words, form),)
     notes: dict[str, object] = {
         "landmarks": [words],
         "landmark_classes": [int(place.kind)],
         "frame": request.frame,
     }
-    pronoun_fields = [color.field for color in colors]
+    pronoun_fields = [other.field for other in colors]
     return ContentPlan(pronoun_fields, {"place": value, f"place.{at}": value}, notes)
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from roboirg.language.instruction import Described, Term
 from roboirg.language.landmarks import Frame
@@ -170,14 +170,13 @@ def _without_set_aside(_pointer: Pointer, history: DiscourseHistory) -> Term:
     return Term("without", ())
 
 
-def _doubled(pointer: Pointer, history: DiscourseHistory) -> Term:
-    """Return the term of *twice as often as that*: ``Term("double", (2,))`` after *two times*."""
-    return Term("double", history.operands(pointer.of))
+def _multiplied(pointer: Pointer, history: DiscourseHistory) -> Term:
+    """Return the term of *twice as often as that*, or of *half as often*.
 
-
-def _halved(pointer: Pointer, history: DiscourseHistory) -> Term:
-    """Return the term of *half as often as that*: ``Term("half", (4,))`` after *four times*."""
-    return Term("half", history.operands(pointer.of))
+    ``Term("double", (2,))`` after *two times*.
+    """
+    operation: Literal["double", "half"] = "double" if pointer.operation == "double" else "half"
+    return Term(operation, history.operands(pointer.of))
 
 
 def _stepped(pointer: Pointer, history: DiscourseHistory) -> Term:
@@ -200,8 +199,8 @@ _TERM_OF: Mapping[Operation, Callable[[Pointer, DiscourseHistory], Term]] = {
     "other": _other,
     "without": _without_set_aside,
     "neighbor": _without_set_aside,
-    "double": _doubled,
-    "half": _halved,
+    "double": _multiplied,
+    "half": _multiplied,
     "minus": _stepped,
     "plus": _stepped,
     "earlier": _stepped,

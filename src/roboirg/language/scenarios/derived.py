@@ -87,7 +87,7 @@ def _deduced_numbers(request: InstructionRequest) -> Iterator[ContentPlan]:
     first = numbers[0]  # all of them have its type
     results = [value.number for value in numbers]
     fields = [value.field for value in request.values_of(first.slot_type)]
-    choices = request.alternative_numbers(first.slot)
+    choices = request.alternatives(first.slot)
     for relation, references in deductions(results, choices):
         # Words for amounts need not name the number: "and Leo wants the same".
         is_unsaid = first.slot_type == "amount" and relation.name == "twice"
@@ -111,7 +111,7 @@ class Deduction(NamedTuple):
 
 def deductions(
     results: Sequence[int],
-    choices: Sequence[Sequence[int]],
+    choices: Sequence[Sequence[str | int]],
     known: Sequence[Relation] = RELATIONS,
     most: int = MAX_REFERENCE,
 ) -> Iterator[Deduction]:
@@ -134,14 +134,14 @@ def deductions(
             yield Deduction(relation, references)
 
 
-def _references(relation: Relation, results: Sequence[int], most: int) -> list[int]:
+def _references(relation: Relation, results: Sequence[str | int], most: int) -> list[int]:
     """Return the numbers from which some results follow; empty if one of them follows from none.
 
     By *one fewer*, 2 and 1 follow from 3 and 2. A number must be from 1 to `most`.
     """
     found: list[int] = []
     for result in results:
-        reference = relation.reference(result)
+        reference = relation.reference(int(result))
         if reference is None or not 1 <= reference <= most:
             return []
         found.append(reference)
@@ -165,7 +165,7 @@ def _steps_in_series(
         pattern: the name of this kind of reasoning, for the metadata.
         known: the steps that words can say.
     """
-    choices = request.alternative_numbers(value.slot)
+    choices = request.alternatives(value.slot)
     length = series_length(request, value)
     for step, references in deductions([value.number], choices, known, length):
         if step.spells != value.number:
@@ -241,8 +241,8 @@ def excluded_colors(request: InstructionRequest) -> tuple[str, ...]:
     target = request.color_values[0].color
     others = [color for color in request.scene_colors if color != target]
     if not others:
-        absent = request.sampler.pick("absent color", request.other_colors(target))
-        return (absent,)
+        absent = [color for color in request.task.things.colors if color != target]
+        return (request.sampler.pick("absent color", absent),)
     return request.sampler.pick("excluded colors", list(itertools.permutations(others)))
 
 

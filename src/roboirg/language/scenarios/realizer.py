@@ -33,9 +33,9 @@ from roboirg.language.phrases import (
 )
 from roboirg.language.request import AMOUNT_FIELD, InstructionRequest
 from roboirg.language.scenarios.amounts import (
+    NOUNS,
     NUMBERS,
     amount_text,
-    amount_texts,
     hidden_fields,
     hidden_term,
     stated_counts,
@@ -131,8 +131,11 @@ class Realizer:
         blue one*.
         """
         if slot.name in ("amounts", "reference") and "amounts" in fillers.values:
-            texts = amount_texts(NUMBERS[slot.name], len(fillers.values["colors"]))
-            return listed([self.realize(text, fillers) for text in texts])
+            phrases: list[Phrase] = []
+            for at in range(len(fillers.values["colors"])):
+                text = amount_text(NUMBERS[slot.name], at, NOUNS[at])
+                phrases.append(self.realize(text, fillers))
+            return listed(phrases)
         self._history.add(slot.name, fillers.values[slot.name])
         return fillers.phrase(slot)
 

@@ -30,12 +30,10 @@ class Relation(NamedTuple):
     def reference(self, result: int) -> int | None:
         """Return the number from which a result follows: 3 for the result 2 and *one fewer*.
 
-        None if that is no whole number, *half* of it, or the result itself.
+        None if that is no whole number: nothing doubled is 3.
         """
         reference = (result - self.offset) / self.factor
-        if reference == result or not reference.is_integer():
-            return None
-        return int(reference)
+        return int(reference) if reference.is_integer() else None
 
 
 RELATIONS = (

@@ -125,7 +125,7 @@ def _words_in_file_of(owner: Task | Setting | None) -> Mapping[str, TaskScenario
     Empty if it names no file, or is None.
     """
     path = _named_file(owner)
-    return read_scenario_file(path) if path else {}
+    return read_task_scenarios(read_text(path), path.name) if path else {}
 
 
 def words_in(setting: str, task: str) -> TaskScenarios | None:
@@ -182,16 +182,8 @@ def read_head(text: str, where: str) -> FileFields:
     Raises:
         InvalidValueError: it is no TOML, lacks tasks, or has fields that no such file has.
     """
-    data = parse_toml(text, where)
-    for task in every_task():
-        if task in data:
-            raise InvalidValueError(
-                f"{where} has the table [{task}] of an earlier format; write its commands under "
-                "[commands], and import RoboMME's sentences again with `roboirg language "
-                "import-robomme`."
-            )
     mistakes = Mistakes(where)
-    head = read_table(data, FileFields, mistakes)
+    head = read_table(parse_toml(text, where), FileFields, mistakes)
     mistakes.raise_if_any()
     if head is None or not head.tasks:
         raise InvalidValueError(f'{where} has no tasks; add a line such as tasks = ["PickXtimes"].')
@@ -462,14 +454,17 @@ def _read_sentences(
     texts: dict[str, tuple[Text, ...]] = {}
     names = sentence_names(stated)
     for name, value in flat.items():
-        if name not in names:
-            continue
-        alternatives = [value]  # most fields have one sentence only
-        if isinstance(value, list) and name.startswith(_FIELDS_WITH_ALTERNATIVES):
-            alternatives = value
-        part = mistakes.at(name)
-        texts[name] = tuple(reader.read(text, part) for text in alternatives)
+        if name in names:
+            part = mistakes.at(name)
+            texts[name] = tuple(reader.read(text, part) for text in _alternatives(name, value))
     return texts
+
+
+def _alternatives(name: str, value: object) -> list[Any]:
+    """Return the sentences of a field, as written: the alternatives, or the only one."""
+    if isinstance(value, list) and name.startswith(_FIELDS_WITH_ALTERNATIVES):
+        return value
+    return [value]
 
 
 def _operations(fields: ScenarioFields | None) -> set[str]:
@@ -677,8 +672,3 @@ def _parse_or_report(text: object, mistakes: Mistakes) -> Text:
     except ValueError as error:
         mistakes.add(str(error))
         return (TaggedText(excerpt(text)),)
-
-
-def read_scenario_file(path: Path) -> Mapping[str, TaskScenarios]:
-    """Read a file of scenarios from anywhere, like `read_task_scenarios`."""
-    return read_task_scenarios(read_text(path), path.name)

@@ -108,8 +108,10 @@ def _with_ours(task: str, setting: str, identity: str) -> TaskScenarios | None:
     if ours is None or theirs is None:
         return theirs
     commands = theirs.commands if COMMANDS in theirs.own else ours.commands
-    own_stated = {field: text for field, text in theirs.stated.items() if field in theirs.own}
-    stated = {**ours.stated, **own_stated}
+    stated = dict(ours.stated)
+    for field, text in theirs.stated.items():
+        if field in theirs.own:
+            stated[field] = text
     their_settings = {scenario.fields.setting for scenario in theirs.scenarios}
     scenarios = list(theirs.scenarios)
     for scenario in ours.scenarios:

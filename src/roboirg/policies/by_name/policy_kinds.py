@@ -52,7 +52,6 @@ from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.planners.planner import Planner
 from roboirg.policies.planners.planner_alone import PlannerAlone
 from roboirg.policies.planners.systems import System, find_system, with_options
-from roboirg.policies.resolving.goal_namers import OF_OURS, make_namer
 from roboirg.policies.resolving.resolving_policy import ResolvingPolicy
 from roboirg.policies.resolving.rewriting import OPTIONS, Rewriting, read_rewriting
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener, VLMNamer
@@ -196,6 +195,9 @@ def namer_of(rewriting: Rewriting, seed: int) -> GoalNamer:
     Raises:
         UnknownNameError: there is no such namer, or it has no such option.
     """
+    # Imported here because it brings the reader's patterns, which other policies do not need.
+    from roboirg.policies.resolving.goal_namers import OF_OURS, make_namer
+
     name = rewriting.namer
     if name in OF_OURS:
         if rewriting.options:

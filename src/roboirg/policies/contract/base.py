@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, runtime_checkable
 
 from roboirg.core.actions import Actions
 from roboirg.core.observations import Demonstration, Observation
@@ -130,15 +129,11 @@ def close_policy(policy: object) -> None:
         close()
 
 
-def tell_policy(policy: object, utterances: Iterable[Mapping[str, Any]]) -> None:
-    """Call the ``hear`` of a policy or planner, if it has one.
+def tell_policy(policy: object, text: str, step: int) -> None:
+    """Pass an utterance on to a policy, with the control step at which it is heard.
 
-    Args:
-        policy: the policy or planner.
-        utterances: ``text`` and ``step`` of what was said after `reset`, in order, as in the info
-            of an environment's step.
+    A policy without ``hear(text, step)`` gets it with the next observation only.
     """
     hear = getattr(policy, "hear", None)
     if callable(hear):
-        for utterance in utterances:
-            hear(utterance["text"], utterance["step"])
+        hear(text, step)

@@ -66,7 +66,8 @@ class EpisodeLoop:
 
     def hear(self, utterances: Sequence[Mapping[str, Any]]) -> None:
         """Let the policy hear what has just been said."""
-        tell_policy(self.policy, utterances)
+        for utterance in utterances:
+            tell_policy(self.policy, utterance["text"], utterance["step"])
 
 
 def play(env: RoboIRGEnv, policy: Policy) -> dict[str, Any]:

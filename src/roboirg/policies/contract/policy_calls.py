@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -146,15 +147,7 @@ def policy_usage(policy: Policy) -> dict[str, float]:
         return {}
     usage: dict[str, float] = {}
     for name, value in policy.usage().items():
-        try:
-            usage[str(name)] = float(value)
-        except (TypeError, ValueError):
-            shown = clip_text(repr(value), MAX_COST_LETTERS)
-            raise InvalidValueError(
-                f"usage() has {shown} as {name!r}; it must be a number."
-            ) from None
-        except OverflowError:  # a whole number that is too large for a float
-            continue
+        usage[str(name)] = _cost(name, value)
     are_names = all(len(name) <= MAX_COST_LETTERS and is_encodable(name) for name in usage)
     if len(usage) > MAX_COSTS or not are_names:
         raise InvalidValueError(
@@ -162,6 +155,17 @@ def policy_usage(policy: Policy) -> dict[str, float]:
             f"most {MAX_COST_LETTERS} characters."
         )
     return {name: cost for name, cost in usage.items() if 0 <= cost < _TOO_LARGE}
+
+
+def _cost(name: object, value: Any) -> float:  # noqa: ANN401 - whatever the policy reports
+    """Return a cost as a number; infinity for a whole number that is too large for a float."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        shown = clip_text(repr(value), MAX_COST_LETTERS)
+        raise InvalidValueError(f"usage() has {shown} as {name!r}; it must be a number.") from None
+    except OverflowError:
+        return math.inf
 
 
 def server_version(metadata: Mapping[str, Any]) -> str | None:

@@ -59,17 +59,23 @@ class SyntheticEpisodes:
         observations = [self._observation(instruction) for _ in range(max(size, 1))]
         video: dict[str, Any] = {}
         for field in observations[0]:
-            is_picture = field.endswith(("_rgb", "_depth"))
-            frames = self._needs.demonstration_frames if is_picture else "all"
-            if field == "instruction" or frames == "none":
-                continue
-            every = 1 if frames == "all" else int(frames)
-            values = np.stack([observation[field] for observation in observations])
-            video[field] = values[:size:every]
+            every = self._frames_between(field)
+            if every is not None:
+                values = np.stack([observation[field] for observation in observations])
+                video[field] = values[:size:every]
         first = self._observation(instruction)
         if self._needs.observe_every is not None:
             first["history"] = ()
         return SyntheticEpisode(instruction, video, cast("Observation", first))
+
+    def _frames_between(self, field: str) -> int | None:
+        """Return n if a video has every n-th value of a field; None if it has none."""
+        frames = self._needs.demonstration_frames
+        if field == "instruction":
+            return None
+        if not field.endswith(("_rgb", "_depth")) or frames == "all":
+            return 1
+        return None if frames == "none" else int(frames)
 
     def after(self, episode: SyntheticEpisode, steps: int) -> Observation:
         """Return an observation `steps` control steps later, with the history in between.

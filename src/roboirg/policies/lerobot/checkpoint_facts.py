@@ -44,13 +44,8 @@ def read_facts(place: str) -> CheckpointFacts:
     Raises:
         InvalidValueError: the checkpoint needs an input that does not exist.
     """
-    path = Path(place) / CHECKPOINT_FILE
     try:
-        if not path.is_file():
-            from huggingface_hub import try_to_load_from_cache
-
-            path = Path(str(try_to_load_from_cache(place, CHECKPOINT_FILE)))
-        config = json.loads(read_regular(path))
+        config = json.loads(read_regular(_configuration_file(place)))
         features = config["input_features"]
         shapes = {name: feature.get("shape") for name, feature in features.items()}
         limit = config.get("tokenizer_max_length")
@@ -60,6 +55,16 @@ def read_facts(place: str) -> CheckpointFacts:
     if isinstance(limit, int) and limit > 0:
         return CheckpointFacts(sizes, limit)
     return CheckpointFacts(sizes)
+
+
+def _configuration_file(place: str) -> Path:
+    """Return where a checkpoint's configuration is or should be: here, or in the Hub's cache."""
+    path = Path(place) / CHECKPOINT_FILE
+    if path.is_file():
+        return path
+    from huggingface_hub import try_to_load_from_cache
+
+    return Path(str(try_to_load_from_cache(place, CHECKPOINT_FILE)))
 
 
 def picture_sizes(place: str, shapes: Mapping[str, object]) -> dict[str, int | None]:

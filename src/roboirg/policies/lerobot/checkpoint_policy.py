@@ -25,7 +25,12 @@ from pydantic import Field
 from roboirg.core.actions import Actions
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.core.observations import PICTURE_SIZE, Demonstration, Observation
+from roboirg.core.observations import (
+    PICTURE_SIZE,
+    Demonstration,
+    Observation,
+    proprioception,
+)
 from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.policies.contract.option_checking import NOT_COMPARED
 from roboirg.policies.contract.policy_urls import UrlOptions, read_options, split_url
@@ -228,19 +233,15 @@ class LeRobotPolicy:
         """
         import torch
 
-        states = []  # seven joints and the first finger
-        for observation in observations:
-            states.append(np.append(observation["joint_positions"], observation["gripper"][0]))
+        states = np.stack([proprioception(observation) for observation in observations])
         batch: dict[str, Any] = {
-            STATE: torch.from_numpy(np.stack(states).astype(np.float32)),
+            STATE: torch.from_numpy(states),
             "task": [observation["instruction"] for observation in observations],
         }
         for camera, width in self._sizes.items():
-            pictures = [seen[f"{camera}_rgb"] for seen in observations]  # type: ignore[literal-required]
-            if width is not None and width != len(pictures[0]):
-                pictures = [scaled_square(picture, width) for picture in pictures]
+            pictures = torch.from_numpy(_pictures(observations, camera, width))
             # In LeRobot's layout of memory, on which a model's rounding depends.
-            channels_first = torch.from_numpy(np.stack(pictures)).permute(0, 3, 1, 2).contiguous()
+            channels_first = pictures.permute(0, 3, 1, 2).contiguous()
             batch[PICTURE.format(camera)] = channels_first.float() / _MAX_BRIGHTNESS
         return batch
 
@@ -299,6 +300,16 @@ class LeRobotPolicy:
         self._takes_batches = self._noise is not None or draws_nothing
         self.metadata = _describe(config, self._before, self._after)
         self.model = model.to(self.options.device).eval()
+
+
+def _pictures(
+    observations: Sequence[Mapping[str, Any]], camera: str, width: int | None
+) -> NDArray[np.uint8]:
+    """Return the pictures of a camera, (n, width, width, 3); None for their own width."""
+    pictures = [observation[f"{camera}_rgb"] for observation in observations]
+    if width is not None and width != len(pictures[0]):
+        pictures = [scaled_square(picture, width) for picture in pictures]
+    return np.stack(pictures)
 
 
 def _filled_up(items: Sequence[Item], size: int) -> list[Item]:

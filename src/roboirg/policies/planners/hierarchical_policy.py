@@ -59,7 +59,7 @@ class PlannerParts:
     def hear(self, text: str, step: int) -> None:
         """Pass an utterance on to all parts that remember language."""
         for part in self._all:
-            tell_policy(part, [{"text": text, "step": step}])
+            tell_policy(part, text, step)
 
     def usage(self) -> dict[str, float]:
         """Return the costs of all parts, added up by name: ``{"calls": 3.0, ...}``."""
@@ -76,7 +76,30 @@ class PlannerParts:
                 stack.callback(close_policy, part)
 
 
-class HierarchicalPolicy(PlannerParts):
+class PlannerAndPolicy(PlannerParts):
+    """Base class of a policy that hears or follows what a planner or a namer before it says.
+
+    Args:
+        planner: is asked first; its needs count as those of a planner.
+        policy: acts.
+
+    Attributes:
+        needs: of both, merged; a subclass declares them, as they are or changed.
+    """
+
+    def __init__(self, planner: object, policy: object) -> None:
+        super().__init__(planner, policy)
+        self._planner_needs = PolicyNeeds.of_planner(planner)
+        self._policy_needs = PolicyNeeds.of(policy)
+        self.needs = self._policy_needs.merge(self._planner_needs)
+
+    def _frames_for(self, needs: PolicyNeeds, demonstration: Demonstration) -> Demonstration:
+        """Return the demonstration with the frames that one of the two needs."""
+        available = self.needs.demonstration_frames
+        return DemonstrationSubset(demonstration, available, needs.demonstration_frames)
+
+
+class HierarchicalPolicy(PlannerAndPolicy):
     """Gets a subgoal from the planner before each chunk of actions, and passes it to the policy.
 
     The needs of both are merged: the environment shows what either needs, and each receives its
@@ -112,11 +135,8 @@ class HierarchicalPolicy(PlannerParts):
         self.policy = policy
         self.name = name
         if hasattr(planner, "attach") or hasattr(policy, "attach"):
-            self.attach = functools.partial(_attach, (planner, policy))
+            self.attach = functools.partial(attach_parts, (planner, policy))
 
-        self._planner_needs = PolicyNeeds.of_planner(planner)
-        self._policy_needs = PolicyNeeds.of(policy)
-        self.needs = self._policy_needs.merge(self._planner_needs)
         self._many_steps = self.needs.action_space.takes_many_steps
         if self._many_steps and self.needs.observe_every is None:
             # Only the history shows how many control steps an action took.
@@ -158,11 +178,8 @@ class HierarchicalPolicy(PlannerParts):
         """How many of `endings` the planner has got."""
         self._gave_up = False
         """Whether the planner is asked no more."""
-        subset = functools.partial(
-            DemonstrationSubset, demonstration, self.needs.demonstration_frames
-        )
-        self.planner.reset(instruction, subset(self._planner_needs.demonstration_frames))
-        self.policy.reset(instruction, subset(self._policy_needs.demonstration_frames))
+        self.planner.reset(instruction, self._frames_for(self._planner_needs, demonstration))
+        self.policy.reset(instruction, self._frames_for(self._policy_needs, demonstration))
 
     def act(self, observation: Observation) -> Actions:
         """Pass the planner's subgoal to the policy, and return the policy's actions.
@@ -218,7 +235,7 @@ class HierarchicalPolicy(PlannerParts):
                 self.planner.learn(end._replace(thing=None))
 
 
-def _attach(parts: tuple[object, ...], env: RoboIRGEnv) -> None:
+def attach_parts(parts: tuple[object, ...], env: RoboIRGEnv) -> None:
     """Pass the environment on to the parts that read it.
 
     It is not a method: a policy that holds its own method would keep the world until the next

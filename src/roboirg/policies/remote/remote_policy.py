@@ -69,6 +69,7 @@ class RemotePolicy(ABC):
         self._space = find_action_space(getattr(self.options, "actions", self.actions))
         self.actions = self._space.name
         self.instruction = ""
+        self._unsent: Demonstration | None = None
         self.connection = ServerConnection(parts.kind, read_endpoints(parts), self.options)
         # Without a close() the server is unlocked when the policy is deleted.
         weakref.finalize(self, self.connection.end)
@@ -90,6 +91,7 @@ class RemotePolicy(ABC):
             PolicyReplyError: the server replied with an error or with something else.
         """
         self.instruction = instruction
+        self._unsent = demonstration
         with self._closed_on_error():
             self.connection.begin()
             reported = as_json(self.greet())
@@ -124,7 +126,13 @@ class RemotePolicy(ABC):
 
     @abstractmethod
     def begin_episode(self, demonstration: Demonstration) -> None:
-        """Reset the server; the demonstration may be kept for `request_actions`."""
+        """Reset the server; `take_demonstration` has the demonstration for `request_actions`."""
+
+    def take_demonstration(self) -> Demonstration | None:
+        """Return the demonstration, which clients send once; None after the first call."""
+        demonstration = self._unsent
+        self._unsent = None
+        return demonstration
 
     @abstractmethod
     def request_actions(self, observation: Observation) -> Actions:

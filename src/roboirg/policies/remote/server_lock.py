@@ -13,7 +13,7 @@ import functools
 import os
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO, NamedTuple
 from weakref import WeakValueDictionary
@@ -62,24 +62,30 @@ def lock_server(
     order = [*endpoints[start:], *endpoints[:start]]
     attempt = functools.partial(_lock_any, order, folder or lock_folder(), shared=shared)
     lock = attempt()
-    if lock is not None:
-        return lock
-
     names = ", ".join(map(str, endpoints))
-    if all(_is_held(endpoint) for endpoint in endpoints):
-        raise PolicyConnectionError(f"Another policy of this thread uses {names}; close() it.")
-    end = time.monotonic() + wait
-    with waiting(f"a free server: {names}", is_queue=True):
-        while time.monotonic() < end:
-            left = end - time.monotonic()
-            time.sleep(min(_PAUSE, max(0.0, left)))
-            lock = attempt()
-            if lock is not None:
-                return lock
-    raise PolicyTimeoutError(
-        f"Other episodes used {names} for {wait:g} s; give each worker a server of its own "
-        "(host:8001,host:8002), use fewer workers, or raise wait=."
-    )
+    if lock is None:
+        if all(_is_held(endpoint) for endpoint in endpoints):
+            raise PolicyConnectionError(f"Another policy of this thread uses {names}; close() it.")
+        with waiting(f"a free server: {names}", is_queue=True):
+            lock = _attempt_again(attempt, wait)
+    if lock is None:
+        raise PolicyTimeoutError(
+            f"Other episodes used {names} for {wait:g} s; give each worker a server of its own "
+            "(host:8001,host:8002), use fewer workers, or raise wait=."
+        )
+    return lock
+
+
+def _attempt_again(attempt: Callable[[], ServerLock | None], seconds: float) -> ServerLock | None:
+    """Attempt to lock a server until it succeeds; return None if it does not within the time."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        left = end - time.monotonic()
+        time.sleep(min(_PAUSE, max(0.0, left)))
+        lock = attempt()
+        if lock is not None:
+            return lock
+    return None
 
 
 def _is_held(endpoint: Endpoint) -> bool:

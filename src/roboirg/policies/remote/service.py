@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
@@ -69,7 +69,7 @@ class Service(ABC):
             step: control steps that the client has shown since the policy's turn began.
         """
         if said != self.said:
-            tell_policy(self.policy, [{"text": said, "step": step}])
+            tell_policy(self.policy, said, step)
         self.said = said
 
     def act(self, observation: Observation) -> tuple[NDArray[np.float64], float]:
@@ -134,6 +134,23 @@ def split_state(state: NDArray[Any]) -> dict[str, NDArray[np.float32]]:
     numbers = state.astype(np.float32)
     fingers = np.repeat(numbers[..., -1:], 2, axis=-1)
     return {"joint_positions": numbers[..., :-1], "gripper": fingers}
+
+
+def stack_video(
+    frames: Sequence[Mapping[str, NDArray[Any]]], observation: Observation, fields: Iterable[str]
+) -> Demonstration:
+    """Return the frames before a policy's turn as a demonstration, by field, arrays (T, ...).
+
+    Without frames T is 0; `observation` gives the other sizes.
+    """
+    demonstration: dict[str, NDArray[Any]] = {}
+    for field in fields:
+        if frames:
+            demonstration[field] = np.stack([frame[field] for frame in frames])
+        else:
+            one_frame = np.asarray(observation[field])[None]  # type: ignore[literal-required]
+            demonstration[field] = one_frame[:0]
+    return demonstration
 
 
 def read_request(message: Message) -> Observation:

@@ -10,13 +10,13 @@ from roboirg.core.episode import Goal
 from roboirg.core.inference_facts import InferenceFacts, inference_facts
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.core.policy_needs import PolicyNeeds
-from roboirg.language import instruct_with
-from roboirg.language.scenarios.wording_store import open_wordings
-from roboirg.policies.contract.base import Policy, SubgoalEnd, tell_policy
+from roboirg.policies.contract.base import AttachedPolicy, Policy, SubgoalEnd, tell_policy
 from roboirg.policies.contract.goal_naming import GoalNamer, SaidAndShown
-from roboirg.policies.planners.hierarchical_policy import PlannerParts, joint_version
-from roboirg.policies.planners.observation_merging import DemonstrationSubset
+from roboirg.policies.planners.hierarchical_policy import (
+    PlannerAndPolicy,
+    attach_parts,
+    joint_version,
+)
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -29,7 +29,7 @@ PASSED_ON = "passed_on"
 """Entry of the usage: an episode whose policy heard what was said."""
 
 
-class ResolvingPolicy(PlannerParts):
+class ResolvingPolicy(PlannerAndPolicy, AttachedPolicy):
     """Rewrites what was said as the explicit command of the goal that a namer names.
 
     ``"The red cubes are my favorite. Put one of them into the bin."`` becomes ``"Put one red cube
@@ -53,16 +53,15 @@ class ResolvingPolicy(PlannerParts):
     """
 
     def __init__(self, namer: GoalNamer, policy: Policy, wordings: str | None = None) -> None:
+        # The language is imported where it is needed: other policies do without.
+        from roboirg.language.scenarios.wording_store import open_wordings
+
         super().__init__(namer, policy)
         self.namer = namer
         self.policy = policy
         self.is_privileged = hasattr(namer, "attach") or hasattr(policy, "attach")
         self._wordings = open_wordings(wordings)
-        self._namer_needs = PolicyNeeds.of_planner(namer)
-        self._policy_needs = PolicyNeeds.of(policy)
-        self.needs = self._policy_needs.merge(self._namer_needs)
         self.needs.declare_on(self)
-        self._env: RoboIRGEnv | None = None
         self._begin("")
 
     def _begin(self, instruction: str) -> None:
@@ -74,17 +73,8 @@ class ResolvingPolicy(PlannerParts):
 
     def attach(self, env: RoboIRGEnv) -> None:
         """Receive the environment; the namer and the policy get it if they are privileged."""
-        self._env = env
-        for part in (self.namer, self.policy):
-            if hasattr(part, "attach"):
-                part.attach(env)
-
-    @property
-    def env(self) -> RoboIRGEnv:
-        """The environment of the episode."""
-        if self._env is None:
-            raise RuntimeError("ResolvingPolicy needs attach(env) before reset().")
-        return self._env
+        super().attach(env)
+        attach_parts(self._all, env)
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode; if all has been said, the policy hears the rewritten command.
@@ -92,16 +82,11 @@ class ResolvingPolicy(PlannerParts):
         The video has the frames that namer or policy need; each of the two gets those of its own.
         """
         self._begin(instruction)
-        self._shown = self._frames_for(self._namer_needs, demonstration)
+        self._shown = self._frames_for(self._planner_needs, demonstration)
         if not self.env.unheard:
             self._resolve()
         shown_to_policy = self._frames_for(self._policy_needs, demonstration)
         self.policy.reset(self._last_words, shown_to_policy)
-
-    def _frames_for(self, needs: PolicyNeeds, demonstration: Demonstration) -> Demonstration:
-        """Return the video with the frames that one of the two needs."""
-        available = self.needs.demonstration_frames
-        return DemonstrationSubset(demonstration, available, needs.demonstration_frames)
 
     def hear(self, text: str, step: int) -> None:
         """Pass an utterance on to the policy, the last one rewritten."""
@@ -109,10 +94,12 @@ class ResolvingPolicy(PlannerParts):
         self._last_words = text
         if len(self._heard) == len(self.env.instruction.utterances):
             self._resolve()
-        tell_policy(self.policy, [{"text": self._last_words, "step": step}])
+        tell_policy(self.policy, self._last_words, step)
 
     def _resolve(self) -> None:
         """Let the namer name the goal, and replace the command, if it names one."""
+        from roboirg.language import instruct_with
+
         env = self.env
         given = SaidAndShown.of(env, " ".join(self._heard), self._shown)
         self._goal = self.namer.name_goal(given)

@@ -8,7 +8,6 @@ from typing import NamedTuple
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_ref import RESOLVE
 from roboirg.policies.builtin import BUILTIN
-from roboirg.shortcuts import SURFACE_RULES
 
 POLICY = "policy"
 WORDINGS = "wordings"
@@ -52,6 +51,9 @@ def read_rewriting(spec: str, target: str, options: Mapping[str, str]) -> Rewrit
             f"Policy {spec!r} rewrites words, but names no policy that hears them; write "
             f"{RESOLVE}:{target or 'surface'}?{POLICY}=SPEC."
         )
+    # Imported here because it brings the reader's patterns, which other policies do not need.
+    from roboirg.shortcuts import SURFACE_RULES
+
     if policy in BUILTIN and policy not in SURFACE_RULES:
         raise InvalidValueError(
             f"Policy {spec!r}: {policy!r} does not listen to words, so rewriting them changes "

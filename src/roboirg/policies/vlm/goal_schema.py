@@ -149,21 +149,21 @@ def goal_schema(task: str) -> GoalSchema:
     -> ``{"blue": 0, "green": 0, "red": 2}``.
     """
     known_task = get_task(task)
-    short_answers = {goal: _answer(goal) for goal in _training_goals(known_task)}
-    names = max(short_answers.values(), key=len)  # the longest answer has all fields
-    zeros = dict.fromkeys(names, 0)
-    answers: list[dict[str, Any]] = []
-    goals_by_answer: dict[str, Goal] = {}
-    for goal, short_answer in short_answers.items():
-        answer = zeros | dict(short_answer)
-        answers.append(answer)
-        goals_by_answer[_canonical(answer)] = goal
-
+    answers = _whole_answers(known_task)
+    goals = {_canonical(answer): goal for goal, answer in answers.items()}
     fields: list[Field] = []
-    for name in names:
-        values = [answer[name] for answer in answers]
+    for name in next(iter(answers.values())):
+        values = [answer[name] for answer in answers.values()]
         fields.append(_field(name, values))
-    return GoalSchema(tuple(fields), goals_by_answer, known_task.things.colored)
+    return GoalSchema(tuple(fields), goals, known_task.things.colored)
+
+
+def _whole_answers(task: Task) -> dict[Goal, Answer]:
+    """Return the answer that names each goal of a task, with the same fields in the same order."""
+    answers = {goal: _answer(goal) for goal in _training_goals(task)}
+    longest = max(answers.values(), key=len)  # which has all fields
+    zeros = dict.fromkeys(longest, 0)
+    return {goal: {**zeros, **answer} for goal, answer in answers.items()}
 
 
 def _training_goals(task: Task) -> Iterable[Goal]:

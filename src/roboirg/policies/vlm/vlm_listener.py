@@ -79,20 +79,21 @@ class VLMNamer:
             self.demonstration_frames = "none"
         self.prompts = load_prompts(PROMPTS, options.prompts)
         self._vlm = VLMQuery(options.model, self.prompts["again"], connect)
+        self._configuration: dict[str, Any] = {
+            "model": options.model.about(),
+            "prompts": self.prompts.fingerprint,
+            **options.model_dump(mode="json", exclude={"model", "prompts"}),
+        }
 
     @property
     def metadata(self) -> dict[str, Any]:
         """Options and prompts; there is no key among them."""
-        return {
-            "model": self.options.model.about(),
-            "prompts": self.prompts.fingerprint,
-            **self.options.model_dump(mode="json", exclude={"model", "prompts"}),
-        }
+        return self._configuration
 
     @property
     def version(self) -> str:
         """The model, and a fingerprint of the options and prompts that may change its answers."""
-        return config_version(self.options.model, self.metadata)
+        return config_version(self.options.model, self._configuration)
 
     def start(self) -> None:
         """Reset the costs for a new episode."""
@@ -141,7 +142,7 @@ class VLMNamer:
         return (summary_clip(frames, self.options.frames, steps),)
 
 
-class VLMListener(ScriptedPolicy):
+class VLMListener(VLMNamer, ScriptedPolicy):
     """Executes the goal that a vision-language model names.
 
     If the model gives no valid answer even to a second query, or names objects that the scene does
@@ -163,20 +164,12 @@ class VLMListener(ScriptedPolicy):
         seed: int = 0,
         connect: Callable[[ModelOptions], Model] = make_model,
     ) -> None:
-        """Make the namer, whose needs of pictures and video become this policy's."""
-        super().__init__(seed)
-        self.namer = VLMNamer(options, connect)
-        self.options = options
-        self.cameras = self.namer.cameras
-        self.demonstration_frames = self.namer.demonstration_frames
+        """Check the options; what the model is shown, this policy needs."""
+        ScriptedPolicy.__init__(self, seed)
+        VLMNamer.__init__(self, options, connect)
         self.understood: Goal | None = None
         self._demonstration: Demonstration = {}
         self._impossible = False
-
-    @property
-    def version(self) -> str:
-        """The model, and a fingerprint of the options and prompts that may change its answers."""
-        return self.namer.version
 
     @property
     def metadata(self) -> dict[str, Any]:
@@ -184,7 +177,7 @@ class VLMListener(ScriptedPolicy):
         understood = None
         if self.understood is not None:
             understood = dict(self.understood.as_mapping())
-        return {**self.namer.metadata, "understood": understood}
+        return {**self._configuration, "understood": understood}
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Query the goal and begin to execute it, or first hear the rest of the instruction.
@@ -194,7 +187,7 @@ class VLMListener(ScriptedPolicy):
             PolicyTimeoutError: it did not answer in time.
             PolicyReplyError: it replied with an error.
         """
-        self.namer.start()
+        self.start()
         self._demonstration = demonstration
         self.understood = None
         self._impossible = False
@@ -206,7 +199,7 @@ class VLMListener(ScriptedPolicy):
         Called once an episode, when all has been said. Keeps the goal for the records in any case.
         """
         given = SaidAndShown.of(env, instruction, self._demonstration)
-        goal = self.namer.name_goal(given)
+        goal = self.name_goal(given)
         self.understood = goal
         if goal is not None and goal not in goals_of(env.episode):
             self._impossible = True
@@ -215,4 +208,4 @@ class VLMListener(ScriptedPolicy):
 
     def usage(self) -> dict[str, float]:
         """Return the cost of the episode."""
-        return {**self.namer.usage(), "impossible": int(self._impossible)}
+        return {**super().usage(), "impossible": int(self._impossible)}

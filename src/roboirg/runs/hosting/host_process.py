@@ -46,6 +46,7 @@ from roboirg.policies.contract.policy_calls import (
 from roboirg.policies.contract.policy_version import read_version
 from roboirg.policies.contract.random_state import RandomState, RandomTurns
 from roboirg.policies.opening import opened
+from roboirg.records.episode_log import flush_streams
 from roboirg.runs.episode_errors import describe_error
 from roboirg.runs.hosting.messages import (
     DRAW_S,
@@ -213,9 +214,7 @@ class HostProcess:
 
     def _printed(self) -> bytes:
         """Return what this process has printed since it was last asked, and forget it."""
-        for stream in (sys.stdout, sys.stderr):
-            with contextlib.suppress(Exception):  # a policy may have closed or replaced it
-                stream.flush()
+        flush_streams()
         with contextlib.suppress(OSError):
             return take_output(self._output)
         return b""
@@ -274,7 +273,7 @@ class HostProcess:
                     version=read_version(policy) or "",
                 )
             case "hear":
-                tell_policy(policy, call.value)
+                tell_policy(policy, call.value["text"], call.value["step"])
             case "act":
                 return _action_outcome(episode, policy.act(_observation(call)))
             case "usage":

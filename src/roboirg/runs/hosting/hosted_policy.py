@@ -110,7 +110,7 @@ class HostedPolicy:
 
     def hear(self, text: str, step: int) -> None:
         """Pass on what was said."""
-        self._take_metadata(self._call(Call("hear", value=[{"text": text, "step": step}])))
+        self._take_metadata(self._call(Call("hear", value={"text": text, "step": step})))
 
     def usage(self) -> dict[str, float]:
         """Return the cost of the episode; empty after an error."""

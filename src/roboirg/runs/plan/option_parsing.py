@@ -193,19 +193,24 @@ def parse_episodes(given: object, split: str, tasks: Collection[str]) -> Numbers
         ranges = [_first_episodes(positions[0])]
     elif positions:
         ranges = _parse_ranges("episode", positions, _EPISODES_HINT)
-    last = max((numbers[-1] for numbers in ranges), default=-1)
-    is_typed = isinstance(given, str | int)
-    if is_typed and last >= splits.split_size(split):
-        raise InvalidValueError(
-            f"There is no episode {last}: split {split!r} has episodes 0 to "
-            f"{splits.split_size(split) - 1}."
-        )
+    if isinstance(given, str | int):
+        _check_positions(ranges, split)
 
     found: list[int] = []
     if levels:
         found += _episodes_of_levels(levels, split, tasks)
     found += _union(ranges)
     return distinct(found)
+
+
+def _check_positions(ranges: Iterable[range], split: str) -> None:
+    """Raise if a split has fewer episodes than some positions need; none of the ranges is empty."""
+    size = splits.split_size(split)
+    last = max((numbers[-1] for numbers in ranges), default=-1)
+    if last >= size:
+        raise InvalidValueError(
+            f"There is no episode {last}: split {split!r} has episodes 0 to {size - 1}."
+        )
 
 
 def _first_episodes(count: str) -> range:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 
@@ -141,13 +142,15 @@ class Plan(PlanFields):
         Args:
             jobs: of this plan.
         """
-        # The keys of each arm's jobs, as if they were of the usual arm: then jobs that differ only
-        # in the arm have equal keys, and missing ones can be counted.
-        trials = {arm: set[RecordKey]() for arm in self.arms}
+        # Jobs that differ only in the arm are one trial: as if they were of the usual arm, they
+        # have equal keys.
+        counts: Counter[str] = Counter()
+        trials: set[RecordKey] = set()
         for job in jobs:
-            trials[job.arm].add(identity_key(msgspec.structs.replace(job, arm=TOLD)))
-        total = len(set[RecordKey]().union(*trials.values()))
-        return {arm: total - len(keys) for arm, keys in trials.items() if len(keys) < total}
+            counts[job.arm] += 1
+            trials.add(identity_key(msgspec.structs.replace(job, arm=TOLD)))
+        total = len(trials)
+        return {arm: total - counts[arm] for arm in self.arms if counts[arm] < total}
 
     def drawable_jobs(self, played: Iterable[Summary] = ()) -> tuple[Job, ...]:
         """Return the jobs that this computer can make, to count what a stored run lacks.

@@ -38,15 +38,8 @@ def recorded_events(events: Iterable[Mapping[str, Any]], start: int) -> tuple[Ev
     """
     recorded = []
     for event in events:
-        place = event.get("place")
-        record = EventRecord(
-            step=int(event["step"]) - start,
-            kind=str(event["kind"]),
-            subject=str(event["subject"]),
-            place=None if place is None else str(place),
-            holds=bool(event.get("holds", True)),
-        )
-        recorded.append(record)
+        step = event["step"] - start
+        recorded.append(EventRecord(**{**event, "step": step}))
     return tuple(recorded)
 
 

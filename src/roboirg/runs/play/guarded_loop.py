@@ -18,8 +18,8 @@ from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.core.subgoal_text import split_point
 from roboirg.judging import judge_subgoal, plain_subgoal
-from roboirg.policies.contract.base import Policy
-from roboirg.policies.contract.play import EpisodeLoop, Moment
+from roboirg.policies.contract.base import Policy, PrivilegedPolicy, tell_policy
+from roboirg.policies.contract.play import Moment
 from roboirg.policies.contract.policy_calls import (
     check_rows,
     policy_metadata,
@@ -43,8 +43,8 @@ NO_RENDER_DEVICE = "none"
 """Name of the device of an environment that renders nothing."""
 
 
-class GuardedLoop(EpisodeLoop):
-    """Plays a job's episode.
+class GuardedLoop:
+    """Plays a job's episode: the turns of `EpisodeLoop`, guarded and recorded.
 
     Args:
         env: the environment of the job.
@@ -71,7 +71,8 @@ class GuardedLoop(EpisodeLoop):
         guard: CallGuard,
         writer: VideoWriter | None = None,
     ) -> None:
-        super().__init__(env, policy)
+        self.env = env
+        self.policy = policy
         self._prepared = prepared
         self._space = space
         self._record = record
@@ -92,10 +93,14 @@ class GuardedLoop(EpisodeLoop):
         self.answers: list[NDArray[np.float64]] = []
         self.log: ActionLog | None = None
 
-    def play(self) -> dict[str, Any]:
-        """Play the episode from beginning to end. Returns the last step's info."""
-        self._last_info = super().play()
-        return self._last_info
+    def play(self) -> None:
+        """Play the episode from beginning to end."""
+        observation, info = self.begin()
+        while info["status"] == "ongoing":
+            observation, info = self.execute(self.act(observation))
+            if info["heard"]:
+                self.hear(info["heard"])
+        self._last_info = info
 
     def conclude(self) -> None:
         """Record the verdict of the episode and its reasons, if it came to its end."""
@@ -169,10 +174,10 @@ class GuardedLoop(EpisodeLoop):
 
         So does a rewriter of ours, which hands the world on to nothing that is not privileged.
         """
-        if self._record.ref.is_privileged or isinstance(self.policy, ResolvingPolicy):
-            super().start_policy(instruction, demonstration)
-        else:
-            self.policy.reset(instruction, demonstration)
+        may_attach = self._record.ref.is_privileged or isinstance(self.policy, ResolvingPolicy)
+        if may_attach and isinstance(self.policy, PrivilegedPolicy):
+            self.policy.attach(self.env)
+        self.policy.reset(instruction, demonstration)
 
     def _read_metadata(self) -> None:
         """Record what the policy reports about itself now."""
@@ -294,7 +299,7 @@ class GuardedLoop(EpisodeLoop):
         rows = np.asarray(actions)
         with self._guard.environment("env_step"):
             executed_before = self.env.executed_actions
-            observation, info = super().execute(rows)
+            observation, *_, info = self.env.step_chunk(rows)
             executed = self.env.executed_actions - executed_before
             self.answers.append(rows[:executed])
         record = self._record
@@ -310,7 +315,8 @@ class GuardedLoop(EpisodeLoop):
         if self._writer is not None:
             self._writer.caption = " ".join(utterance["text"] for utterance in self._heard)
         with self._guard.policy("policy's hear()", "policy_hear"):
-            super().hear(utterances)
+            for utterance in utterances:
+                tell_policy(self.policy, utterance["text"], utterance["step"])
             self._read_metadata()
 
     def keep_actions(self) -> None:

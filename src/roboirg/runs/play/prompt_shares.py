@@ -102,20 +102,22 @@ def audit_job(
     return audit_prompt(instruction, steps, limit)
 
 
-def check_prompt(audit: PromptAudit, verdict: PromptVerdict) -> None:
-    """Raise if an instruction is certainly too long for a policy's language model.
+def check_prompt(job: Job, limit: PromptLimit, instruction: Instruction) -> None:
+    """Refuse an instruction of which the policy's model does not read the end.
 
     Args:
-        audit: how many tokens it needs, and how many the model reads.
-        verdict: ``cut`` if it is too long.
+        job: the episode.
+        limit: of the policy.
+        instruction: of the episode.
 
     Raises:
-        EpisodeError: it is.
+        EpisodeError: of the kind ``prompt``.
     """
-    if verdict == "cut":
+    audited = audit_job(job, limit, instruction)
+    if audited.verdict == "cut":
         words = (
-            f"the instruction needs {audit.needed_text} tokens, but the policy's model reads "
-            f"{audit.limit}; long_prompts: send in the plan plays the episode anyway"
+            f"the instruction needs {audited.audit.needed_text} tokens, but the policy's model "
+            f"reads {limit.tokens}; long_prompts: send in the plan plays the episode anyway"
         )
         raise EpisodeError("prompt", words, "")
 

@@ -51,7 +51,7 @@ from roboirg.runs.play.episode_record import (
 )
 from roboirg.runs.play.guarded_loop import GuardedLoop
 from roboirg.runs.play.policy_environment import job_needs, make_env
-from roboirg.runs.play.prompt_shares import audit_job, check_prompt
+from roboirg.runs.play.prompt_shares import check_prompt
 from roboirg.runs.play.video_writer import VideoWriter
 
 PlayJob = Callable[[Job], Record]
@@ -103,10 +103,6 @@ class EpisodeRunner:
         """Return a copy that writes its videos and the replies of models to another folder."""
         replies = None if self.replies is None else self.replies._replace(folder=folder)
         return replace(self, folder=folder, replies=replies)
-
-    def with_hosts(self, hosts: socket) -> EpisodeRunner:
-        """Return a copy that asks for hosts on a line, as `HostPool.connect` returns it."""
-        return replace(self, hosts=hosts)
 
     def __call__(self, job: Job) -> Record:
         """Play one job.
@@ -182,36 +178,36 @@ class EpisodeRunner:
         hosts = self.hosts if job.ref is not None and job.ref.is_hosted else None
         record = begin_record(prepared)
         guard = CallGuard(record.timings, self.policy_timeout_s, is_hosted=hosts is not None)
-        policy: Policy | None = None
         limit: PromptLimit | None = None
         loop: GuardedLoop | None = None
-        try:
-            with guard.policy("policy's constructor", "policy_load"):
-                if hosts is None:
-                    policy = load_policy(prepared)
-                else:
-                    policy = load_hosted_policy(hosts, prepared, self.policy_timeout_s, alone=alone)
-                needs = job_needs(policy, job)
-                limit = prompt_limit(needs)
-                # Refused before the episode is played, as the outcome would mean nothing.
-                if self.refuse_long and limit is not None:
-                    audited = audit_job(job, limit, prepared.words.instruction)
-                    check_prompt(audited.audit, audited.verdict)
-            loop = play_with(policy, prepared, needs, record, guard, writer)
-        except EpisodeError as error:
-            record.record_error(error.kind, error.cause, error.details)
-        finally:
-            if policy is not None:
-                _close_policy(policy, record, guard)
+        with contextlib.ExitStack() as closing:
+            try:
+                with guard.policy("policy's constructor", "policy_load"):
+                    policy = self._load(prepared, hosts, alone=alone)
+                    closing.callback(_close_policy, policy, record, guard)
+                    needs = job_needs(policy, job)
+                    limit = prompt_limit(needs)
+                    # Refused before the episode is played, as the outcome would mean nothing.
+                    if self.refuse_long and limit is not None:
+                        check_prompt(job, limit, prepared.words.instruction)
+                loop = play_with(policy, prepared, needs, record, guard, writer)
+            except EpisodeError as error:
+                record.record_error(error.kind, error.cause, error.details)
 
-        log = None  # of the actions
-        if loop is not None:
-            loop.conclude()
-            log = loop.log
         if limit is not None:
             with contextlib.suppress(InvalidValueError):
                 audit_record(record, prepared, limit)
-        return PlayedJob(record, log)
+        if loop is None:
+            return PlayedJob(record)
+        loop.conclude()
+        return PlayedJob(record, loop.log)
+
+    def _load(self, prepared: PreparedJob, hosts: socket | None, *, alone: bool) -> Policy:
+        """Make the policy of a job, in a process of its own if `hosts` leads to one."""
+        if hosts is None:
+            return load_policy(prepared)
+        seed = _seed_of(prepared)
+        return _hosted(hosts, _policy_of(prepared), seed, self.policy_timeout_s, alone=alone)
 
     def _finish_video(self, writer: VideoWriter, record: Record) -> None:
         """Complete the video, or discard an unwanted one; record its path, and what failed."""
@@ -271,8 +267,8 @@ def load_policy(prepared: PreparedJob) -> Policy:
     return make_policy(_policy_of(prepared), _seed_of(prepared))
 
 
-def load_hosted_policy(
-    hosts: socket, prepared: PreparedJob, limit_s: float | None, *, alone: bool = False
+def _hosted(
+    hosts: socket, ref: PolicyRef, seed: int, limit_s: float | None, *, alone: bool
 ) -> HostedPolicy | HierarchicalPolicy | ResolvingPolicy:
     """Return a policy of the user's, whose code runs in a process of its own.
 
@@ -281,17 +277,11 @@ def load_hosted_policy(
 
     Args:
         hosts: the line on which to ask for the process.
-        prepared: the job.
+        ref: the policy.
+        seed: of its random choices.
         limit_s: seconds that one call may take.
         alone: whether it must not be asked about this episode together with others.
     """
-    return _hosted(hosts, _policy_of(prepared), _seed_of(prepared), limit_s, alone=alone)
-
-
-def _hosted(
-    hosts: socket, ref: PolicyRef, seed: int, limit_s: float | None, *, alone: bool
-) -> HostedPolicy | HierarchicalPolicy | ResolvingPolicy:
-    """Return a policy of which something runs in a process of its own, as `load_hosted_policy`."""
     if ref.place == "split":
         planner = HostedPlanner(hosts, ref.hosted_part, seed, limit_s, alone=alone)
         hands = make_follower(SCRIPTED, seed)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,19 +17,17 @@ from roboirg.core.extras import extra_needed
 from roboirg.core.observations import CAMERAS, FRONT, Pixels
 from roboirg.core.subgoal_text import Point
 from roboirg.records.film import FRAME_RATE, FRAME_STEPS, LAST_FRAME_REPEATS, poster_name
-from roboirg.util.media import draw_text, encode_jpeg, wrap_text
+from roboirg.util.media import Mp4Encoder, draw_text, encode_jpeg, wrap_text
 
 if TYPE_CHECKING:
-    from av.container import OutputContainer
-    from av.video.stream import VideoStream
-
     from roboirg.envs.environment import RoboIRGEnv
 
 DEMONSTRATION_COLOR = (255, 176, 32)
 """RGB of the border around the frames of the demonstration."""
 
-QUALITY = 28
-"""x264's constant rate factor; higher is smaller."""
+# x264's macroblock tree reads memory that it has not written if the width is no multiple of 128:
+# equal pictures would give files that differ. A higher constant rate factor gives smaller files.
+_ENCODER_OPTIONS = {"crf": "28", "mbtree": "0"}
 
 BORDER = 6
 GAP = 4
@@ -136,13 +134,6 @@ def _caption_lines(text: str, width: int) -> list[str]:
     return wrap_text(text, width - 2 * _TEXT_MARGIN, _TEXT_SCALE)[:_MAX_LINES]
 
 
-class _OpenVideo(NamedTuple):
-    """A video file that is being written, and the stream of frames in it."""
-
-    container: OutputContainer
-    stream: VideoStream
-
-
 @dataclass
 class VideoWriter:
     """Writes one video. Nothing exists under `path` until `finish`.
@@ -167,7 +158,7 @@ class VideoWriter:
     longest_caption: str = field(default="", init=False)
     point: Point | None = field(default=None, init=False)
     error: Exception | None = field(default=None, init=False)
-    _video: _OpenVideo | None = field(default=None, init=False, repr=False)
+    _video: Mp4Encoder | None = field(default=None, init=False, repr=False)
     _last_frame: Pixels | None = field(default=None, init=False, repr=False)
 
     @property
@@ -213,9 +204,7 @@ class VideoWriter:
             for _ in range(LAST_FRAME_REPEATS):
                 self._encode(self._last_frame)
             poster.write_bytes(encode_jpeg(self._last_frame))
-            remaining = self._video.stream.encode(None)  # packets that the encoder still holds
-            self._video.container.mux(remaining)
-            self._video.container.close()
+            self._video.close()
             self.partial.replace(self.path)
         except Exception as error:  # noqa: BLE001 - see the class
             self._abandon(error)
@@ -246,31 +235,11 @@ class VideoWriter:
 
         Height and width are even, and all frames have the same.
         """
-        import av
-
         if self._video is None:
-            self._video = self._open(frame)
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._video = Mp4Encoder(self.partial, frame, Fraction(FRAME_RATE), _ENCODER_OPTIONS)
         self._last_frame = frame
-        packets = self._video.stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24"))
-        self._video.container.mux(packets)
-
-    def _open(self, frame: Pixels) -> _OpenVideo:
-        """Begin the file of a video; its frames, uint8 (height, width, 3), have this one's size."""
-        import av
-
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        # The index goes to the front, so that a player can start before it has read the whole file.
-        container = av.open(
-            str(self.partial), "w", format="mp4", options={"movflags": "+faststart"}
-        )
-        stream = container.add_stream("libx264", rate=Fraction(FRAME_RATE))
-        stream.height, stream.width = frame.shape[:2]
-        stream.pix_fmt = "yuv420p"
-        # x264's macroblock tree reads memory that it has not written if the width is no multiple of
-        # 128: equal pictures would give files that differ.
-        stream.options = {"crf": str(QUALITY), "preset": "veryfast", "mbtree": "0"}
-        stream.codec_context.thread_count = 1
-        return _OpenVideo(container, stream)
+        self._video.add(frame)
 
 
 @contextlib.contextmanager

@@ -109,15 +109,13 @@ class LocalProcesses:
                         failed_starts = failed_starts + 1 if worker.is_stillborn else 0
                         if failed_starts >= MAX_FAILED_STARTS * self.workers:
                             raise RoboIRGError(f"No worker process can start ({record.cause}).")
-                        if worker.is_dead:
-                            active.remove(worker)
-                        elif jobs:
-                            others = [other for other in active if other is not worker]
-                            worker.assign(take_job(jobs, others))
-                        else:
-                            active.remove(worker)  # nothing is left to play
+                        active.remove(worker)
+                        if not worker.is_dead and jobs:
+                            worker.assign(take_job(jobs, active))
+                            active.append(worker)
+                        elif not worker.is_dead:
                             released.append(worker)
-                            worker.child.connection.close()  # it may exit
+                            worker.child.connection.close()  # nothing is left: it may exit
                         yield record
             finally:
                 for worker in active:

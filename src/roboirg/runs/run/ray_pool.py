@@ -467,9 +467,10 @@ class RayPool:
             A record of an error for each job that was lost.
         """
         now = time.monotonic()
-        machines = [machine for machine in self._machines.values() if machine.fault is None]
         asked: list[_Machine | _Worker] = []
-        asked += [machine for machine in machines if machine.actor is not None]
+        for machine in self._machines.values():
+            if machine.fault is None and machine.actor is not None:
+                asked.append(machine)
         asked += [worker for worker in self._workers if worker.job is not None]
         for process in asked:
             if isinstance(process, _Worker) and process not in self._workers:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 from roboirg.core.error_words import MAX_CAUSE_LENGTH
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
+from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.core.versions import NO_VERSION, Mismatch
 from roboirg.policies.vlm.models.reply_store import ReplySettings
 from roboirg.records.film import VIDEO_FOLDER
@@ -315,15 +316,19 @@ def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> N
     what = f"{folder} holds episodes"
     for record in records:
         check_same(what, other_versions(record), _HERE)
-    scenes = {(record.task, record.split, record.episode, record.seed) for record in records}
-    for task, split, episode, seed in scenes:
-        expected: str | int = NO_VERSION
-        with contextlib.suppress(InvalidValueError):
-            expected = get_episode(task, split, episode).seed
-        if seed != expected:
-            of_scene = f"{what} of {task} {split}/{episode}"
-            check_same(of_scene, [Mismatch("scene seed", seed, expected)], _HERE)
+    for scene in {(record.task, record.split, record.episode, record.seed) for record in records}:
+        _check_scene(what, *scene)
     _check_policies(plan, records, folder)
+
+
+def _check_scene(what: str, task: str, split: str, episode: int, seed: int) -> None:
+    """Raise if an episode has another seed here than in records; `what` holds them."""
+    expected: str | int = NO_VERSION
+    with contextlib.suppress(InvalidValueError):
+        expected = get_episode(task, split, episode).seed
+    if seed != expected:
+        of_scene = f"{what} of {task} {split}/{episode}"
+        check_same(of_scene, [Mismatch("scene seed", seed, expected)], _HERE)
 
 
 def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> None:
@@ -343,17 +348,19 @@ def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> Non
         policy = planned.get(name)
         if policy is None:
             continue
-        # If the policy cannot be opened now, its version is unknown, and equal to another unknown
-        # one: a verdict with that may still be of another version. An error with it does no harm.
-        may_differ = outcome != "error" or versions.policy_version != policy.version
-        if policy.problem is not None and may_differ:
+        # If a policy cannot be opened, its version is unknown, and equal to another unknown one: a
+        # verdict with that may still be of another version. An error with it does no harm.
+        known = versions
+        if outcome == "error" and versions.policy_version == UNKNOWN_VERSION:
+            known = versions._replace(policy_version=None)
+        elif policy.problem is not None:
             raise StoreError(
                 f"{folder} holds episodes of {name} version {versions.policy_version}, but the "
                 f"policy cannot be opened to read its version now ({policy.problem}); choose "
                 "another --out."
             )
         what = f"{folder} holds episodes of {name}"
-        check_same(what, versions.differences(policy.versions))
+        check_same(what, known.differences(policy.versions))
 
 
 @contextlib.contextmanager

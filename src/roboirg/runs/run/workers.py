@@ -13,6 +13,7 @@ import functools
 import os
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from typing import cast
 
@@ -153,7 +154,7 @@ def connected(play: PlayJob, connect: Connect | None) -> Iterator[PlayJob]:
         yield play
         return
     with connect() as line:
-        yield cast("EpisodeRunner", play).with_hosts(line)
+        yield replace(cast("EpisodeRunner", play), hosts=line)
 
 
 def _work(connection: Connection, watchdog: Watchdog, play: PlayJob, limit_threads: bool) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,20 +38,15 @@ def grasp_rotations(name: str, bodies: Mapping[str, Body], tool: Rotation) -> li
         bodies: all objects, by name; the others are obstacles.
         tool: the tool's current rotation.
     """
-    grasped = bodies[name]
-    center = grasped.position
+    center = bodies[name].position
     closing_now = tool.as_matrix()[:2, 1]  # fingers close along the tool's y axis
-    obstacles: list[Footprint] = []
-    for other, body in bodies.items():
-        if other != name:
-            obstacles += _footprints(body)
+    others = [body for other, body in bodies.items() if other != name]
 
     def cost(side: Direction) -> tuple[bool, float]:
         """Rank free sides before blocked ones, then those that need a shorter turn."""
-        fingers = _fingers(center, side)
-        return _is_blocked(fingers, obstacles), -float(side @ closing_now)
+        return _is_blocked(_fingers(center, side), others), -float(side @ closing_now)
 
-    return [_rotation(side) for side in sorted(_sides(grasped), key=cost)]
+    return [_rotation(side) for side in sorted(_sides(bodies[name]), key=cost)]
 
 
 def _sides(body: Body) -> list[Direction]:
@@ -68,8 +63,9 @@ def _sides(body: Body) -> list[Direction]:
     return sides
 
 
-def _is_blocked(fingers: Sequence[Rectangle], obstacles: Sequence[Footprint]) -> bool:
-    """Return whether a finger would hit an obstacle."""
+def _is_blocked(fingers: Sequence[Rectangle], others: Iterable[Body]) -> bool:
+    """Return whether one of the fingers would touch one of the other objects."""
+    obstacles = itertools.chain.from_iterable(_footprints(body) for body in others)
     pairs = itertools.product(fingers, obstacles)
     return any(overlap(finger, obstacle) for finger, obstacle in pairs)
 

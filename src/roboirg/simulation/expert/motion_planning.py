@@ -201,11 +201,8 @@ class MotionPlanner:
         if _largest(offset) > MAX_TRAVEL:
             raise MotionPlanningError(f"{_format_position(goal)} is out of reach.")
         turn = (start.rotation.inv() * goal.rotation).as_rotvec()
-        count_by_distance = math.ceil(float(np.linalg.norm(offset)) / WAYPOINT_DISTANCE)
-        count_by_angle = math.ceil(float(np.linalg.norm(turn)) / WAYPOINT_ANGLE)
-        count = max(1, count_by_distance, count_by_angle)
         points = [arm]
-        for share in np.linspace(0.0, 1.0, count + 1)[1:]:
+        for share in np.linspace(0.0, 1.0, _move_count(offset, turn) + 1)[1:]:
             position = start.position + share * offset
             rotation = start.rotation * Rotation.from_rotvec(share * turn)
             points.append(self._solve_near(ToolPose(position, rotation), points[-1]))
@@ -242,6 +239,13 @@ class MotionPlanner:
         if _largest(arm - seed) > MAX_JOINT_STEP:
             raise MotionPlanningError("A straight move passes too close to a singularity.")
         return arm
+
+
+def _move_count(offset: Vector, turn: Vector) -> int:
+    """Return in how many moves the tool is shifted (m) and turned (a rotation vector, rad)."""
+    by_distance = math.ceil(float(np.linalg.norm(offset)) / WAYPOINT_DISTANCE)
+    by_angle = math.ceil(float(np.linalg.norm(turn)) / WAYPOINT_ANGLE)
+    return max(1, by_distance, by_angle)
 
 
 def _largest(vector: Vector) -> float:

@@ -32,18 +32,14 @@ def read_stl(path: Path) -> NDArray[np.void]:
 
 
 def packed_mask() -> bytes:
-    """Return the shipped bit mask, compressed by zlib; `visible_mask` unpacks it."""
+    """Return the shipped bit mask, compressed by zlib; `visible_triangles` unpacks it."""
     return resources.files("roboirg.simulation.rendering").joinpath(MASK_FILE).read_bytes()
-
-
-def visible_mask(count: int) -> NDArray[np.bool_]:
-    """Return for each of the file's triangles whether it is visible from outside: (count,)."""
-    packed = zlib.decompress(packed_mask())
-    return np.unpackbits(np.frombuffer(packed, np.uint8), count=count).astype(bool)
 
 
 def visible_triangles(stl: Path) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return corners (n, 3, 3), m, and normals (n, 3) of the triangles visible from outside."""
     triangles = read_stl(stl)
-    visible = triangles[visible_mask(len(triangles))]
+    bits = np.frombuffer(zlib.decompress(packed_mask()), np.uint8)
+    is_visible = np.unpackbits(bits, count=len(triangles)).astype(bool)  # a bit for each triangle
+    visible = triangles[is_visible]
     return np.ascontiguousarray(visible["corners"]), np.ascontiguousarray(visible["normal"])

@@ -6,8 +6,8 @@ What finds no free place raises `SceneRejectedError`: the seed gives no scene.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,12 @@ ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
 BIN_YAW = math.radians(20.0)
 """Largest rotation of the bin to either side."""
+
+HALF_SIZES = {
+    "cube": (object_sizes.CUBE_HALF, object_sizes.CUBE_HALF),
+    "tape": (object_sizes.TAPE_RADIUS, object_sizes.TAPE_HALF),
+}
+"""Half the width of an item that lies on the table, and half its height, m."""
 
 LINE_TURNS = (None, None, 0.0, math.pi / 2)
 """Direction, from a cube's yaw, of the line that stands for the cube; None for its square."""
@@ -73,12 +79,40 @@ def goals_by_color(
     return tuple(goals)
 
 
-class CubePlan(NamedTuple):
-    """A cube to draw: its name, its color, and the region of its center."""
+class ItemPlan(NamedTuple):
+    """A cube or a roll of tape that is to be drawn.
+
+    Attributes:
+        name: ``cube_red``.
+        color: of it.
+        region: in which it lies.
+        gap: to all that is there already, m.
+        kind: ``cube`` or ``tape``.
+    """
 
     name: str
     color: Color
     region: Region
+    gap: float
+    kind: Literal["cube", "tape"] = "cube"
+
+
+class DiscPlan(NamedTuple):
+    """A target disc that is to be drawn.
+
+    Attributes:
+        name: ``target``.
+        region: in which it lies.
+        radius: m.
+        gap: to all that is there already, m.
+        rgb: color of its rings, each part from 0 to 1; None for the usual one.
+    """
+
+    name: str
+    region: Region
+    radius: float
+    gap: float = 0.0
+    rgb: tuple[float, float, float] | None = None
 
 
 class ButtonAndCubes(NamedTuple):
@@ -127,43 +161,46 @@ def cube_obstacle(cube: SceneObject) -> Rectangle | Line:
     return Line(x, y, object_sizes.CUBE_HALF, cube.yaw + turn)
 
 
-def draw_cube(
-    rng: np.random.Generator,
-    name: str,
-    color: Color,
-    region: Region,
-    gap: float,
-    obstacles: Sequence[Obstacle],
+def draw_item(
+    rng: np.random.Generator, plan: ItemPlan, obstacles: Sequence[Obstacle]
 ) -> SceneObject:
-    """Draw a cube that lies in the region, with any yaw, at least `gap` meters from all obstacles.
+    """Draw a cube or a roll of tape as planned, with any yaw, away from all obstacles.
 
     Draws place and yaw, in this order, again until there is room. Raises SceneRejectedError after
     256 draws without any.
     """
+    half_width, half_height = HALF_SIZES[plan.kind]
 
     def draw() -> SceneObject:
-        x, y = region.draw(rng, inset=object_sizes.CUBE_HALF)
+        x, y = plan.region.draw(rng, inset=half_width)
         yaw = 2.0 * math.pi * rng.random()
-        position = Point(x, y, object_sizes.CUBE_HALF)
-        return SceneObject(name, "cube", position, yaw, color)
+        return SceneObject(
+            name=plan.name,
+            kind=plan.kind,
+            position=Point(x, y, half_height),
+            yaw=yaw,
+            color=plan.color,
+        )
 
-    return placed(name, draw, lambda cube: footprint(cube).grown(gap), obstacles)
+    def clearance(item: SceneObject) -> Footprint:
+        if plan.kind == "tape":
+            return disc_area(item, plan.gap)
+        return footprint(item).grown(plan.gap)
+
+    return placed(plan.name, draw, clearance, obstacles)
 
 
 def draw_cubes(
-    rng: np.random.Generator,
-    plans: Iterable[CubePlan],
-    gap: float,
-    obstacles: Sequence[Obstacle],
+    rng: np.random.Generator, plans: Iterable[ItemPlan], obstacles: Sequence[Obstacle]
 ) -> list[SceneObject]:
     """Draw the planned cubes one after the other, each away from those before it.
 
-    Returns them in the order of `plans`. `gap` is in meters; `obstacles` is not changed.
+    Returns them in the order of `plans`. A plan is asked for after the draws of the one before.
     """
     taken = list(obstacles)
     drawn: list[SceneObject] = []
     for plan in plans:
-        cube = draw_cube(rng, plan.name, plan.color, plan.region, gap, taken)
+        cube = draw_item(rng, plan, taken)
         drawn.append(cube)
         taken.append(cube_obstacle(cube))
     return drawn
@@ -176,10 +213,13 @@ def draw_colored_cubes(
     gap: float,
     obstacles: Sequence[Obstacle],
 ) -> tuple[SceneObject, ...]:
-    """Draw `count` cubes of different colors, ``cube_red`` and so on, in random order."""
+    """Draw `count` cubes of different colors, ``cube_red`` and so on, in random order.
+
+    They lie in the region, at least `gap` meters from each other and from all obstacles.
+    """
     colors = shuffled(rng, COLORS)[:count]
-    plans = [CubePlan(f"cube_{color}", color, region) for color in colors]
-    return tuple(draw_cubes(rng, plans, gap, obstacles))
+    plans = [ItemPlan(f"cube_{color}", color, region, gap) for color in colors]
+    return tuple(draw_cubes(rng, plans, obstacles))
 
 
 def draw_button_and_cubes(
@@ -206,55 +246,55 @@ def draw_button_and_cubes(
 
 
 def draw_target(
-    rng: np.random.Generator,
-    name: str,
-    radius: float,
-    region: Region,
-    gap: float,
-    obstacles: Sequence[Obstacle],
-    rgb: tuple[float, float, float] | None = None,
+    rng: np.random.Generator, plan: DiscPlan, obstacles: Sequence[Obstacle]
 ) -> SceneObject:
-    """Draw a target disc of `radius` meters, at least `gap` meters from all obstacles.
+    """Draw a target disc as planned, away from all obstacles.
 
-    Draws again until there is room; raises SceneRejectedError after 256 draws without any. `rgb`,
-    each from 0 to 1, is the color of its rings; None for the usual one.
+    Draws again until there is room; raises SceneRejectedError after 256 draws without any.
     """
 
     def draw() -> SceneObject:
-        x, y = region.draw(rng, inset=radius)
-        place = Point(x, y, object_sizes.TARGET_HEIGHT)
-        return SceneObject(name, "target", place, radius=radius, rgb=rgb)
+        x, y = plan.region.draw(rng, inset=plan.radius)
+        return SceneObject(
+            name=plan.name,
+            kind="target",
+            position=Point(x, y, object_sizes.TARGET_HEIGHT),
+            radius=plan.radius,
+            rgb=plan.rgb,
+        )
 
-    return placed(name, draw, lambda target: disc_area(target, gap), obstacles)
+    return placed(plan.name, draw, lambda target: disc_area(target, plan.gap), obstacles)
 
 
 def draw_targets(
-    rng: np.random.Generator,
-    regions: Mapping[str, Region],
-    radius: float,
-    gap: float,
-    obstacles: Sequence[Obstacle],
-    rgb: tuple[float, float, float] | None = None,
+    rng: np.random.Generator, plans: Iterable[DiscPlan], obstacles: Sequence[Obstacle]
 ) -> list[SceneObject]:
-    """Draw a target disc in each region, away from those before it; the keys name the discs.
+    """Draw the planned target discs one after the other, each away from those before it.
 
-    Returns them in the order of `regions`. `radius` and `gap` are in meters, `rgb` is from 0 to 1.
+    Returns them in the order of `plans`.
     """
     taken = list(obstacles)
     targets: list[SceneObject] = []
-    for name, region in regions.items():
-        target = draw_target(rng, name, radius, region, gap, taken, rgb)
+    for plan in plans:
+        target = draw_target(rng, plan, taken)
         targets.append(target)
         taken.append(disc_area(target))
     return targets
 
 
-def marker_over(target: SceneObject, name: str) -> SceneObject:
-    """Return the disc that lights up over a target: a little wider, and high enough to cover it."""
+def marker_over(target: SceneObject) -> SceneObject:
+    """Return the disc that lights up over a target: a little wider, and high enough to cover it.
+
+    Over ``target_left`` it is ``marker_left``.
+    """
+    name = target.name.replace("target", "marker")
     x, y, z = target.position
-    position = Point(x, y, z - object_sizes.MARKER_DEPTH)
-    radius = object_sizes.MARKER_RADIUS_SHARE * target.half_width
-    return SceneObject(name, "marker", position, radius=radius)
+    return SceneObject(
+        name=name,
+        kind="marker",
+        position=Point(x, y, z - object_sizes.MARKER_DEPTH),
+        radius=object_sizes.MARKER_RADIUS_SHARE * target.half_width,
+    )
 
 
 def draw_bin(
@@ -269,8 +309,12 @@ def draw_bin(
         x, y = region.draw(rng)
         # Uniform, to either side.
         yaw = (2.0 * rng.random() - 1.0) * BIN_YAW
-        position = Point(x, y, object_sizes.BIN_HEIGHT / 2)
-        return SceneObject("bin", "bin", position, yaw)
+        return SceneObject(
+            name="bin",
+            kind="bin",
+            position=Point(x, y, object_sizes.BIN_HEIGHT / 2),
+            yaw=yaw,
+        )
 
     return placed("bin", draw, footprint, obstacles)
 

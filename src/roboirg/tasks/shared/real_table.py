@@ -1,4 +1,4 @@
-"""Draw the scenes of the real-robot tasks: boxes and tapes, one object on either side.
+"""Draw the scenes of the real-robot tasks: two objects of a kind, one on either side.
 
 In the study on a Franka Research 3 (paper), two objects of a kind stand in front of the robot, one
 to its left and one to its right, with either color on either side. Sizes and regions are our own:
@@ -14,9 +14,8 @@ import numpy as np
 
 from roboirg.core import object_sizes
 from roboirg.core.episode import Color, ObjectKind, Scene, SceneObject
-from roboirg.core.footprints import Footprint, Region
+from roboirg.core.footprints import Region
 from roboirg.core.motions import Point
-from roboirg.tasks.shared.fixtures import disc_area, placed
 from roboirg.util.random_draws import shuffled
 
 BOX_YAW = math.radians(15.0)
@@ -53,27 +52,10 @@ def draw_box(rng: np.random.Generator, name: str, color: Color, region: Region) 
     x, y = region.draw(rng)
     # Uniform, to either side.
     yaw = (2.0 * rng.random() - 1.0) * BOX_YAW
-    position = Point(x, y, object_sizes.BOX_HEIGHT / 2)
-    return SceneObject(name, "box", position, yaw, color)
-
-
-def draw_tape(
-    rng: np.random.Generator,
-    name: str,
-    color: Color,
-    region: Region,
-    gap: float,
-    obstacles: Sequence[Footprint],
-) -> SceneObject:
-    """Draw a roll of tape that lies in the region, with any yaw, `gap` meters from all obstacles.
-
-    Draws again until there is room; see `roboirg.tasks.shared.fixtures.placed`.
-    """
-
-    def draw() -> SceneObject:
-        x, y = region.draw(rng, inset=object_sizes.TAPE_RADIUS)
-        yaw = 2.0 * math.pi * rng.random()
-        position = Point(x, y, object_sizes.TAPE_HALF)
-        return SceneObject(name, "tape", position, yaw, color)
-
-    return placed(name, draw, lambda tape: disc_area(tape, gap), obstacles)
+    return SceneObject(
+        name=name,
+        kind="box",
+        position=Point(x, y, object_sizes.BOX_HEIGHT / 2),
+        yaw=yaw,
+        color=color,
+    )

@@ -17,6 +17,11 @@ RETREAT_STEPS = 20
 """Control steps for which the hand waits away from the objects (RoboMME)."""
 
 
+def facts_of_all(kind: FactKind, objects: Iterable[SceneObject]) -> tuple[Fact, ...]:
+    """Return the facts of a kind about some objects: that a red cube is picked, and a green one."""
+    return tuple(Fact(kind, item.name) for item in objects)
+
+
 def facts_of_others(kind: FactKind, objects: Iterable[SceneObject], right: str) -> tuple[Fact, ...]:
     """Return the facts of a kind about all objects but the right one, as a stage forbids them.
 

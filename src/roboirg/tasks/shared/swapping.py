@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 
@@ -34,24 +35,27 @@ def plan_swaps(
         start: step of the first swap; the others follow without a pause.
         lane: sideways swing, m.
         stage: index of the demonstration's stage from which `start` counts; None: from reset.
-        partners: names of those with whom the first initiators change places instead, where known.
+        partners: names of those with whom the first initiators change places instead; None where
+            that is not known. At most as many as `initiators`.
     """
-    places: dict[str, Point] = {item.name: item.position for item in objects}
+    places = {item.name: item.position for item in objects}
     swaps: list[Swap] = []
-    for number, first in enumerate(initiators):
-        known_partner = partners[number] if number < len(partners) else None
-        second = known_partner or nearest(places, first)
+    for first, partner in itertools.zip_longest(initiators, partners):
+        second = partner or nearest(places, first)
+        others = [name for name in places if name not in (first, second)]
         swap = Swap(
             first,
             second,
-            start=start + number * SWAP_STEPS,
+            start=start,
             steps=SWAP_STEPS,
             lane=lane,
-            pinned=tuple(name for name in places if name not in (first, second)),
+            pinned=tuple(others),
             stage=stage,
         )
-        _exchange(places, swap)  # the next one starts from the new places
         swaps.append(swap)
+        # The next one starts when this one is complete, from the new places.
+        _exchange(places, swap)
+        start += SWAP_STEPS
     return tuple(swaps)
 
 

@@ -83,12 +83,16 @@ def draw_containers_in(
         spot = _free_spot(rng, region, gap, taken)
         if spot is None:
             break
-        position = Point(*spot, object_sizes.CONTAINER_HEIGHT)
-        yaw = -rng.random() * math.pi / 2
-        container = SceneObject(f"container_{index}", "container", position, yaw)
+        container = _draw_container(rng, f"container_{index}", spot)
         containers.append(container)
         taken.append(footprint(container).grown(gap))
     return containers
+
+
+def _draw_container(rng: np.random.Generator, name: str, spot: PlanePoint) -> SceneObject:
+    """Draw the yaw of a container that stands at a spot (x, y; meters)."""
+    yaw = -rng.random() * math.pi / 2
+    return SceneObject(name, "container", Point(*spot, object_sizes.CONTAINER_HEIGHT), yaw)
 
 
 def _free_spot(

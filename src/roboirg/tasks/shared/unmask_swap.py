@@ -52,11 +52,11 @@ def sample(
     covers = shuffled(rng, containers[: len(COLORS)])
     cubes = hide_cubes(rng, covers)
     initiators = _draw_initiators(rng, difficulty, containers)
+    picks = draw_number(rng, PICKS[difficulty])
     scene = Scene(
         objects=(*buttons, *containers, *cubes),
         motions=plan_motions(containers, cubes, initiators),
     )
-    picks = draw_number(rng, PICKS[difficulty])
     return scene, goal_of(cubes[:picks])
 
 
@@ -86,7 +86,7 @@ def _draw_initiators(
     swap_count = draw_number(rng, SWAPS[difficulty])
     names = [container.name for container in containers]
     with_cube = names[: len(COLORS)]  # cubes are under the first three
-    first, second, _ = shuffled(rng, with_cube)
-    others = [name for name in names if name not in (first, second)]
-    third = draw(rng, others)
-    return (first, second, third)[:swap_count]
+    initiators = shuffled(rng, with_cube)[:2]
+    others = [name for name in names if name not in initiators]
+    initiators.append(draw(rng, others))
+    return tuple(initiators[:swap_count])

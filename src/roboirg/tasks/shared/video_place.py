@@ -15,9 +15,9 @@ import numpy as np
 from roboirg.core import object_sizes
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Primitive, Scene, SceneObject, Stage
-from roboirg.core.footprints import Region
+from roboirg.core.footprints import Obstacle, Region
 from roboirg.core.motions import Point, Swap
-from roboirg.tasks.shared.fixtures import disc_area, draw_button_and_cubes, draw_targets
+from roboirg.tasks.shared.fixtures import DiscPlan, disc_area, draw_button_and_cubes, draw_targets
 from roboirg.tasks.shared.stages import (
     facts_of_others,
     go_home,
@@ -65,11 +65,22 @@ def draw_table(
     site = _draw_site(rng, site_radius)
     placed = draw_button_and_cubes(rng, difficulty, WORK_REGION, GAP, BUTTON_REGION)
     # As in RoboMME, cubes may lie on the site; discs may not.
-    obstacles = [*placed.obstacles, disc_area(site)]
-    regions = {f"target_{number}": WORK_REGION for number in range(discs)}
-    targets = tuple(draw_targets(rng, regions, TARGET_RADIUS, GAP, obstacles))
-    objects = (site, placed.button, *placed.cubes, *targets)
-    return PlaceTable(objects, targets, cube=draw(rng, placed.cubes))
+    obstacles = (*placed.obstacles, disc_area(site))
+    targets = _draw_discs(rng, discs, obstacles)
+    return PlaceTable(
+        objects=(site, placed.button, *placed.cubes, *targets),
+        discs=targets,
+        cube=draw(rng, placed.cubes),
+    )
+
+
+def _draw_discs(
+    rng: np.random.Generator, count: int, obstacles: Sequence[Obstacle]
+) -> tuple[SceneObject, ...]:
+    """Draw the target discs, ``target_0`` and so on, anywhere away from all obstacles."""
+    usual = DiscPlan("", WORK_REGION, TARGET_RADIUS, GAP)
+    plans = [usual._replace(name=f"target_{number}") for number in range(count)]
+    return tuple(draw_targets(rng, plans, obstacles))
 
 
 def _draw_site(rng: np.random.Generator, radius: float) -> SceneObject:
@@ -164,8 +175,10 @@ def place_stages(scene: Scene, color: str, answer: str) -> tuple[Stage, ...]:
     the episode.
     """
     cube = f"cube_{color}"
-    discs = [item.name for item in scene.of_kind("target")]
-    wrong_discs = [Fact("placed", cube, disc) for disc in discs if disc != answer]
     wrong_picks = facts_of_others("picked", scene.of_kind("cube"), cube)
+    pick = pick_stage(cube).forbidding(*wrong_picks)
     put = place_stage(cube, answer, "place the cube onto the correct target {at}")
-    return pick_stage(cube).forbidding(*wrong_picks), put.forbidding(*wrong_discs)
+    for disc in scene.of_kind("target"):
+        if disc.name != answer:
+            put = put.forbidding(Fact("placed", cube, disc.name))
+    return pick, put

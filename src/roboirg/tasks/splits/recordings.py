@@ -37,7 +37,7 @@ def is_recorded(task: str, split: str, index: int) -> bool:
     """Return whether the recording of an episode's video is shipped.
 
     None is shipped for tasks whose robot rests in the video, for episodes that RoboMME does not
-    have, and for four whose recording does not complete the video's stages (`INCOMPLETE`).
+    have, and for four whose recording does not complete the video's stages.
     """
     return index in _recorded_indices(task, split)
 
@@ -50,18 +50,6 @@ def recorded_actions(task: str, split: str, index: int) -> RecordedActions:
         actions = arrays[f"actions_{index}"]
         stages = arrays[f"stages_{index}"]
         return RecordedActions(actions.astype(np.float64), stages)
-
-
-INCOMPLETE = frozenset(
-    {
-        ("VideoPlaceOrder", "test", 7),
-        ("VideoPlaceOrder", "train", 94),
-        ("VideoRepick", "train", 47),
-        ("VideoRepick", "val", 35),
-    }
-)
-"""Episodes whose recorded actions leave a stage of the video undone here, and in two of them there:
-contacts between crowded cubes go another way. The scripted expert plans their videos."""
 
 
 def _file(task: str, split: str) -> Traversable:

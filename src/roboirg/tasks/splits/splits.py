@@ -28,7 +28,6 @@ from roboirg.core.episode import ROBOT, SPLITS, Difficulty, Episode, Goal, Scene
 from roboirg.core.errors import InvalidValueError, SceneRejectedError, check_names, known_name
 from roboirg.core.fact_traits import FACT_TRAITS
 from roboirg.tasks import Task, get_task
-from roboirg.tasks.splits.fingerprint import fingerprint
 from roboirg.tasks.splits.private_splits import RANDOM, check_salt, is_private, private_seed
 from roboirg.tasks.splits.published_episodes import published_episode
 from roboirg.tasks.splits.recordings import is_recorded
@@ -158,15 +157,6 @@ def shipped_splits() -> Mapping[str, TaskSplits]:
     return {task: TaskSplits(**entry) for task, entry in entries.items()}
 
 
-def splits_text(splits: Mapping[str, TaskSplits]) -> str:
-    """Return the text of ``splits.json``: JSON with a line for each task; see `shipped_splits`."""
-    lines: list[str] = []
-    for task, entry in splits.items():
-        numbers = json.dumps(entry._asdict())
-        lines.append(f"{json.dumps(task)}: {numbers}")
-    return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
 def get_episode(task_name: str, split: str, index: SupportsIndex) -> Episode:
     """Return episode number `index` (from 0) of a split of a task.
 
@@ -191,26 +181,14 @@ def split_episodes(tasks: Iterable[str], splits: Iterable[Split]) -> Iterator[Ep
             yield get_episode(task, split, index)
 
 
-def fingerprint_of(task_name: str, passed_over: Mapping[str, int]) -> str:
-    """Return the fingerprint of all episodes of a task, a hash that changes if any of them does.
+def fixed_episode(task: Task, split: Split, index: int, passed_over: Mapping[str, int]) -> Episode:
+    """Return an episode of train, val or test: RoboMME's if it is published, else a sampled one.
 
     `passed_over` has the numbers of seeds passed over by episode, ``{"train/3": 1}``, without
     zeros.
     """
-    task = get_task(task_name)
-    return fingerprint(_fixed_episodes(task, passed_over))
-
-
-def _fixed_episodes(task: Task, passed_over: Mapping[str, int]) -> Iterator[Episode]:
-    """Yield the episodes of train, val and test, in this order.
-
-    `passed_over` has the numbers of seeds passed over by episode, ``{"train/3": 1}``, without
-    zeros.
-    """
-    for split in SPLITS:
-        for index in range(SIZES[split]):
-            number = passed_over.get(slot_key(split, index), 0)
-            yield _published(task, split, index) or _sampled(task, split, index, number)
+    number = passed_over.get(slot_key(split, index), 0)
+    return _published(task, split, index) or _sampled(task, split, index, number)
 
 
 def _check_index(split: Split, index: SupportsIndex) -> int:
@@ -237,13 +215,9 @@ def _episode(task_name: str, split: Split, index: int) -> Episode:
     Which seed that is, is shipped for the fixed splits of our tasks; else it is tried out.
     """
     task = get_task(task_name)
-    published = _published(task, split, index)
-    if published is not None:
-        return published
-    entry = shipped_splits().get(task_name)
-    if entry is not None and split in SPLITS:
-        number = entry.passed_over.get(slot_key(split, index), 0)
-        return _sampled(task, split, index, number)
+    shipped = shipped_splits().get(task_name)
+    if shipped is not None and split in SPLITS:
+        return fixed_episode(task, split, index, shipped.passed_over)
     for passed_over in range(MAX_REJECTED):
         with contextlib.suppress(SceneRejectedError):
             return _sampled(task, split, index, passed_over)
@@ -275,15 +249,18 @@ def check_stages(task: str, scene: Scene, stages: Iterable[Stage]) -> None:
     """
     kinds = {item.name: item.kind for item in scene.objects}
     kinds[ROBOT] = ROBOT
-    facts: list[Fact] = []
-    for stage in stages:
-        for condition in (stage.expects, *stage.forbids):
-            facts += facts_of(condition)
-    for fact in facts:
+    for fact in _facts_in(stages):
         check_names("kind of fact", [fact.kind], FACT_TRAITS)
         problem = _problem_of(fact, kinds)
         if problem is not None:
             raise InvalidValueError(f"{task}: {fact!r} can never hold: {problem}.")
+
+
+def _facts_in(stages: Iterable[Stage]) -> Iterator[Fact]:
+    """Yield all facts that some stages expect or forbid, stage by stage."""
+    for stage in stages:
+        for condition in (stage.expects, *stage.forbids):
+            yield from facts_of(condition)
 
 
 def _problem_of(fact: Fact, kinds: Mapping[str, str]) -> str | None:

@@ -76,14 +76,14 @@ def _line(table: Table, row: Row, column: Column, entry: Entry) -> list[object]:
         column: the entry's; its name is a value.
         entry: with the rate in percent, its counts and its interval.
     """
-    # Counts and interval take several columns each, which are empty without them.
-    counts: Sequence[object] = [""] * len(Counts._fields)
+    # Counts and interval take several columns each. None is written as nothing.
+    counts: Sequence[int | None] = [None] * len(Counts._fields)
     if entry.counts is not None:
         counts = entry.counts
-    ends = ["", ""]
+    ends: Sequence[str | None] = [None, None]
     if entry.interval is not None:
         ends = [f"{100 * end:.2f}" for end in entry.interval]
-    is_comparable = ""
+    is_comparable = None
     if entry.differences is not None:
         is_comparable = _flag(not entry.differences)
     return [
@@ -93,10 +93,10 @@ def _line(table: Table, row: Row, column: Column, entry: Entry) -> list[object]:
         row.name,
         column.name,
         _flag(bool(column.averages)),
-        _or_empty(entry.percent),
+        entry.percent,
         entry.word.translate(_ASCII),
         _flag(entry.applies),
-        _or_empty(entry.change),
+        entry.change,
         _flag(entry.best),
         " ".join(MARK_NAMES[mark] for mark in entry.marks),
         *counts,
@@ -104,10 +104,6 @@ def _line(table: Table, row: Row, column: Column, entry: Entry) -> list[object]:
         is_comparable,
         "; ".join(entry.differences or ()),
     ]
-
-
-def _or_empty(value: object) -> object:
-    return "" if value is None else value
 
 
 def _flag(value: bool) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 from rich.console import Console, Group, RenderableType
@@ -83,9 +84,9 @@ def split_columns(table: Table, shown: Sequence[int], room: int) -> list[list[in
         The numbers of the columns of each part, at least one.
     """
     widths = _column_widths(table)
-    groups: dict[str, list[int]] = {}
+    groups = defaultdict(list)
     for number in shown:
-        groups.setdefault(table.columns[number].group, []).append(number)
+        groups[table.columns[number].group].append(number)
     parts: list[list[int]] = []
     left = 0  # characters that are free in the last part
     for number in shown:

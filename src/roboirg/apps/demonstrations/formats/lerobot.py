@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.dataset_part import (
     CHUNK_SIZE,
-    EPISODE_TABLE,
     DatasetPart,
     RecordedInstructions,
     all_texts,
-    episode_row,
     place_instructions,
     read_episodes,
 )
@@ -145,17 +143,14 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     columns = parts[0].columns
     stats = StatsCollector(columns)
     episodes = []
-    facts = []
     for part, episode, trajectory in read_episodes(parts):
         for placed in episode.instructions:
             entry = _episode_entry(part, placed, trajectory.facts.frames)
             entry |= _flat(stats.add(trajectory, placed))
             episodes.append(entry)
-            facts.append(episode_row(trajectory, placed))
     texts = all_texts(parts)
     write_rows(root / "meta/episodes/chunk-000/file-000.parquet", episodes)
     _write_tasks(root / "meta/tasks.parquet", texts)
-    write_rows(root / EPISODE_TABLE, facts)
     write_json(root / "meta/stats.json", stats.result())
     info = {
         **common_info(parts, texts),

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.dataset_part import EPISODE_TABLE
 from roboirg.apps.demonstrations.frame_columns import EXECUTED
@@ -45,19 +44,17 @@ def read_tables(root: Path) -> Iterator[ReplayableTrajectory]:
     action = _present(_ACTIONS, info)
     files = sorted((root / "data").rglob("*.parquet"))
     frames = parquet.ParquetDataset(files).read(columns=[state, action])
-    rows: dict[str, dict[str, Any]] = {}
+    seen: set[str] = set()
     for row in read_rows(root / EPISODE_TABLE):
-        rows.setdefault(row["trajectory"], row)  # that of its first instruction
-    for row in rows.values():
-        after_video = row["from_index"] + row["video_length"]
-        own = frames.slice(after_video, row["length"] - row["video_length"])
-        states = np.array(own[state].to_pylist())
-        actions = np.array(own[action].to_pylist())
-        yield _trajectory(row, states, actions.astype(np.float64))
+        if row["trajectory"] not in seen:  # else it is of another instruction
+            seen.add(row["trajectory"])
+            after_video = row["from_index"] + row["video_length"]
+            own = frames.slice(after_video, row["length"] - row["video_length"])
+            yield _trajectory(row, own[state].to_pylist(), own[action].to_pylist())
 
 
 def _trajectory(
-    row: Mapping[str, Any], states: NDArray[np.float64], actions: NDArray[np.float64]
+    row: Mapping[str, Any], states: Sequence[Sequence[float]], actions: Sequence[Sequence[float]]
 ) -> ReplayableTrajectory:
     """Return a trajectory from its row in the table of facts and its frames without the video.
 
@@ -73,8 +70,8 @@ def _trajectory(
         seed=row["seed"],
         split=row["split"],
         index=row["episode"],
-        actions=actions,
-        states=np.concatenate([states[1:], final[None, : _JOINTS + 1]]),
+        actions=np.array(actions, np.float64),
+        states=np.concatenate([np.array(states)[1:], final[None, : _JOINTS + 1]]),
         final_state=final,
         status=row["status"],
         space=row.get("actions", JOINT_ANGLE.name),

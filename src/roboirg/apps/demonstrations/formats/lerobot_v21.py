@@ -10,10 +10,8 @@ from typing import Any
 
 from roboirg.apps.demonstrations.dataset_part import (
     CHUNK_SIZE,
-    EPISODE_TABLE,
     DatasetPart,
     all_texts,
-    episode_row,
     read_episodes,
 )
 from roboirg.apps.demonstrations.export_format import ExportFormat
@@ -29,7 +27,7 @@ from roboirg.apps.demonstrations.formats.lerobot import (
 )
 from roboirg.apps.demonstrations.formats.lerobot_tables import INFO, read_tables
 from roboirg.apps.demonstrations.frame_columns import FrameColumns
-from roboirg.apps.demonstrations.parquet_tables import write_frames, write_rows
+from roboirg.apps.demonstrations.parquet_tables import write_frames
 from roboirg.apps.demonstrations.trajectory import load_trajectory
 from roboirg.util.atomic_write import write_atomically
 
@@ -136,7 +134,6 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     collector = StatsCollector(columns)
     episodes = []
     stats = []
-    facts = []
     for _, episode, trajectory in read_episodes(parts):
         for placed in episode.instructions:
             index = placed.episode_index
@@ -144,10 +141,8 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
             length = trajectory.facts.frames
             episodes.append({"episode_index": index, "tasks": tasks, "length": length})
             stats.append({"episode_index": index, "stats": collector.add(trajectory, placed)})
-            facts.append(episode_row(trajectory, placed))
     texts = all_texts(parts)
     task_lines = [{"task_index": index, "task": text} for index, text in enumerate(texts)]
-    write_rows(root / EPISODE_TABLE, facts)
     _write_lines(root / "meta/episodes.jsonl", episodes)
     _write_lines(root / "meta/episodes_stats.jsonl", stats)
     _write_lines(root / "meta/tasks.jsonl", task_lines)

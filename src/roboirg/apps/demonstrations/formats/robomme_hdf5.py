@@ -16,18 +16,14 @@ from typing import Any
 import numpy as np
 
 from roboirg.apps.demonstrations.dataset_part import (
-    EPISODE_TABLE,
     DatasetPart,
     RecordedEpisode,
     RecordedInstructions,
-    episode_row,
     place_instructions,
-    read_episodes,
 )
 from roboirg.apps.demonstrations.export_format import ExportFormat
 from roboirg.apps.demonstrations.export_plan import ExportedInstruction, ExportPlan
 from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedInstruction
-from roboirg.apps.demonstrations.parquet_tables import write_rows
 from roboirg.apps.demonstrations.replayable_trajectory import ReplayableTrajectory
 from roboirg.apps.demonstrations.trajectory import (
     Trajectory,
@@ -272,14 +268,6 @@ def _is_boundary(trajectory: Trajectory, row: int) -> bool:
     return bool(trajectory.subgoals[row] != trajectory.subgoals[row - 1])
 
 
-def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
-    """Write the table of facts."""
-    rows = []
-    for _, episode, trajectory in read_episodes(parts):
-        rows += [episode_row(trajectory, placed) for placed in episode.instructions]
-    write_rows(root / EPISODE_TABLE, rows)
-
-
 def training_text(_plan: ExportPlan, root: Path) -> str:
     """Return how to train MME-VLA from a dataset, as Markdown."""
     return _MME_VLA.format(root=root)
@@ -362,7 +350,6 @@ FORMAT = ExportFormat(
     check_support=check_hdf5_support,
     make_parts=make_parts,
     write_part=write_part,
-    finish=finish,
     training_text=training_text,
     read=read,
 )

@@ -11,11 +11,11 @@ from roboirg.apps.grounding.items.grounding_item import (
     GroundingItem,
     QuestionKind,
     decode_lines,
+    read_content,
 )
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import clip_text
 from roboirg.util.atomic_write import write_atomically
-from roboirg.util.regular_file import read_regular
 
 _MAX_QUOTE = 60
 
@@ -45,33 +45,25 @@ def read_answers(path: Path, items: Sequence[GroundingItem]) -> list[Answer]:
         InvalidValueError: the file cannot be read, a line is no answer, names an unknown item, or
             answers a question again.
     """
-    try:
-        content = read_regular(path)
-    except (OSError, InvalidValueError) as error:
-        words = str(error).rstrip(".")
-        raise InvalidValueError(f"Answers {str(path)!r} cannot be read ({words}).") from error
     known = {item.id for item in items}
-    answers: dict[tuple[str, QuestionKind], Answer] = {}
+    answers = {}
+    content = read_content(path, f"Answers {str(path)!r} cannot be read")
     for number, answer in decode_lines(content, Answer, path):
         question = answer.id, answer.kind
         if answer.id not in known:
-            raise _bad_line(
-                path,
-                number,
-                f"the dataset has no item {clip_text(answer.id, _MAX_QUOTE)!r}; are these answers "
-                "to another dataset?",
+            name = clip_text(answer.id, _MAX_QUOTE)
+            raise InvalidValueError(
+                f"{path}, line {number}: the dataset has no item {name!r}; are these answers to "
+                "another dataset?"
             )
         if question in answers:
-            raise _bad_line(path, number, f"{answer.kind} of item {answer.id!r} occurs again.")
+            raise InvalidValueError(
+                f"{path}, line {number}: {answer.kind} of item {answer.id!r} occurs again."
+            )
         answers[question] = answer
     if not answers:
         raise InvalidValueError(f"Answers {str(path)!r}: the file holds no answers.")
     return list(answers.values())
-
-
-def _bad_line(path: Path, number: int, problem: str) -> InvalidValueError:
-    """Return (not raise) the error of a line of the file, with its number from 1."""
-    return InvalidValueError(f"{path}, line {number}: {problem}")
 
 
 def write_answers(path: Path, answers: Iterable[Answer]) -> None:

@@ -153,6 +153,24 @@ def decode_mask(counts: list[int], size: tuple[int, int]) -> Mask:
     return np.repeat(is_inside, counts).reshape(size, order="F")
 
 
+def read_content(path: Path, refusal: str, advice: str = "") -> bytes:
+    """Return the content of a file.
+
+    Args:
+        path: of the file.
+        refusal: what the error says before the reason.
+        advice: what it says behind the reason.
+
+    Raises:
+        InvalidValueError: it cannot be read.
+    """
+    try:
+        return read_regular(path)
+    except (OSError, InvalidValueError) as error:
+        reason = str(error).rstrip(".")
+        raise InvalidValueError(f"{refusal} ({reason}){advice}.") from error
+
+
 def write_items(items: list[GroundingItem], folder: Path) -> bytes:
     """Write the items of a dataset into its folder; return the content of the file."""
     content = msgspec.json.Encoder().encode_lines(items)
@@ -193,12 +211,9 @@ def read_items(folder: Path) -> list[GroundingItem]:
         InvalidValueError: the folder has no items, or a line is no item.
     """
     path = folder / ITEMS_FILE
-    try:
-        content = read_regular(path)
-    except (OSError, InvalidValueError) as error:
-        words = str(error).rstrip(".")
-        raise InvalidValueError(
-            f"{str(folder)!r} holds no grounding dataset ({words}); "
-            "make one with: roboirg export grounding --out DIR."
-        ) from error
+    content = read_content(
+        path,
+        f"{str(folder)!r} holds no grounding dataset",
+        "; make one with: roboirg export grounding --out DIR",
+    )
     return [item for _, item in decode_lines(content, GroundingItem, path)]

@@ -172,7 +172,7 @@ def _instruction_fields(
     that fit the command alone, 0 to 1, or None; ``hidden_slots`` are the goal's values that only
     the words before the command name.
     """
-    hidden: list[str] = []
+    hidden = []
     if options.form != "resolved":  # a resolved command leaves none to its context
         hidden = list(hidden_slots((episode, instruction)))
     chance = right_share(blind_goals(instruction, episode), episode)
@@ -215,14 +215,15 @@ def _choice_question(
     questions = load_prompts(QUESTIONS)
     (other_pool,) = set(POOLS) - {instruction.metadata["pool"]}
     explicit = InstructionOptions(wordings=other_pool)
-    commands = []
+    commands = [instruct_with(with_goal(episode, goal), explicit).text for goal in choices.goals]
     lines = []
-    for letter, goal in zip(LETTERS, choices.goals, strict=False):
-        command = instruct_with(with_goal(episode, goal), explicit).text
-        commands.append(command)
+    for letter, command in zip(LETTERS, commands, strict=False):
         lines.append(questions.fill("choice_line", letter=letter, goal=command))
-    question = questions.fill("choice", choices="\n".join(lines))
-    return {"choice_question": question, "choices": commands, "choice": LETTERS[choices.right]}
+    return {
+        "choice_question": questions.fill("choice", choices="\n".join(lines)),
+        "choices": commands,
+        "choice": LETTERS[choices.right],
+    }
 
 
 def _points_question(episode: Episode) -> dict[str, Any]:

@@ -78,7 +78,7 @@ def collect_items(
     """
     _check_empty(folder)
     # By episode, because worker processes end in any order.
-    items_of: dict[EpisodeName, list[GroundingItem]] = {}
+    items_of = {}
     work = functools.partial(_make_episode, folder, request)
     total = len(request.episodes)
     for name, items in parallel_map(work, request.episodes, min(workers, total)):
@@ -86,7 +86,7 @@ def collect_items(
         if progress is not None:
             progress(len(items_of), total)
 
-    found: list[GroundingItem] = []
+    found = []
     for name in request.episodes:
         found += items_of[name]
     if not found:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from roboirg.core.episode import (
@@ -48,22 +48,35 @@ def pointed_kinds(task_name: str) -> tuple[ObjectKind, ...]:
     is the kind that the robot handles first. They are found by looking at all scenes of the
     training split, and are in the order in which the stages first name them.
     """
-    task = get_task(task_name)
-    all_kinds: list[ObjectKind] = []
-    differing: set[ObjectKind] = set()
-    handled_first: set[ObjectKind] = set()
-    for episode in split_episodes([task_name], [SOURCE]):
-        scene = episode.scene
-        names_by_goal = [_pointed(task, scene, goal) for goal in task.goals(scene)]
-        in_every_goal = set(names_by_goal[0]).intersection(*names_by_goal)
-        for name in itertools.chain(*names_by_goal):
-            kind = scene[name].kind
-            all_kinds.append(kind)
-            if name not in in_every_goal:
-                differing.add(kind)
+    kinds = []
+    differing = set()
+    handled_first = set()
+    for scene, names_by_goal in _scenes_of(task_name):
+        kinds += _kinds_of(scene, itertools.chain(*names_by_goal))
+        differing.update(_kinds_of(scene, _not_in_all(names_by_goal)))
         handled_first.update(_first_handled(scene, names_by_goal[0]))
     wanted = differing or handled_first
-    return tuple(kind for kind in dict.fromkeys(all_kinds) if kind in wanted)
+    return tuple(kind for kind in dict.fromkeys(kinds) if kind in wanted)
+
+
+def _scenes_of(task_name: str) -> Iterator[tuple[Scene, list[list[str]]]]:
+    """Yield the scenes of a task's training split, each with the objects of each possible goal.
+
+    These are the names of the objects that the stages of the goal point at.
+    """
+    task = get_task(task_name)
+    for episode in split_episodes([task_name], [SOURCE]):
+        scene = episode.scene
+        yield scene, [_pointed(task, scene, goal) for goal in task.goals(scene)]
+
+
+def _kinds_of(scene: Scene, names: Iterable[str]) -> list[ObjectKind]:
+    return [scene[name].kind for name in names]
+
+
+def _not_in_all(lists: Sequence[Sequence[str]]) -> set[str]:
+    """Return the names that are in one of some lists, at least, but not in all."""
+    return set().union(*lists) - set(lists[0]).intersection(*lists)
 
 
 def _first_handled(scene: Scene, names: Sequence[str]) -> list[ObjectKind]:
@@ -112,7 +125,7 @@ def _pointed(task: Task, scene: Scene, goal: Goal) -> list[str]:
 
     Red, twice, in PickXtimes -> ``["cube_red", "target", "button"]``.
     """
-    names: list[str] = []
+    names = []
     for stage in task.stages(scene, goal):
         name = stage.points_at
         if name is not None and name not in names:

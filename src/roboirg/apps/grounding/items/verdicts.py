@@ -16,7 +16,12 @@ from roboirg.apps.grounding.items.grounding_item import (
     QuestionKind,
 )
 from roboirg.policies.vlm.goal_schema import goal_schema
-from roboirg.util.reply_reading import UnparsableReplyError, chosen_letter, last_json
+from roboirg.util.reply_reading import (
+    UnparsableReplyError,
+    check_whole,
+    chosen_letter,
+    last_json,
+)
 
 Coordinate = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 """Columns or rows of a picture. No bound holds for NaN."""
@@ -50,11 +55,16 @@ def judge_reply(item: GroundingItem, kind: QuestionKind, reply: str) -> ReplyVer
 
     It is read as by the language-model listener (`roboirg.util.reply_reading`): thoughts are left
     out, words and code fences around a JSON object do no harm, but a value that the task does not
-    have makes the reply unreadable.
+    have makes the reply unreadable, and so does its end at the limit of tokens, as what looks like
+    an answer may be a draft.
 
     Raises:
         UnknownNameError: the item's task is not installed.
     """
+    try:
+        check_whole(reply)
+    except UnparsableReplyError:
+        reply = ""  # names no answer
     return _JUDGES[kind](item, reply)
 
 
@@ -123,11 +133,13 @@ def _judge_points(item: GroundingItem, reply: str) -> ReplyVerdict:
     points = _read_points(reply)
     parts = {}
     for number, target in enumerate(item.points):
-        candidates = points[number : number + 1] if item.points_in_order else points
+        candidates = points
+        if item.points_in_order:
+            candidates = points[number : number + 1]
         parts[str(number + 1)] = any(_hits(target, point) for point in candidates)
     if not points:
         return ReplyVerdict(False, None, parts)
-    is_right = all(parts.values()) and len(points) == len(item.points)
+    is_right = len(points) == len(item.points) and all(parts.values())
     return ReplyVerdict(is_right, msgspec.json.encode(points).decode(), parts)
 
 

@@ -187,8 +187,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
             pixels[camera] = scaled_square(seen[f"{camera}_rgb"], self._size)
         first_camera = self._env.cameras[0]
         self._picture = pixels[first_camera]
-        state = proprioception(seen["joint_positions"], seen["gripper"])
-        return {"pixels": pixels, "agent_pos": state}
+        return {"pixels": pixels, "agent_pos": proprioception(seen)}
 
     def _info(self, *, success: bool) -> dict[str, Any]:
         """Return the info of a step, which shows nothing of setting, episode or goal."""

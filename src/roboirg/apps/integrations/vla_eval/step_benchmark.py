@@ -13,7 +13,8 @@ from vla_eval.specs import IMAGE_RGB, LANGUAGE, DimSpec
 from roboirg.core.actions import JOINT_ANGLE, find_action_space
 from roboirg.core.environment_options import DEFAULT_MESHES, MAX_STEPS
 from roboirg.core.instruction_options import DEFAULT_DELIVERY
-from roboirg.core.observations import FRONT, WRIST, proprioception
+from roboirg.core.observations import FRONT, WRIST, Demonstration
+from roboirg.policies.remote.protocols.vla_eval import TASK, observation_payload
 from roboirg.tasks import ALL, find_tasks
 
 if TYPE_CHECKING:
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 OPEN_GRIPPER = 1.0
-TOLD_TASK = {"name": "RoboIRGBench"}
-"""All that a policy learns of the task besides the observations."""
 ICD_VARIABLE = "ROBOIRG_LAVAPIPE_ICD"
 """Environment variable with the path of lavapipe's Vulkan manifest, for ``render: cpu``."""
 _STATE = DimSpec("state", 8, "joint_positions7_finger1")
@@ -40,7 +39,7 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
     seven joints (rad) and the first finger (m); `task_description`, what was said last. The first
     one of an episode with a video also has `video_history`, `wrist_video_history` and
     `episode_restart`. Names of tasks, settings and episodes stay with the harness: what it sends at
-    an episode's start is `TOLD_TASK`.
+    an episode's start is `TASK`.
 
     Action: `actions`, (8,), or (7,) in the other action spaces.
 
@@ -95,8 +94,8 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
             "meshes": meshes,
         }
         self._env: RoboIRGEnv | None = None
-        # What the next observation has of the video.
-        self._video_fields: dict[str, Any] = {}
+        # The video, until it is shown with the first observation.
+        self._video: Demonstration | None = None
 
     @classmethod
     def configure_render(cls, mode: str) -> dict[str, str]:
@@ -113,24 +112,21 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
 
         Args:
             task: one of `get_tasks`, with the harness's ``episode_idx``. Its contents are replaced
-                by `TOLD_TASK`, because the harness sends them to the policy.
+                by `TASK`, because the harness sends them to the policy.
         """
         from roboirg.envs.factory import make
 
         name = task["name"]
         options: EnvOptions = {**self._env_options, "episode": task["episode_idx"]}
         task.clear()
-        task.update(TOLD_TASK)
+        task.update(TASK)
         self.cleanup()
         self._env = make(name, **options)
         observation, info = self._env.reset()
         video = info["demonstration"]
         if self._sends_video and video.length:
             video.draw()
-            self._video_fields["video_history"] = list(video["front_rgb"])
-            if self._sends_wrist:
-                self._video_fields["wrist_video_history"] = list(video["wrist_rgb"])
-            self._video_fields["episode_restart"] = True
+            self._video = video
         self._recorder.record_video(observation["front_rgb"])
         return observation
 
@@ -148,17 +144,11 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
 
     def make_obs(self, raw_obs: Mapping[str, Any], task: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG002
         """Return what the policy is shown; the video only with an episode's first observation."""
-        shown: dict[str, Any] = {
-            "images": {"agentview": raw_obs["front_rgb"]},
-            "task_description": raw_obs["instruction"],
-            **self._video_fields,
-        }
-        self._video_fields = {}
-        if self._sends_wrist:
-            shown["images"]["wrist"] = raw_obs["wrist_rgb"]
-        if self._sends_state:
-            shown["states"] = proprioception(raw_obs["joint_positions"], raw_obs["gripper"])
-        return shown
+        video = self._video
+        self._video = None
+        return observation_payload(
+            raw_obs, video, has_wrist=self._sends_wrist, has_state=self._sends_state
+        )
 
     def get_step_result(self, step_result: StepResult) -> dict[str, Any]:
         """Return the verdict and nothing else: the harness sends it to the policy."""
@@ -202,7 +192,7 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         if self._env is not None:
             self._env.close()
         self._env = None
-        self._video_fields = {}
+        self._video = None
 
     @property
     def _playing(self) -> RoboIRGEnv:

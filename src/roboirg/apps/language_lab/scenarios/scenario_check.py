@@ -72,11 +72,6 @@ class ScenarioReport:
     longest: str = ""
     resolved: set[str] = field(default_factory=set)
 
-    @property
-    def scenes(self) -> int:
-        """Number of scenes that it fits."""
-        return len(self.fitting)
-
     def add(self, rule: str, text: str) -> None:
         """Count that a text breaks a rule, and keep the first such text as its example."""
         self.broken[rule] += 1
@@ -133,7 +128,7 @@ def check_scenario(
     if too_long:
         report.add(too_long, report.longest)
 
-    if not report.scenes:
+    if not report.fitting:
         request = request_of(first, checker.usual)
         why = explain_misfit(request, scenario.fields.setting, [scenario])
         report.add(f"fits none of the scenes; in {first.key} {why}", "")
@@ -202,7 +197,7 @@ class _SceneChecker:
             implicit: what the scenario says of it in the implicit form.
         """
         report = self._report
-        number = report.scenes
+        number = len(report.fitting)
         if len(report.renderings) < SHOWN and number % 3 == 0:  # neighbors are similar
             report.renderings.append(implicit.text)
         report.fitting.append(episode.key)
@@ -404,8 +399,9 @@ def _unclear_references(instruction: Instruction, scenario: Scenario) -> Iterato
     """Yield a complaint for each word that points back, such as *it*, without a clear antecedent.
 
     An antecedent is an earlier mention of the value, such as *red* before *it*; there must be
-    exactly one. Once a word such as *the former* has chosen from a list, later ones may mean it.
-    Values in distracting remarks do not count.
+    exactly one. *Red and blue are nice. Lift it.* -> *'it' can mean red or blue*. Once a word such
+    as *the former* has chosen from a list, later ones may mean it: *Red or blue? Let's take the
+    former. Lift it.* Values in distracting remarks do not count.
 
     Args:
         instruction: with its mentions in the order of speaking.

@@ -48,10 +48,11 @@ def report_lines(report: ScenarioReport, task: str) -> Iterator[str]:
     if report.competing:
         yield f"  With a competing remark: {report.competing}"
     tokens = tokens_shown(report.longest)
-    yield f"  {tokens} of {USUAL_LIMIT} tokens; fits {counted(report.scenes, 'scene')}."
-    if report.open < report.scenes:
+    scenes = len(report.fitting)
+    yield f"  {tokens} of {USUAL_LIMIT} tokens; fits {counted(scenes, 'scene')}."
+    if report.open < scenes:
         yield (
-            f"  In {counted(report.scenes - report.open, 'scene')} the command alone gives the "
+            f"  In {counted(scenes - report.open, 'scene')} the command alone gives the "
             "goal, because the scene leaves only one; this is counted, not broken."
         )
     for rule in report.broken:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import operator
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from html import escape
@@ -41,7 +43,8 @@ def sheet_text(plan: StudyPlan) -> str:
     """
     page = _HEAD
     number = 1
-    for block, trials in _by_block(plan).items():
+    for block, of_block in itertools.groupby(plan.trials, operator.attrgetter("block")):
+        trials = list(of_block)
         title = f"Block {block}: {trials[0].job.task}"
         page += _section(plan, title, _block(trials, number))
         number += len(trials)
@@ -49,14 +52,6 @@ def sheet_text(plan: StudyPlan) -> str:
         demonstrations = [_demonstration(planned) for planned in plan.demonstrations]
         page += _section(plan, "Demonstrations", demonstrations)
     return page
-
-
-def _by_block(plan: StudyPlan) -> dict[int, list[PlannedTrial]]:
-    """Return the trials of each block, all of one task, in order."""
-    blocks: dict[int, list[PlannedTrial]] = {}
-    for trial in plan.trials:
-        blocks.setdefault(trial.block, []).append(trial)
-    return blocks
 
 
 def _section(plan: StudyPlan, title: str, content: Iterable[str]) -> str:

@@ -16,6 +16,7 @@ from typing import Literal, NamedTuple
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from roboirg.apps.real.study.counterbalancing import counterbalanced_episodes, target_kind
 from roboirg.core.episode import Episode
@@ -198,8 +199,8 @@ def make_study(
     Raises:
         InvalidValueError: a name is missing, unknown or given twice, or a number is out of range.
     """
-    policies_named = [name_and_spec(policy) for policy in policies]
-    names = tuple(name for name, _ in policies_named)
+    refs = [_planned_policy(policy) for policy in policies]
+    names = tuple(ref.name for ref in refs)
     if settings is None:
         settings = _shared_settings(tasks)
     _check_each_once(names, tasks, settings)
@@ -209,7 +210,6 @@ def make_study(
     _check_known(names, tasks, settings)
 
     rng = np.random.default_rng(seed)
-    refs = [replace(unknown_policy(name), spec=spec) for name, spec in policies_named]
     blocks = _blocks(tasks, trials, rng)  # drawn in turns with the orders of their trials
     return StudyPlan(
         seed=seed,
@@ -217,6 +217,12 @@ def make_study(
         trials=_trials(blocks, settings, refs, rng),
         demonstrations=_demonstrations(tasks, demonstrations, rng),
     )
+
+
+def _planned_policy(text: str) -> PolicyRef:
+    """Return the policy that a spec, NAME=SPEC or a label names; nothing of it is looked up."""
+    name, spec = name_and_spec(text)
+    return replace(unknown_policy(name), spec=spec)
 
 
 def write_study(plan: StudyPlan, folder: Path) -> Path:
@@ -260,16 +266,23 @@ class _Block(NamedTuple):
     episode: int
 
 
+def _shuffled_episodes(
+    tasks: Sequence[str], split: str, count: int, rng: np.random.Generator
+) -> dict[str, NDArray[np.intp]]:
+    """Return balanced episodes of each task in a random order; the tasks are drawn in turn."""
+    episodes = {}
+    for task in tasks:
+        episodes[task] = rng.permutation(counterbalanced_episodes(task, split, count))
+    return episodes
+
+
 def _blocks(tasks: Sequence[str], trials: int, rng: np.random.Generator) -> Iterator[_Block]:
     """Yield the blocks, one arrangement each: tasks alternate, their episodes in random order.
 
     A generator on purpose: `_trials` draws from the same `rng` between two blocks, so making it a
     list changes all plans.
     """
-    episodes = {}
-    for task in tasks:
-        chosen = counterbalanced_episodes(task, TRIAL_SPLIT, trials)
-        episodes[task] = rng.permutation(chosen)
+    episodes = _shuffled_episodes(tasks, TRIAL_SPLIT, trials, rng)
     for position in range(trials):
         for task in shuffled(rng, list(tasks)):
             yield _Block(task, int(episodes[task][position]))
@@ -310,10 +323,7 @@ def _demonstrations(
 
     Draws one order for each task, in the order of `tasks`; `count` are those of each task.
     """
-    episodes = {}
-    for task in tasks:
-        chosen = counterbalanced_episodes(task, DEMONSTRATION_SPLIT, count)
-        episodes[task] = rng.permutation(chosen)
+    episodes = _shuffled_episodes(tasks, DEMONSTRATION_SPLIT, count, rng)
     planned = []
     for position in range(count):
         for task in tasks:

@@ -66,11 +66,9 @@ class ChallengePolicy(RemotePolicy):
             self._fields.update(DEPTH_FIELDS)
         if self.calibration:
             self._fields.update(EXTRINSIC_FIELDS)
-        self._demonstration: Demonstration | None = None
 
-    def begin_episode(self, demonstration: Demonstration) -> None:
+    def begin_episode(self, demonstration: Demonstration) -> None:  # noqa: ARG002
         """Reset the server; the demonstration goes with the first request for actions."""
-        self._demonstration = demonstration
         self.request_confirmed({"reset": True}, "reset_finished")
 
     def request_actions(self, observation: Observation) -> Actions:
@@ -79,8 +77,7 @@ class ChallengePolicy(RemotePolicy):
         The first call of an episode sends the demonstration and the observation, later ones the
         history.
         """
-        demonstration = self._demonstration
-        self._demonstration = None
+        demonstration = self.take_demonstration()
         is_first_step = demonstration is not None
         seen: Sequence[Observation] = (observation,)
         if not is_first_step and observation["history"]:

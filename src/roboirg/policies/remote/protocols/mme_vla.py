@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, NamedTuple
 
@@ -37,6 +37,7 @@ from roboirg.policies.remote.service import (
     read_array,
     read_request,
     split_state,
+    stack_video,
 )
 
 EXECUTED = 16
@@ -63,8 +64,12 @@ class MmeVlaOptions(RemoteOptions):
     part: int = Field(EXECUTED, ge=1, exclude=NOT_COMPARED)
 
 
+FIELDS = ("front_rgb", "joint_positions", "gripper")
+"""Fields of a demonstration that the protocol carries: it has no wrist pictures of the video."""
+
+
 class _Frame(NamedTuple):
-    """What the server remembers of a moment: the front picture and eight numbers (`_state`)."""
+    """What the server remembers of a moment: the front picture and the state (8,)."""
 
     picture: NDArray[np.uint8]
     state: NDArray[np.float32]
@@ -86,13 +91,11 @@ class MmeVlaPolicy(RemotePolicy):
             self.demonstration_frames = "all"
             self.observe_every = 1
         self.history_cameras = ("front",)
-        self._demonstration: Demonstration | None = None
         self._subgoal: str | None = None
 
-    def begin_episode(self, demonstration: Demonstration) -> None:
+    def begin_episode(self, demonstration: Demonstration) -> None:  # noqa: ARG002
         """Clear the server's memory; the demonstration goes with the first frame."""
         self._subgoal = None
-        self._demonstration = demonstration if self.options.history else None
         self.request_confirmed({"reset": True}, "reset_finished")
 
     def follow(self, subgoal: str) -> None:
@@ -115,7 +118,7 @@ class MmeVlaPolicy(RemotePolicy):
         message = {
             "observation/image": observation["front_rgb"],
             "observation/wrist_image": observation["wrist_rgb"],
-            "observation/state": _state(observation),
+            "observation/state": proprioception(observation),
             "prompt": self.instruction.lower(),
         }
         if self._subgoal is not None:
@@ -129,8 +132,7 @@ class MmeVlaPolicy(RemotePolicy):
         policy's turn, which has the number T (``exec_start_idx``); later, one after each action
         since then.
         """
-        demonstration = self._demonstration
-        self._demonstration = None
+        demonstration = self.take_demonstration()
         frames = _new_frames(demonstration, observation)
         start = 0 if demonstration is None else len(demonstration["joint_positions"])
         while part := list(itertools.islice(frames, self.options.part)):
@@ -214,7 +216,7 @@ class MmeVlaService(Service):
         frames = self._sent.new
         if self.policy is None:
             video = frames[: self._sent.turn_start]
-            self.begin(instruction, _demonstration(video, observation))
+            self.begin(instruction, stack_video(video, observation, FIELDS))
             frames = []
         # The first frame of the turn was seen before any step.
         steps = self._sent.count - self._sent.turn_start - 1
@@ -236,33 +238,11 @@ def _new_frames(demonstration: Demonstration | None, observation: Observation) -
     is None for all but the first request of an episode.
     """
     if demonstration is not None and len(demonstration["joint_positions"]):
-        states = proprioception(demonstration["joint_positions"], demonstration["gripper"])
+        states = proprioception(demonstration)
         for picture, state in zip(demonstration["front_rgb"], states, strict=True):
             yield _Frame(picture, state)
     for seen in observation["history"] or (observation,):
-        yield _Frame(seen["front_rgb"], _state(seen))
-
-
-def _state(observation: Observation) -> NDArray[np.float32]:
-    """Return what the server calls the state: seven joints (rad) and the first finger (m), (8,)."""
-    return proprioception(observation["joint_positions"], observation["gripper"])
-
-
-def _demonstration(
-    frames: Sequence[dict[str, NDArray[Any]]], observation: Observation
-) -> Demonstration:
-    """Return the frames before the policy's turn as a demonstration, by field, arrays (T, …).
-
-    The protocol has no wrist pictures of them. Without frames T is 0; `observation` gives the
-    shapes.
-    """
-    demonstration: dict[str, NDArray[Any]] = {}
-    for name in ("front_rgb", "joint_positions", "gripper"):
-        if frames:
-            demonstration[name] = np.stack([frame[name] for frame in frames])
-        else:  # an array of length 0, whose other sizes are those of a frame
-            demonstration[name] = np.asarray(observation[name])[None][:0]
-    return demonstration
+        yield _Frame(seen["front_rgb"], proprioception(seen))
 
 
 PROTOCOL = Protocol(

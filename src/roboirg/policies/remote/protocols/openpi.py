@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-import numpy as np
 from pydantic import Field
 
 from roboirg.core.actions import Actions
@@ -21,7 +20,10 @@ from roboirg.policies.contract.option_checking import NOT_COMPARED
 from roboirg.policies.remote.endpoints import MIB, ActionSpaceName, RemoteOptions
 from roboirg.policies.remote.protocols import Protocol
 from roboirg.policies.remote.remote_policy import RemotePolicy
-from roboirg.policies.remote.service import Message, Service, read_request
+from roboirg.policies.remote.service import Message, Service, read_request, stack_video
+
+FIELDS = ("front_rgb", "wrist_rgb", "joint_positions", "gripper")
+"""Fields of the demonstration without frames that a policy behind our service gets."""
 
 
 class OpenpiOptions(RemoteOptions):
@@ -81,8 +83,7 @@ class OpenpiPolicy(RemotePolicy):
         message: dict[str, Any] = {}
         for camera, key in self._keys.items():
             message[key] = observation[f"{camera}_rgb"]  # type: ignore[literal-required]
-        state = proprioception(observation["joint_positions"], observation["gripper"])
-        message[self.options.state] = state
+        message[self.options.state] = proprioception(observation)
         message[self.options.prompt] = self.instruction
         return self.read_actions(self.request(message))[: self.options.execute]
 
@@ -105,19 +106,9 @@ class OpenpiService(Service):
         # The protocol has no beginning of an episode: another prompt is taken for one.
         if self.policy is None or observation["instruction"] != self.said:
             close_policy(self.policy)
-            self.begin(observation["instruction"], _empty_video(observation["front_rgb"].shape))
+            self.begin(observation["instruction"], stack_video((), observation, FIELDS))
         actions, milliseconds = self.act(observation)
         return {"actions": actions, "server_timing": {"infer_ms": milliseconds}}
-
-
-def _empty_video(shape: tuple[int, ...]) -> dict[str, Any]:
-    """Return a demonstration without frames, given the shape of a picture."""
-    return {
-        "front_rgb": np.zeros((0, *shape), np.uint8),
-        "wrist_rgb": np.zeros((0, *shape), np.uint8),
-        "joint_positions": np.zeros((0, 7), np.float32),
-        "gripper": np.zeros((0, 2), np.float32),
-    }
 
 
 PROTOCOL = Protocol(

@@ -57,7 +57,6 @@ class VlaEvalPolicy(RemotePolicy):
         super().__init__(url, seed)
         self.cameras = ("front", "wrist") if self.options.wrist else ("front",)
         self.demonstration_frames = "all" if self.options.video else "none"
-        self._demonstration: Demonstration | None = None
         self._subgoal: str | None = None
         self._in_episode = False
         self._number = 0
@@ -81,7 +80,7 @@ class VlaEvalPolicy(RemotePolicy):
         version = f"{hello.get('model_server')}, vla-eval {hello.get('harness_version')}"
         return {"version": version, **hello}
 
-    def begin_episode(self, demonstration: Demonstration) -> None:
+    def begin_episode(self, demonstration: Demonstration) -> None:  # noqa: ARG002
         """Begin an episode; the demonstration goes with the first observation, if it is wanted.
 
         The URL and the server must both want it.
@@ -89,7 +88,8 @@ class VlaEvalPolicy(RemotePolicy):
         self._check_params()
         self._subgoal = None
         sends_video = self.options.video and self._wants("send_video_history")
-        self._demonstration = demonstration if sends_video else None
+        if not sends_video:
+            self.take_demonstration()
         self._send("episode_start", {"task": TASK})
         self._in_episode = True
 
@@ -110,22 +110,12 @@ class VlaEvalPolicy(RemotePolicy):
 
         What else is sent depends on the options, and on what the server says that it wants.
         """
-        sends_wrist = self.options.wrist and self._wants("send_wrist_image")
-        images = {"agentview": observation["front_rgb"]}
-        if sends_wrist:
-            images["wrist"] = observation["wrist_rgb"]
-        payload: dict[str, Any] = {"images": images, "task_description": self.instruction}
-        if self.options.state and self._wants("send_state"):
-            state = proprioception(observation["joint_positions"], observation["gripper"])
-            payload["states"] = state
-
-        demonstration = self._demonstration
-        self._demonstration = None
-        if demonstration is not None and len(demonstration["joint_positions"]):  # there is a video
-            payload["video_history"] = list(demonstration["front_rgb"])
-            if sends_wrist:
-                payload["wrist_video_history"] = list(demonstration["wrist_rgb"])
-            payload["episode_restart"] = True
+        payload = observation_payload(
+            observation,
+            self.take_demonstration(),
+            has_wrist=self.options.wrist and self._wants("send_wrist_image"),
+            has_state=self.options.state and self._wants("send_state"),
+        )
         if self._subgoal is not None:
             payload["subgoal"] = self._subgoal
 
@@ -187,6 +177,35 @@ class VlaEvalPolicy(RemotePolicy):
                 f"The server acts in the action space {_clipped(wanted)!r}, but the policy's URL "
                 f"says actions={self.actions}."
             )
+
+
+def observation_payload(
+    observation: Mapping[str, Any],
+    demonstration: Demonstration | None,
+    *,
+    has_wrist: bool,
+    has_state: bool,
+) -> dict[str, Any]:
+    """Return an observation as vla-eval's model servers expect it.
+
+    Args:
+        observation: as the environment returns it.
+        demonstration: with the first observation of an episode; None later, or to leave it out.
+        has_wrist: whether the pictures of the wrist camera are sent, too.
+        has_state: whether proprioception is sent, too.
+    """
+    images = {"agentview": observation["front_rgb"]}
+    if has_wrist:
+        images["wrist"] = observation["wrist_rgb"]
+    payload: dict[str, Any] = {"images": images, "task_description": observation["instruction"]}
+    if has_state:
+        payload["states"] = proprioception(observation)
+    if demonstration is not None and len(demonstration["joint_positions"]):  # there is a video
+        payload["video_history"] = list(demonstration["front_rgb"])
+        if has_wrist:
+            payload["wrist_video_history"] = list(demonstration["wrist_rgb"])
+        payload["episode_restart"] = True
+    return payload
 
 
 def _clipped(value: object) -> str:
