@@ -17,7 +17,7 @@ from roboirg.policies.planners.systems import all_systems
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
 from roboirg.records.record import IDENTITY
 from roboirg.records.record_codec import encode, read_record
-from roboirg.runs.job_instruction import PreparedJob
+from roboirg.runs.job_instruction import PreparedJob, instruct_job
 from roboirg.runs.plan.plan_file import read_plan_file
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.play.episode_record import audit_record, utterances_at
