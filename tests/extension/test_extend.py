@@ -21,8 +21,6 @@ from roboirg.policies.vlm.models.model import model_providers
 from roboirg.runs.plan.plan_maker import make_plan
 
 REGISTRIES = (model_providers, export_formats, record_columns, diagnostic_tables, figure_kinds)
-QUESTION_TO_A_MODEL = ModelQuery("you see", (ChatTurn("user", ("which?",)),))
-REPLY_OF_A_MODEL = {"text": "red", "usage": {"read": 4_000_000, "written": 1_000_000}}
 
 
 def forget_what_was_registered():
@@ -48,38 +46,65 @@ def printed_by(words):
     return done.output
 
 
-def test_the_model_provider_of_the_page_sends_its_key_and_counts_its_costs(monkeypatch):
-    """REPLY_OF_A_MODEL has 4 million tokens read and 1 million written: 4 dollars at its prices.
-
-    At another address prices are unknown.
-    """
+def test_the_model_provider_of_the_page_sends_the_question_with_its_key(monkeypatch):
     monkeypatch.setenv("LAB_KEY", "secret")
     options = ModelOptions(provider="lab", model="lab-1")
-    request = options.service.write(QUESTION_TO_A_MODEL, options, options.key())
+    question = ModelQuery("you see", (ChatTurn("user", ("which?",)),))
+
+    request = options.service.write(question, options, options.key())
+
     assert request.headers == {"X-Key": "secret"}
     assert json.loads(request.body)["turns"] == [{"role": "user", "text": "which?"}]
-    assert options.cost_usd(options.service.read(REPLY_OF_A_MODEL)) == 4.0
-    elsewhere = ModelOptions(provider="lab", model="lab-1", base_url="http://here")
-    assert not elsewhere.has_prices
+
+
+def test_the_model_provider_of_the_page_counts_costs_at_its_prices():
+    """4 million tokens read and 1 million written cost 4 dollars."""
+    options = ModelOptions(provider="lab", model="lab-1")
+    reply = {"text": "red", "usage": {"read": 4_000_000, "written": 1_000_000}}
+
+    assert options.cost_usd(options.service.read(reply)) == 4.0
+
+
+def test_the_model_provider_of_the_page_has_no_prices_at_another_address():
+    assert not ModelOptions(provider="lab", model="lab-1", base_url="http://here").has_prices
 
 
 def test_the_export_format_of_the_page_writes_its_files_and_describes_them(
     folder_with_the_pages_code, monkeypatch
 ):
+    """One episode in two settings: a file of two lines."""
     monkeypatch.setattr(export_run, "record_trajectory", synthetic_trajectories.record)
     monkeypatch.setattr(export_run, "choose_policy", lambda job: None)
-    words = "--format lab-lines --tasks PickXtimes --episodes 1 --workers 0 --out data"
-    printed_by(f"export demonstrations --settings explicit,direct {words}")
+
+    printed_by(
+        "export demonstrations --format lab-lines --tasks PickXtimes --episodes 1 "
+        "--settings explicit,direct --workers 0 --out data"
+    )
+
     assert len((folder_with_the_pages_code / "data/000000.jsonl").read_text().splitlines()) == 2
     assert "Read the lines of" in (folder_with_the_pages_code / "data/README.md").read_text()
 
 
-def test_the_column_table_and_figure_of_the_page_show_a_run(folder_with_the_pages_code):
+@pytest.fixture
+def run(folder_with_the_pages_code):
+    """A run of one episode with 3 calls and 7 steps by the checkpoint *mine*."""
     (job,) = make_plan("random", tasks="PickXtimes", settings="explicit", episodes="1").jobs()
     record = make_record(job, "failure", calls=3, steps=7, policy_metadata={"checkpoint": "mine"})
-    run = fill(folder_with_the_pages_code / "run", record)
+    return fill(folder_with_the_pages_code / "run", record)
+
+
+def test_the_column_of_the_page_is_in_the_results(run):
     assert list(roboirg.results(run)["checkpoint"]) == ["mine"]
+
+
+def test_the_table_of_the_page_is_printed(run):
     assert printed_by(f"tables {run} --which calls --format markdown").endswith("| random | 3 |\n")
+
+
+def test_the_help_of_tables_names_the_table_of_the_page():
     assert "calls (for actions)." in printed_by("tables --help")
+
+
+def test_the_figure_of_the_page_is_drawn(run, folder_with_the_pages_code):
     printed_by(f"figures {run} --which steps --out figures")
     assert (folder_with_the_pages_code / "figures/steps.svg").exists()

@@ -64,7 +64,7 @@ for task, expected in list(test_golden.DIGESTS.items())[::4]:
 """
 
 
-def recipe(page: str, heading: str, kind: str = "python") -> str:
+def recipe(page, heading, kind="python"):
     """The first block of a section in Python, or of another kind, as it stands in the docs."""
     text = (ROOT / "docs" / page).read_text()
     section = re.search(rf"^#+ {heading}\n(.*?)(?=^##|\Z)", text, flags=re.DOTALL | re.MULTILINE)
@@ -120,7 +120,7 @@ def roboirg(python_with_the_packages, tmp_path_factory):
     """Run a command in that environment and return what it prints."""
     folder = tmp_path_factory.mktemp("work")
 
-    def run(*words: str) -> str:
+    def run(*words):
         command = [str(python_with_the_packages), "-m", "roboirg", *words]
         env = {**os.environ, "COLUMNS": "200", "ROBOIRG_CACHE": str(folder / "cache")}
         done = subprocess.run(

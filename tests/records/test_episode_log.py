@@ -1,7 +1,5 @@
 """What is printed in an episode goes to its log, from real processes with real descriptors."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

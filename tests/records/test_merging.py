@@ -1,11 +1,8 @@
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from pathlib import Path
 
 import pytest
-from flat_jobs import with_version
 from made_records import fill
 from msgspec.structs import replace
 from run_fakes import FakePlay, fake_run, small_plan
@@ -55,22 +52,29 @@ def test_the_plan_of_a_merged_run_is_kept(tmp_path):
     assert plan.read_bytes() == (part / PLAN_FILE).read_bytes()
 
 
-WITHOUT_CONNECTION = {"outcome": "error", "error": "connection", "server_version": None}
-
-
-def test_merging_keeps_a_verdict_rather_than_an_error_and_the_first_of_two_errors(tmp_path):
-    won, unplayed, *_ = played_records()
-    connection = replace(unplayed, outcome="error", error="connection", cause="connection: refused")
+def test_merging_keeps_a_verdict_rather_than_an_error(tmp_path):
+    """Whichever comes first."""
+    won = played_records()[0]
+    error = replace(won, outcome="error", error="connection", server_version=None)
     sources = [
-        fill(tmp_path / "a", replace(won, **WITHOUT_CONNECTION), connection),
-        fill(tmp_path / "b", won, replace(connection, cause="connection: lost")),
-        fill(tmp_path / "c", replace(won, **WITHOUT_CONNECTION)),
-    ]
+        fill(tmp_path / "a", error), fill(tmp_path / "b", won), fill(tmp_path / "c", error)
+    ]  # fmt: skip
 
     merged = merge_runs(sources, tmp_path / "out")
 
-    assert read_records(tmp_path / "out") == (won, connection), "of two errors the first"
-    assert (merged.added, merged.duplicates, merged.conflicts) == (2, 3, [])
+    assert read_records(tmp_path / "out") == (won,)
+    assert (merged.added, merged.duplicates, merged.conflicts) == (1, 2, [])
+
+
+def test_merging_keeps_the_first_of_two_errors(tmp_path):
+    first = replace(
+        played_records()[0], outcome="error", error="connection", cause="connection: refused"
+    )
+    second = replace(first, cause="connection: lost")
+
+    merge_runs([fill(tmp_path / "a", first), fill(tmp_path / "b", second)], tmp_path / "out")
+
+    assert read_records(tmp_path / "out") == (first,)
 
 
 def test_merging_keeps_the_first_of_two_verdicts_and_reports_the_other_as_a_conflict(tmp_path):
@@ -85,47 +89,62 @@ def test_merging_keeps_the_first_of_two_verdicts_and_reports_the_other_as_a_conf
     assert (identity_key(conflict), conflict.outcome) == (identity_key(record), "success")
 
 
-def test_merging_warns_of_verdicts_by_other_code_but_not_in_episodes_without_instruction(tmp_path):
-    """The silent one is of another policy and split, whose versions and seeds may differ."""
-    first, second, third, *_ = (replace(record, server_version="8") for record in played_records())
-    second = replace(second, verdict_code="old")
-    elsewhere = {"arm": "silent", "verdict_code": "older", "split": "val", "episode": 0, "seed": 5}
-    silent = replace(with_version(third, "old"), policy="other", server_version="9", **elsewhere)
+def test_merging_warns_of_verdicts_by_other_code(tmp_path):
+    first, second, *_ = played_records()
+    by_other_code = replace(second, verdict_code="old")
 
     merged = merge_runs(
-        [fill(tmp_path / "a", first, second), fill(tmp_path / "b", silent)], tmp_path / "out"
+        [fill(tmp_path / "a", first), fill(tmp_path / "b", by_other_code)], tmp_path / "out"
     )
 
-    assert read_records(tmp_path / "out") == (first, second, silent)
-    assert [warning.partition(".")[0] for warning in merged.warnings()] == [
-        f"Mixed states of the code that decides verdicts: {first.verdict_code}, old"
-    ]
+    (warning,) = merged.warnings()
+    assert warning.startswith(
+        f"Mixed states of the code that decides verdicts: {first.verdict_code}, old."
+    )
+
+
+def test_merging_does_not_warn_of_other_code_in_episodes_without_instruction(tmp_path):
+    """In them nothing is understood. The silent one is of another policy and split, too."""
+    first, second, *_ = played_records()
+    silent = replace(
+        second, policy="other", arm="silent", verdict_code="older", split="val", episode=0, seed=5
+    )
+
+    merged = merge_runs(
+        [fill(tmp_path / "a", first), fill(tmp_path / "b", silent)], tmp_path / "out"
+    )
+
+    assert read_records(tmp_path / "out") == (first, silent)
+    assert not merged.warnings()
 
 
 def test_videos_actions_and_logs_are_copied_with_the_records_that_are_kept(tmp_path):
-    first, second, *_ = played_records()
-    filmed = replace(first, video="videos/x.mp4", action_log="ab" * 32)
-    gone = replace(second, video="videos/gone.mp4")
-    error = replace(filmed, outcome="error", error="connection")
-    sources = [fill(tmp_path / "a", error, gone), fill(tmp_path / "b", filmed, gone)]
-    of_first = [
-        str(log_path(Path(), first.slug)),
+    """The verdict of the second run is kept in place of the error of the first."""
+    record = replace(played_records()[0], video="videos/x.mp4", action_log="ab" * 32)
+    error = replace(record, outcome="error", error="connection")
+    files = (
+        str(log_path(Path(), record.slug)),
         "videos/x.mp4",
         "videos/x.jpg",
         f"actions/ab/{'ab' * 32}.npz",
-    ]
-    of_second = str(log_path(Path(), second.slug))
-    for source, name in itertools.product(sources, (*of_first, of_second)):
+    )
+    sources = [fill(tmp_path / "a", error), fill(tmp_path / "b", record)]
+    for source, name in itertools.product(sources, files):
         (source / name).parent.mkdir(parents=True, exist_ok=True)
-        (source / name).write_text(source.name)
-    out = tmp_path / "out"
+        (source / name).write_text(f"of run {source.name}")
 
-    merge_runs(sources, out)
+    merge_runs(sources, tmp_path / "out")
 
-    # The verdict of the second run is kept in place of the error, and the first of two verdicts.
-    assert [(out / name).read_text() for name in of_first] == ["b", "b", "b", "b"]
-    assert (out / of_second).read_text() == "a"
-    assert [record.video for record in read_records(out)] == ["videos/x.mp4", None]
+    assert [(tmp_path / "out" / name).read_text() for name in files] == ["of run b"] * 4
+
+
+def test_a_merged_record_whose_video_is_gone_has_none(tmp_path):
+    source = fill(tmp_path / "a", replace(played_records()[0], video="videos/gone.mp4"))
+
+    merge_runs([source], tmp_path / "out")
+
+    (record,) = read_records(tmp_path / "out")
+    assert record.video is None
 
 
 @pytest.mark.parametrize(
@@ -137,24 +156,24 @@ def test_videos_actions_and_logs_are_copied_with_the_records_that_are_kept(tmp_p
             "PickXtimes/test@0a",
             "PickXtimes/test whose words version is PickXtimes/test@0a",
         ),
-        (
-            "server_version",
-            "8",
-            "random whose server version is 8, but in .* it is none; they",
-        ),
+        ("server_version", "8", "random whose server version is 8, but in .* it is none; they"),
         ("seed", 5, "PickXtimes test 0 whose seed is 5"),
     ],
 )
-def test_runs_of_other_words_servers_or_scenes_are_not_merged(tmp_path, field, value, words):
-    """Neither into a new folder nor into one of them; nothing is written."""
+@pytest.mark.parametrize("into", ["a new folder", "one of them"])
+def test_runs_of_other_words_servers_or_scenes_are_not_merged(tmp_path, field, value, words, into):
     record = replace(played_records()[0], words="PickXtimes/test@1b")
-    odd = replace(record, **{field: value})
-    one = fill(tmp_path / "a", record)
-    other = fill(tmp_path / "b", odd)
+    usual = fill(tmp_path / "usual", record)
+    odd = fill(tmp_path / "odd", replace(record, **{field: value}))
+    sources = [odd]
+    out = usual
+    if into == "a new folder":
+        sources = [usual, odd]
+        out = tmp_path / "out"
 
-    for folders, out in (([one, other], tmp_path / "out"), ([other], one)):
-        with pytest.raises(StoreError, match=f"{words}.* cannot be merged"):
-            merge_runs(folders, out)
+    with pytest.raises(StoreError, match=f"{words}.* cannot be merged"):
+        merge_runs(sources, out)
+
     assert not (tmp_path / "out").exists()
 
 
@@ -167,10 +186,10 @@ def test_a_run_is_not_merged_into_itself(tmp_path):
 def test_runs_with_two_wording_files_can_be_merged(tmp_path):
     """Their words differ, as they should."""
     usual = played_records()[0]
-    records = []
-    for name in ("0a", "1b"):
-        options = dataclasses.replace(usual.options, wordings=f"mine@{name}")
-        records.append(replace(usual, options=options, words=f"PickXtimes/test@{name}"))
-    folders = [fill(tmp_path / record.words[-2:], record) for record in records]
+    folders = []
+    for digest in ("0a", "1b"):
+        options = dataclasses.replace(usual.options, wordings=f"mine@{digest}")
+        record = replace(usual, options=options, words=f"PickXtimes/test@{digest}")
+        folders.append(fill(tmp_path / digest, record))
 
-    assert merge_runs(folders, tmp_path / "out").added == len(records)
+    assert merge_runs(folders, tmp_path / "out").added == 2

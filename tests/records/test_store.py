@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import errno
 import functools
 import math
@@ -25,8 +23,7 @@ from roboirg.core.versions import Versions
 from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.server_lock import lock_server
 from roboirg.records.line_file import LOCK_FILE
-from roboirg.records.record import Record
-from roboirg.records.record_codec import StoreError, encode, identity_key
+from roboirg.records.record_codec import StoreError, encode
 from roboirg.records.run_files import PLAN_FILE
 from roboirg.records.store import (
     RECORDS_FILE,
@@ -45,69 +42,76 @@ from roboirg.util.atomic_write import locked, write_atomically
 
 
 @pytest.mark.parametrize("field", Versions._fields[1:])
-def test_a_run_is_refused_if_any_of_its_versions_differs_unless_it_is_unknown(field):
+def test_a_run_is_refused_if_any_of_its_versions_differs(field):
     """As those of the language, the environment and the server."""
-    first = Versions(**{field: "a"})
-    other = Versions(**{field: "b"})
-    unknown = Versions()
+    differences = Versions(**{field: "a"}).differences(Versions(**{field: "b"}))
 
     sentence = f"^x whose {field.replace('_', ' ')} is a, but now it is b; choose another --out.$"
     with pytest.raises(StoreError, match=sentence):
-        check_same("x", first.differences(other))
-    assert not first.differences(unknown)
+        check_same("x", differences)
+
+
+@pytest.mark.parametrize("field", Versions._fields[1:])
+def test_an_unknown_version_differs_from_none(field):
+    assert not Versions(**{field: "a"}).differences(Versions())
 
 
 @functools.cache
-def eight_records() -> tuple[Record, ...]:
-    return tuple(fake_record(job) for job in small_plan().jobs())
+def eight_records():
+    """Return the records of four episodes in explicit and in direct."""
+    return tuple(fake_record(job) for job in small_plan(4).jobs())
 
 
-@given(st.data())
+@given(data=st.data())
 @settings(max_examples=40, deadline=None)
 def test_a_file_of_records_cut_anywhere_loses_only_the_line_that_was_cut(data):
-    """As by a crash. What is left of that line is kept in a file of its own."""
+    """As by a crash. What is left of that line is kept in a file of its own.
+
+    A record is complete as soon as its last brace is there; its newline may be missing.
+    """
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        path = fill(folder, *eight_records()) / RECORDS_FILE
+        path = fill(Path(name), *eight_records()) / RECORDS_FILE
         whole = path.read_bytes()
-        ends = [place for place, byte in enumerate(whole) if byte == ord("\n")]
-        cut = data.draw(st.integers(0, len(whole)) | st.sampled_from(ends))
-        path.write_bytes(whole[:cut])
-        # A record is there as soon as its last brace is; its newline may be missing.
-        count = sum(end <= cut for end in ends)
-        complete = eight_records()[:count]
-        last = eight_records()[-1]
-
-        assert tuple(iterate_records(folder)) == complete
-        with RecordStore(folder) as store:
-            assert list(store.stored) == [identity_key(record) for record in complete]
-            torn = store.torn
-            store.append(last)
-
+        line_ends = [place for place, byte in enumerate(whole) if byte == ord("\n")]
+        cut = data.draw(st.integers(0, len(whole)) | st.sampled_from(line_ends))
+        complete = eight_records()[: sum(end <= cut for end in line_ends)]
         kept = b"".join(encode(record) + b"\n" for record in complete)
-        assert whole.startswith(kept)
-        assert path.read_bytes() == kept + encode(last) + b"\n"
+
+        path.write_bytes(whole[:cut])
+        found = tuple(iterate_records(path.parent))
+        with RecordStore(path.parent) as store:
+            torn = store.torn
+            store.append(eight_records()[-1])
+
+        assert found == complete
         assert torn == whole[len(kept) : cut]
+        assert path.read_bytes() == kept + encode(eight_records()[-1]) + b"\n"
         if torn:
-            assert (folder / TORN_FILE).read_bytes() == torn + b"\n"
+            assert path.with_name(TORN_FILE).read_bytes() == torn + b"\n"
+
+
+POLICY_ERROR = {"outcome": "error", "error": "policy"}
 
 
 def test_an_error_before_a_policy_declares_its_version_gets_that_of_its_verdicts(tmp_path):
     """Else its row has no mark of the error, and a row of unknown version stands next to it."""
-    won, raised, other = eight_records()[:3]
-    ref = replace_field(other.ref, version=UNKNOWN_VERSION, makeup=(("policy", "another"),))
-    error = {"outcome": "error", "error": "policy"}
-    fill(
-        tmp_path,
-        with_version(won, "7"),
-        replace(with_version(raised, UNKNOWN_VERSION), **error),
-        replace(other, ref=ref, **error),
-    )
+    won = with_version(eight_records()[0], "7")
+    raised = replace(with_version(eight_records()[1], UNKNOWN_VERSION), **POLICY_ERROR)
+    fill(tmp_path, won, raised)
 
     versions = [result.policy_version for result in read_results(tmp_path)]
 
-    assert won.policy == raised.policy == other.policy
-    assert versions == ["7", "7", UNKNOWN_VERSION]
+    assert versions == ["7", "7"]
+
+
+def test_an_error_of_another_policy_of_the_same_name_stays_of_unknown_version(tmp_path):
+    won = with_version(eight_records()[0], "7")
+    another = replace_field(won.ref, version=UNKNOWN_VERSION, makeup=(("policy", "another"),))
+    fill(tmp_path, won, replace(eight_records()[1], ref=another, **POLICY_ERROR))
+
+    versions = [result.policy_version for result in read_results(tmp_path)]
+
+    assert versions == ["7", UNKNOWN_VERSION]
 
 
 def test_unfinished_lines_of_several_crashes_are_all_kept_in_a_file_of_their_own(tmp_path):
@@ -120,12 +124,18 @@ def test_unfinished_lines_of_several_crashes_are_all_kept_in_a_file_of_their_own
 
 
 def test_a_second_run_in_the_same_folder_is_refused_with_the_process_of_the_first(tmp_path):
-    (tmp_path / LOCK_FILE).write_text("12345678901234\n")  # of an earlier one, which was killed
-    with (
-        RecordStore(tmp_path),
-        pytest.raises(StoreError, match=rf"being written by .*process {os.getpid()}\)"),
-    ):
+    first = RecordStore(tmp_path)
+
+    with pytest.raises(StoreError, match=rf"being written by .*process {os.getpid()}\)"):
         RecordStore(tmp_path)
+
+    first.close()
+    RecordStore(tmp_path).close()
+
+
+def test_a_lock_that_a_killed_run_left_refuses_nobody(tmp_path):
+    """The number is that of a process."""
+    (tmp_path / LOCK_FILE).write_text("12345678901234\n")
     RecordStore(tmp_path).close()
 
 
@@ -153,11 +163,11 @@ def test_records_of_a_newer_format_are_refused_and_stay_as_they_are(tmp_path):
     newer = path.read_bytes().replace(b'"schema_version":1', b'"schema_version":7', 1)
     path.write_bytes(newer)
 
+    sentence = r"line 1 has schema version 7, .* reads only version 1;"
     for _ in range(2):
-        with pytest.raises(
-            StoreError, match=r"line 1 has schema version 7, .* reads only version 1;"
-        ):
+        with pytest.raises(StoreError, match=sentence):
             RecordStore(tmp_path)
+
     assert path.read_bytes() == newer
 
 
@@ -178,14 +188,16 @@ def test_a_line_that_is_no_record_is_reported_with_its_number(tmp_path, read, li
 
 @pytest.mark.parametrize(
     "fields",
-    [{"steps": 2**63}, {"seed": -(2**63) - 1}, {"duration_s": math.nan},
-     {"usage": {"cost_usd": math.inf}}, {"environment": EnvironmentOptions(max_steps=10**22)}],
-    ids=str,
+    [{"steps": 2**63}, {"duration_s": math.nan}, {"usage": {"cost_usd": math.inf}},
+     {"environment": EnvironmentOptions(max_steps=10**22)}],
+    ids=["steps", "duration", "cost", "step limit"],
 )  # fmt: skip
 def test_a_record_with_a_number_that_could_not_be_read_back_is_not_written(tmp_path, fields):
     record = replace(eight_records()[0], **fields)
+
     with RecordStore(tmp_path) as store, pytest.raises(StoreError, match=r"is not a record"):
         store.append(record)
+
     assert (tmp_path / RECORDS_FILE).read_bytes() == b""
 
 
@@ -204,46 +216,61 @@ def test_a_folder_without_records_is_reported_in_one_sentence(tmp_path):
 
 
 def test_atomic_writing_replaces_a_file_and_leaves_no_temporary_one(tmp_path):
-    for text in ("one", "two"):
-        write_atomically(tmp_path / "x.txt", text)
+    (tmp_path / "x.txt").write_text("old")
+
+    write_atomically(tmp_path / "x.txt", "new")
+
     assert [path.name for path in tmp_path.iterdir()] == ["x.txt"]
-    assert (tmp_path / "x.txt").read_text() == "two"
+    assert (tmp_path / "x.txt").read_text() == "new"
 
 
-def test_a_full_disk_ends_the_run_in_one_sentence_and_loses_no_earlier_record(tmp_path):
-    first = fill(tmp_path / "whole", *eight_records()[:3]) / RECORDS_FILE
-    # The kernel takes a part of the fourth record and refuses the rest, as a full disk does.
-    limit = first.stat().st_size + 100
+@pytest.fixture
+def limit_file_sizes():
+    """Return what limits the size of files, in bytes, as a full disk does."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_a_full_disk_ends_the_run_in_one_sentence_and_loses_no_earlier_record(
+    tmp_path, limit_file_sizes
+):
+    """The kernel takes a part of the fourth record and refuses the rest."""
+    three_records = fill(tmp_path / "whole", *eight_records()[:3]) / RECORDS_FILE
     folder = tmp_path / "run"
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    play = lambda job: replace(FakePlay()(job), started_at="")  # noqa: E731
-    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
-    try:
-        with pytest.raises(StoreError, match=rf"^Cannot write to {folder}.*: File too large\.$"):
-            run_plan(small_plan(), folder, play, InProcess())
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    limit_file_sizes(three_records.stat().st_size + 100)
+
+    with pytest.raises(StoreError, match=rf"^Cannot write to {folder}.*: File too large\.$"):
+        run_plan(
+            small_plan(), folder, lambda job: replace(FakePlay()(job), started_at=""), InProcess()
+        )
 
     with RecordStore(folder) as store:
         assert (len(store.stored), store.torn) == (3, b"")
 
 
-@pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "models.sqlite", "videos/a.jpg"])
-def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path, name):
+@pytest.mark.parametrize(
+    "begin",
+    [RecordStore, lambda folder: check_run(small_plan(), folder)],
+    ids=["stored", "checked"],
+)
+@pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "videos/a.jpg"])
+def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path, name, begin):
     victim = tmp_path / "victim"
     victim.write_text("mine")
     link = tmp_path / "run" / name
     link.parent.mkdir(parents=True)
     link.symlink_to(victim)
 
-    for begin in (RecordStore, lambda run: check_run(small_plan(), run)):
-        with pytest.raises(RoboIRGError, match=f"{link} is a symbolic link, and a run writes"):
-            begin(tmp_path / "run")
+    with pytest.raises(RoboIRGError, match=f"{link} is a symbolic link, and a run writes"):
+        begin(tmp_path / "run")
+
     assert victim.read_text() == "mine"
 
 
-@pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "records.torn", "models.sqlite"])
+@pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "models.sqlite"])
 def test_a_run_changes_no_file_that_has_another_name_elsewhere(tmp_path, name):
+    """A hard link."""
     victim = tmp_path / "victim"
     victim.write_text("mine")
     (tmp_path / "run").mkdir()
@@ -251,6 +278,7 @@ def test_a_run_changes_no_file_that_has_another_name_elsewhere(tmp_path, name):
 
     with pytest.raises(RoboIRGError, match=f"{name} has another name elsewhere"):
         RecordStore(tmp_path / "run")
+
     assert victim.read_text() == "mine"
 
 
@@ -274,6 +302,7 @@ def test_a_plan_may_be_a_hard_link_as_it_is_replaced(tmp_path):
 
     with RecordStore(tmp_path / "run"):
         write_plan(small_plan(), tmp_path / "run")
+
     assert victim.read_text() == "{}"
 
 

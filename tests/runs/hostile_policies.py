@@ -29,7 +29,7 @@ class Hostile:
     version = "1"
 
     def reset(self, instruction, demonstration):
-        self.metadata: dict[str, Any] = {}
+        self.metadata = {}
 
     def act(self, observation):
         return -np.ones((24, 8))
@@ -41,7 +41,7 @@ class Searcher(Hostile):
     def reset(self, instruction, demonstration):
         types = set()
         texts = set()
-        frames: list[Any] = [*sys._current_frames().values()]
+        frames = [*sys._current_frames().values()]
         while frames:
             frame = frames.pop()
             types |= {type(value).__name__ for value in frame.f_locals.values()}
@@ -68,9 +68,9 @@ class Patcher(Hostile):
         from roboirg.judging import Judge
         from roboirg.records import record
 
-        patched: Any = record.Record
+        patched = record.Record
         patched.record_status = lambda self, *_: setattr(self, "outcome", "success")
-        judge: Any = Judge
+        judge = Judge
         judge.status = "success"
         return super().act(observation)
 
@@ -179,10 +179,9 @@ def host_of(frame):
     return frame.f_locals["self"]
 
 
-def line_of(host: Any) -> socket.socket:
+def line_of(host):
     """Return the line to the world of the episode whose call is under way."""
-    line: socket.socket = host._under_way[0].line
-    return line
+    return host._under_way[0].line
 
 
 class ForgesReply(Forger):

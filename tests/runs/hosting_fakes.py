@@ -8,7 +8,6 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -159,7 +158,7 @@ class BatchedDice:
 
     def __init__(self):
         type(self).made += 1
-        self.metadata: dict[str, Any] = {"made": self.made}
+        self.metadata = {"made": self.made}
 
     def begin(self, instruction, demonstration, seed):
         return np.random.default_rng(seed)
@@ -199,7 +198,7 @@ def fake_world_plan(policy, episodes=8, seeds=1, **options):
     )
 
 
-def fake_world_runner(plan: Plan, folder: Path, seconds: float = 0.0) -> FakeWorldRunner:
+def fake_world_runner(plan, folder, seconds=0.0):
     return FakeWorldRunner(
         folder,
         policy_timeout_s=plan.hosting.policy_timeout_s,

@@ -1,7 +1,5 @@
 """A policy whose module cannot be imported on the bad machine of a cluster."""
 
-from __future__ import annotations
-
 import os
 
 from ray_fakes import BAD_MACHINE
@@ -16,6 +14,6 @@ class Local:
     def reset(self, instruction, demonstration):
         """Begin."""
 
-    def act(self, observation: object) -> list[list[float]]:
+    def act(self, observation):
         """Hold still."""
         return [[0.0] * 8]

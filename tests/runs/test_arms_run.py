@@ -1,12 +1,9 @@
 """Control arms in plans, records, resumed and merged runs, and verification."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
 from page_text import call
-from run_fakes import fake_run
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.records.record_codec import identity_key
@@ -24,13 +21,6 @@ def plan_with_arms(arms=ALL_ARMS, **changes):
     """Return a plan of three episodes of two tasks, each told in several ways, its arms."""
     fields = {"tasks": "PickXtimes,VideoRepick", "settings": "direct", "episodes": "3", **changes}
     return make_plan(["oracle"], arms=arms, **fields)
-
-
-def folder_of_fake_run(plan, folder):
-    folder.mkdir(exist_ok=True)
-    write_plan(plan, folder)
-    fake_run(folder, plan)
-    return folder
 
 
 def test_each_arm_of_an_episode_is_a_job_of_its_own():

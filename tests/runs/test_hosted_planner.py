@@ -1,7 +1,5 @@
 """A planner of the user's own has a process of its own; its scripted hands stay with the world."""
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

@@ -27,7 +27,6 @@ from roboirg.runs.plan.option_parsing import (
     parse_policies,
     parse_stages,
 )
-from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_maker import make_plan, word_options
 from roboirg.runs.plan.stored_plans import read_plan, write_plan
 from roboirg.tasks import all_tasks
@@ -54,14 +53,12 @@ def test_a_number_that_stands_twice_in_a_list_counts_once():
 
 @pytest.mark.parametrize(
     "text",
-    [
-        "0", "-3", "010", "0,010", "a", "3-1", "5-0", "1.5", "", ",", "1,,b", "300000000",
-        "0-999999999", "9" * 5000, "0," + "9" * 5000, "a" * 5000,
-    ],
-)  # fmt: skip
+    ["0", "-3", "010", "0,010", "a", "3-1", "1.5", "", "1,,b", "0-999999999", "9" * 5000],
+)
 def test_a_text_that_is_no_list_of_episodes_is_refused_in_one_short_sentence(text):
     with pytest.raises(InvalidValueError) as caught:
         parse_episodes(text, "test", ())
+
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 200
 
@@ -69,17 +66,25 @@ def test_a_text_that_is_no_list_of_episodes_is_refused_in_one_short_sentence(tex
 ALL_TASKS = tuple(all_tasks())
 
 
+ONE_EPISODE = {"tasks": "PickXtimes", "episodes": "1"}
+
+
 @pytest.mark.parametrize(
-    ("text", "episodes"),
+    ("text", "first_episodes"),
     [
-        ("hard", tuple(range(3, 50, 4))),
-        ("hard, medium", tuple(sorted([*range(3, 50, 4), *range(2, 50, 4)]))),
-        ("hard,0,3", (*range(3, 50, 4), 0)),
+        ("hard", (3, 7, 11, 15)),
+        ("hard, medium", (2, 3, 6, 7)),
     ],
 )
-def test_a_difficulty_selects_the_episodes_that_have_it(text, episodes):
-    """In the split *test* every fourth is hard, 3, 7, ..., and those before are medium."""
-    assert parse_episodes(text, "test", ALL_TASKS) == episodes
+def test_a_difficulty_selects_the_episodes_that_have_it(text, first_episodes):
+    """In the split *test* every fourth episode is hard, and each before a hard one is medium."""
+    assert parse_episodes(text, "test", ALL_TASKS)[:4] == first_episodes
+
+
+def test_a_number_next_to_a_difficulty_adds_that_episode():
+    hard = parse_episodes("hard", "test", ALL_TASKS)
+
+    assert parse_episodes("hard,0,3", "test", ALL_TASKS) == (*hard, 0)
 
 
 def test_a_difficulty_selects_an_episode_only_if_it_has_it_in_every_task():
@@ -96,24 +101,36 @@ def test_a_difficulty_of_the_endless_random_split_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("parse", "given", "words"),
+    ("text", "split", "words"),
     [
-        (parse_episodes, ("all", "random", ()), "'random' has .* say how many"),
-        (parse_episodes, ("0", "test", ()), r"for episode 0 alone write '0,'\.$"),
-        (parse_episodes, ("3,0-999999999,5", "train", ()), "split 'train' has episodes 0 to 99"),
-        (parse_stages, ("5-1",), "1,5; 1,2,5; 1,2,3,5; 1,2,3,4,5"),
-        (lambda text: word_options(stages=text), ("1,5;1-5",), "is '1,5;1-5'; here it must be one"),
-        (parse_numbers, ("policy seed", "0-999999999"), "1,000,000,000 numbers; at most 10,000"),
+        ("all", "random", "'random' has .* say how many"),
+        ("0", "test", r"for episode 0 alone write '0,'\.$"),
+        ("3,0-999999999,5", "train", "split 'train' has episodes 0 to 99"),
     ],
 )
-def test_a_refused_list_of_numbers_comes_with_what_to_write_instead(parse, given, words):
+def test_a_refused_list_of_episodes_comes_with_what_to_write_instead(text, split, words):
     with pytest.raises(InvalidValueError, match=words):
-        parse(*given)
+        parse_episodes(text, split, ())
+
+
+def test_refused_stages_come_with_the_lists_of_stages_that_there_are():
+    with pytest.raises(InvalidValueError, match="1,5; 1,2,5; 1,2,3,5; 1,2,3,4,5"):
+        parse_stages("5-1")
+
+
+def test_two_lists_of_stages_are_refused_where_one_is_wanted():
+    with pytest.raises(InvalidValueError, match="is '1,5;1-5'; here it must be one"):
+        word_options(stages="1,5;1-5")
+
+
+def test_a_range_of_too_many_numbers_is_refused_with_the_most_that_there_may_be():
+    with pytest.raises(InvalidValueError, match="1,000,000,000 numbers; at most 10,000"):
+        parse_numbers("policy seed", "0-999999999")
 
 
 @pytest.mark.parametrize("text", ["all", "ALL", "all,explicit", "direct, All"])
 def test_the_word_all_in_a_list_of_settings_stands_for_everything_in_any_case(text):
-    assert make_plan(["random"], settings=text, episodes="1").settings == ("all",)
+    assert make_plan(["random"], settings=text, **ONE_EPISODE).settings == ("all",)
 
 
 @pytest.mark.parametrize("text", ["all", "ALL", "all,BinFill", "StopCube, All"])
@@ -141,89 +158,113 @@ def test_an_unknown_suite_is_refused_with_the_nearest_name():
 
 @pytest.mark.parametrize("task", ALL_TASKS)
 def test_a_plan_plays_each_episode_in_every_setting_that_can_express_it_explicit_last(task):
-    """A setting is a way to put an instruction; not every scene can be told in each.
-
-    `expressible` has explicit first.
-    """
+    """A setting is a way to put an instruction; not every scene can be told in each."""
     jobs = make_plan(["random"], tasks=task, episodes="6").jobs()
 
-    for episode in range(6):
-        possible = expressible(get_episode(task, "test", episode))
-        explicit, *implicit = [setting for setting in possible if setting in plain_settings()]
-        played = [job.setting for job in jobs if job.episode == episode]
-        assert played == [*implicit, explicit]
+    for number in range(6):
+        episode = get_episode(task, "test", number)
+        played = [job.setting for job in jobs if job.episode == number]
+        assert set(played) == set(expressible(episode)) & set(plain_settings()), number
+        assert played[-1] == "explicit"
 
 
-def test_options_that_leave_the_words_as_they_are_add_no_episode():
-    """Explicit has one form only, stages count in contextual, a frame in spatial instructions."""
-    plan = make_plan(["random"], forms="implicit,resolved", stages="1,5", frame="camera")
-    jobs = plan.jobs()
+@pytest.mark.parametrize(
+    ("setting", "options", "episodes"),
+    [
+        ("explicit", {"forms": "implicit,resolved"}, 1),
+        ("direct", {"forms": "implicit,resolved"}, 2),
+        ("direct", {"stages": "1,5;1,2,5"}, 1),
+        ("contextual", {"stages": "1,5;1,2,5"}, 2),
+    ],
+)
+def test_options_that_leave_the_words_of_a_setting_as_they_are_add_no_episode(
+    setting, options, episodes
+):
+    """Explicit instructions have one form only, and stages exist in contextual ones alone."""
+    plan = make_plan(["random"], tasks="BinFill", settings=setting, episodes="1", **options)
 
-    assert len(set(jobs)) == len(jobs)
-    assert {job.form for job in jobs if job.setting == "explicit"} == {"implicit"}
-    for job in jobs:
-        assert (job.options.stages == (1, 5)) == (job.setting == "contextual")
-        assert (job.options.frame == "camera") == (job.setting == "spatial")
+    assert len(plan.jobs()) == episodes
 
 
-def test_an_instruction_in_turns_is_another_episode_unless_it_has_one_utterance():
+@pytest.mark.parametrize(("setting", "frame"), [("spatial", "camera"), ("direct", "robot")])
+def test_the_frame_of_reference_counts_in_spatial_instructions_alone(setting, frame):
+    """*robot* is the default, which stands where no side is named."""
+    plan = make_plan(["random"], tasks="BinFill", settings=setting, episodes="1", frame="camera")
+
+    assert [job.options.frame for job in plan.jobs()] == [frame]
+
+
+@pytest.mark.parametrize(
+    ("setting", "delivery", "is_same"),
+    [("direct", "turns", False), ("explicit", "prompt", True)],
+)
+def test_an_instruction_in_turns_is_another_episode_unless_it_has_one_utterance(
+    setting, delivery, is_same
+):
     """Utterances come at once, as a prompt, or one by one. Explicit ones have only one."""
-    prompt = make_plan(["random"], delivery="prompt").jobs()
-    turns = make_plan(["random"], delivery="turns").jobs()
+    (at_once,) = make_plan(["random"], settings=setting, delivery="prompt", **ONE_EPISODE).jobs()
+    (in_turns,) = make_plan(["random"], settings=setting, delivery="turns", **ONE_EPISODE).jobs()
 
-    for job, other in zip(prompt, turns, strict=True):
-        is_same = job.setting == "explicit"
-        assert (job == other) == is_same
-        assert (identity_key(job) == identity_key(other)) == is_same
-        assert (job.slug == other.slug) == is_same
-        assert other.options.delivery == ("prompt" if is_same else "turns")
+    assert in_turns.options.delivery == delivery
+    assert (identity_key(in_turns) == identity_key(at_once)) == is_same
+    assert (in_turns.slug == at_once.slug) == is_same
 
 
 @pytest.mark.parametrize("text", ["every", "direct, Every", "all,every"])
 def test_the_word_every_stands_for_all_settings_and_for_the_harder_ones(text):
-    assert make_plan(["random"], settings=text).settings == ("every",)
+    assert make_plan(["random"], settings=text, **ONE_EPISODE).settings == ("every",)
 
 
-def test_settings_every_adds_the_harder_settings_that_all_leaves_out():
-    """*direct-rival* is harder: a second thing fits the words but for one property.
+@pytest.mark.parametrize(("word", "is_told"), [("all", False), ("every", True)])
+def test_settings_every_adds_the_harder_settings_that_all_leaves_out(word, is_told):
+    """*direct-rival* is harder: a second thing fits the words but for one property."""
+    plan = make_plan(["random"], tasks="BinFill", settings=word, episodes="0-3")
 
-    Of these tasks, StopCube and BinFill, none has spatial instructions.
-    """
-    plan = make_plan(["random"], tasks="StopCube,BinFill", settings="every", episodes="0-3")
+    settings_told = {job.setting for job in plan.jobs()}
 
-    told = set()
-    for job in plan.jobs():
-        told.add(job.setting)
-        assert job.setting in expressible(get_episode(job.task, "test", job.episode))
-    assert told > set(plain_settings()) - {"spatial"}
-    assert "direct-rival" in told
+    assert {"explicit", "direct", "spatial"} <= settings_told
+    assert ("direct-rival" in settings_told) == is_told
 
 
 def test_a_setting_in_turns_is_added_to_its_usual_delivery():
-    """Two episodes of *direct* in turns, next to those at once; explicit has nothing to add."""
-    options = {"tasks": "StopCube", "episodes": "2", "settings": "explicit,direct,reasoning"}
-    usual = make_plan(["random"], **options).jobs()
-    both = make_plan(["random"], in_turns="direct", **options).jobs()
+    plan = make_plan(
+        ["random"], tasks="StopCube", episodes="1", settings="explicit,direct,reasoning",
+        in_turns="direct",
+    )  # fmt: skip
 
-    added = [job for job in both if job not in usual]
+    told = sorted((job.setting, job.options.delivery) for job in plan.jobs())
 
-    assert [(job.setting, job.options.delivery) for job in added] == [("direct", "turns")] * 2
-    assert len(both) == len(usual) + 2
+    assert told == [
+        ("direct", "prompt"),
+        ("direct", "turns"),
+        ("explicit", "prompt"),
+        ("reasoning", "prompt"),
+    ]
+
+
+def test_explicit_instructions_in_turns_are_refused():
+    """They are one utterance, so that turns would change nothing."""
     with pytest.raises(UnknownNameError, match="no setting in turns 'explicit'"):
-        make_plan(["random"], in_turns="explicit", **options)
+        make_plan(["random"], in_turns="explicit")
 
 
 def test_an_episode_that_lacks_what_a_setting_needs_is_left_out():
     """*direct-rival* needs a second thing that nearly fits the words."""
-    options = {"tasks": "BinFill", "settings": "explicit,direct-rival", "episodes": "0-7"}
+    plan = make_plan(
+        ["random"], tasks="BinFill", settings="explicit,direct-rival", episodes="0-7"
+    ).checked()
 
-    jobs = make_plan(["random"], **options).checked().jobs()
+    episodes = {"explicit": [], "direct-rival": []}
+    for job in plan.jobs():
+        episodes[job.setting].append(job.episode)
+    assert episodes["explicit"] == [0, 1, 2, 3, 4, 5, 6, 7]
+    assert 0 < len(episodes["direct-rival"]) < 8
 
-    with_rival = [job.episode for job in jobs if job.setting == "direct-rival"]
-    assert 0 < len(with_rival) < 8
-    assert [job.episode for job in jobs if job.setting == "explicit"] == list(range(8))
+
+def test_a_plan_whose_setting_fits_none_of_its_episodes_is_refused():
+    """*grounded* asks where a thing is, which the scene of this episode does not hide."""
     with pytest.raises(InvalidValueError, match="nothing to play: grounded cannot"):
-        make_plan(["random"], tasks="PickXtimes", settings="grounded", episodes="1").checked()
+        make_plan(["random"], settings="grounded", **ONE_EPISODE).checked()
 
 
 def test_settings_of_a_list_are_played_in_its_order():
@@ -254,67 +295,71 @@ def test_a_setting_in_a_list_that_a_task_lacks_is_refused_with_what_plays_the_re
         ("long_prompts", "refuse"),
     ],
 )  # fmt: skip
-def test_what_the_help_of_an_option_names_is_a_value_of_it(option, typed):
-    """Help said "implicit, resolved or both", and both was refused."""
+def test_a_value_that_the_help_of_an_option_names_is_accepted(option, typed):
+    """The help of ``--forms`` once said "implicit, resolved or both", and both was refused."""
     assert make_plan(["random"], tasks="PickXtimes", settings="explicit", **{option: typed})
 
 
-def test_both_forms_are_the_two_that_there_are():
-    made = make_plan(["random"], tasks="PickXtimes", settings="direct", forms="both")
-    assert made.forms == ("implicit", "resolved")
+def test_both_forms_are_implicit_and_resolved():
+    plan = make_plan(["random"], tasks="PickXtimes", settings="direct", forms="both")
+    assert plan.forms == ("implicit", "resolved")
 
 
-def test_episodes_are_played_in_the_given_order_with_explicit_words_last_in_each_scene():
+def test_policies_tasks_and_episodes_are_played_in_the_order_in_which_they_are_given():
+    plan = make_plan(
+        ["random", "oracle"], tasks="VideoUnmask,BinFill", settings="explicit", episodes="3,0"
+    )
+
+    assert [(job.policy, job.task, job.episode) for job in plan.jobs()] == [
+        ("random", "VideoUnmask", 3), ("random", "VideoUnmask", 0),
+        ("random", "BinFill", 3), ("random", "BinFill", 0),
+        ("oracle", "VideoUnmask", 3), ("oracle", "VideoUnmask", 0),
+        ("oracle", "BinFill", 3), ("oracle", "BinFill", 0),
+    ]  # fmt: skip
+
+
+def test_plain_words_come_last_in_each_scene():
     """So that no policy hears a scene's goal in plain words before it had to work it out.
 
-    Plain are explicit words, and the *resolved* form, in which references are spelled out. False
-    is before True in what is compared: random before oracle, VideoUnmask before BinFill, episode 3
-    before 0.
+    Plain are explicit words, and the *resolved* form, in which references are spelled out.
     """
-    jobs = make_plan(
-        ["random", "oracle"], tasks="VideoUnmask,BinFill", episodes="3,0", policy_seeds="2,0",
+    plan = make_plan(
+        ["random"], tasks="BinFill", settings="explicit,direct", episodes="3,0",
         forms="resolved,implicit",
-    ).jobs()  # fmt: skip
+    )  # fmt: skip
 
-    order = []
-    for job in jobs:
-        is_plain = job.setting == "explicit" or job.form == "resolved"
-        order.append((job.policy == "oracle", job.task == "BinFill", job.episode == 0, is_plain))
-    assert order == sorted(order)
-    assert len({job.slug for job in jobs}) == len(jobs)
+    assert [(job.episode, job.setting, job.form) for job in plan.jobs()] == [
+        (3, "direct", "implicit"),
+        (3, "explicit", "implicit"),
+        (3, "direct", "resolved"),
+        (0, "direct", "implicit"),
+        (0, "explicit", "implicit"),
+        (0, "direct", "resolved"),
+    ]
 
 
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
         ({"tasks": "PickXtime"}, r"no task 'PickXtime'.*Did you mean 'PickXtimes'\?"),
-        ({"settings": "contextal"}, r"no setting 'contextal'.*Did you mean 'contextual'\?"),
         ({"split": "tests"}, r"no split 'tests'.*Did you mean 'test'\?"),
-        ({"forms": "resolve"}, r"no form 'resolve'.*Did you mean 'resolved'\?"),
         ({"episodes": "0,50,3"}, r"no episode 50: split 'test' has episodes 0 to 49"),
         ({"video": "on"}, r"video is 'on'; it must be 'off', 'failures' or 'all'"),
-        ({"retry_on": "none,policy"}, r"no kind of error 'none'"),
         ({"stages": "2,5"}, r"stages \(2, 5\)"),
-        ({"distractor": "loud"}, r"no distractor 'loud'"),
         ({"frame": "world"}, r"no frame 'world'"),
         ({"settings": "explicit", "delivery": "turn"}, r"no delivery 'turn'.*'turns'"),
         ({"settings": "direct-rivals"}, r"no setting 'direct-rivals'.*'direct-rival'"),
         ({"max_steps": 0}, r"max_steps is 0; it must be a whole number from 1 to 1,000,000,000"),
-        ({"max_steps": 10**22}, r"max_steps is 10{22}; it must be a whole number from 1"),
         ({"tries": 10**22}, r"tries is 10{22}; it must be at most 1000000000"),
         ({"policy_seeds": 10**22}, r"'10{22}' is not a valid policy seed"),
         ({"max_cost": math.inf}, r"max_cost is inf; it must be a finite number"),
         ({"cluster": {"memory_gb": 1e300}}, r"memory_gb is 1e\+300; it must be at most 1000000000"),
         ({"max_steps": True}, r"max_steps is 'True'; it must be a whole number"),
-        ({"policy_timeout_s": True}, r"policy_timeout_s is 'True'; it must be a number"),
         ({"tasks": None}, r"No task was given"),
-        ({"forms": []}, r"No form was given"),
         ({"episodes": []}, r"No episode was given"),
         ({"episodes": [True]}, r"'True' is not a valid episode"),
         ({"episodes": 2.0}, r"'2.0' is not a valid episode"),
-        ({"devices": ""}, r"No device was given"),
         ({"max_steps": "many"}, r"max_steps is 'many'"),
-        ({"max_steps": "1_0"}, r"max_steps is '1_0'; write the number without underscores"),
         ({"max_cost": "1_0.5"}, r"max_cost is '1_0.5'; write the number without underscores"),
         ({"max_steps": 9, "environment": {"max_steps": 8}},
          r"max_steps is 9, but stands in environment, too"),
@@ -330,43 +375,42 @@ def test_a_plan_with_an_impossible_option_is_refused_with_the_reason(options, se
     ["tasks", "settings", "in_turns", "forms", "episodes", "policy_seeds", "arms", "stages",
      "devices", "policy_env", "retry_on"],
 )  # fmt: skip
-@pytest.mark.parametrize("given", [{"1-5": 3}, {1: 3}, {}], ids=str)
-def test_a_mapping_where_a_list_belongs_is_refused(name, given):
+def test_a_mapping_where_a_list_belongs_is_refused(name):
     """As a list, its keys would be taken, and its values lost."""
-    with pytest.raises(InvalidValueError, match=r"\{.*\} is not a valid .*; write a list"):
-        make_plan(["random"], **{name: given})
+    with pytest.raises(InvalidValueError, match=r"\{'1-5': 3\} is not a valid .*; write a list"):
+        make_plan(["random"], **{name: {"1-5": 3}})
 
 
-def test_a_plan_takes_numbers_and_arrays_of_numpy():
-    options = {"tasks": "PickXtimes", "settings": "explicit"}
-    plan = make_plan("random", episodes=np.int64(2), max_steps=np.int32(60), **options)
+@pytest.mark.parametrize(
+    ("given", "episodes"),
+    [(np.int64(2), (0, 1)), (np.arange(1, 3), (1, 2))],
+    ids=["count", "array"],
+)
+def test_a_plan_takes_numbers_and_arrays_of_numpy(given, episodes):
+    plan = make_plan("random", tasks="PickXtimes", settings="explicit", episodes=given)
+    assert plan.episodes == episodes
 
-    assert (plan.episodes, plan.environment.max_steps) == ((0, 1), 60)
-    assert make_plan("random", episodes=np.arange(1, 3), **options).episodes == (1, 2)
 
-
-ANY_NUMBERS = st.integers(-(10**25), 10**25) | st.integers(-2, 200) | st.floats() | st.booleans()
-
-
-@given(
-    st.dictionaries(
-        st.sampled_from([
-            "max_steps", "observe_every", "demonstration_frames", "policy_seeds", "tries", "batch",
-            "policy_timeout_s", "episode_timeout_s", "max_cost", "devices", "distractors",
-        ]),
-        ANY_NUMBERS | ANY_NUMBERS.map(str),
-        min_size=1,
-        max_size=3,
-    )
+OPTIONS_WITH_NUMBERS = st.dictionaries(
+    st.sampled_from([
+        "max_steps", "observe_every", "demonstration_frames", "policy_seeds", "tries", "batch",
+        "policy_timeout_s", "episode_timeout_s", "max_cost", "devices", "distractors",
+    ]),
+    st.integers(-(10**25), 10**25) | st.integers(-2, 200) | st.floats() | st.booleans(),
+    min_size=1,
+    max_size=3,
 )  # fmt: skip
+
+
+@given(OPTIONS_WITH_NUMBERS)
 @example({"max_steps": 10**9, "policy_seeds": 10**18 - 1, "max_cost": 1e308})
 @settings(deadline=None)
 def test_a_plan_with_any_numbers_is_refused_or_read_back_as_it_was_written(numbers):
-    usual = {"tasks": "PickXtimes", "settings": "explicit", "episodes": 1}
     try:
-        plan = make_plan("random", **usual, **numbers)
+        plan = make_plan("random", tasks="PickXtimes", settings="explicit", episodes=1, **numbers)
     except InvalidValueError:
         return
+
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_plan(plan, folder)
@@ -378,19 +422,19 @@ def test_a_plan_with_any_numbers_is_refused_or_read_back_as_it_was_written(numbe
 def test_commas_separate_policies_but_not_the_servers_of_one_policy():
     specs = ["random,oracle", "mme-vla://a:8001,b:8001?history=no", "random"]
     assert parse_policies(specs) == ("random", "oracle", "mme-vla://a:8001,b:8001?history=no")
+
+
+def test_no_policy_at_all_is_refused():
     with pytest.raises(InvalidValueError, match="No policy was given"):
         parse_policies([])
 
 
 def test_name_equals_spec_gives_a_policy_a_name():
-    address = "mme-vla://localhost:8001?history=no"
+    spec = "mme-vla://localhost:8001?history=no"
 
-    plan = make_plan([f"pi0.5={address}", "oracle"], tasks="StopCube", episodes="1")
+    (policy,) = make_plan([f"pi0.5={spec}"]).policies
 
-    assert [(policy.name, policy.spec) for policy in plan.policies] == [
-        ("pi0.5", address), ("oracle", "oracle"),
-    ]  # fmt: skip
-    assert plan.jobs()[0].policy == "pi0.5"
+    assert (policy.name, policy.spec) == ("pi0.5", spec)
 
 
 @pytest.mark.parametrize(
@@ -415,29 +459,35 @@ def test_a_policy_name_that_a_shell_or_a_spreadsheet_would_execute_is_refused(po
         make_plan(policy, tasks="PickXtimes", episodes="1")
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["", " ", "NA", "<NA>", "n/a", "#N/A N/A", "null", "nan", "None", "007", "7.0", "1,000", ".5",
-     "1e5", "2.5E-3", "inf", "True", "1.#IND"],
+NAMES_THAT_PANDAS_TAKES_FOR_NO_TEXT = (
+    "", " ", "NA", "<NA>", "#N/A N/A", "nan", "None", "007", "1,000", ".5", "1e5", "inf", "True",
+    "1.#IND",
 )  # fmt: skip
-def test_a_policy_name_that_pandas_would_read_as_missing_or_a_number_is_refused(name, tmp_path):
-    """By plans, and by files of records that come from elsewhere."""
+"""For a missing value, a number or a truth value."""
+
+
+@pytest.mark.parametrize("name", NAMES_THAT_PANDAS_TAKES_FOR_NO_TEXT)
+def test_a_policy_name_that_pandas_would_read_as_missing_or_a_number_is_refused(name):
     with pytest.raises(InvalidValueError, match=f"Policy '{name}' has no valid name for records"):
         make_plan([replace(read_policy("random"), name=name)], tasks="PickXtimes", episodes="1")
 
-    record = make_record(Plan(policies="random", tasks="PickXtimes", episodes=1).jobs()[0])
-    stranger = msgspec.structs.replace(record, policy=name)
+
+@pytest.mark.parametrize("name", ["NA", "007"])
+def test_a_record_whose_policy_name_pandas_would_misread_is_refused(name, tmp_path):
+    """Such a record comes from elsewhere, as no plan admits the name."""
+    (job,) = make_plan("random", settings="explicit", **ONE_EPISODE).jobs()
+    record = msgspec.structs.replace(make_record(job), policy=name)
+
     with pytest.raises(StoreError, match="a missing value"):
-        fill(tmp_path, stranger)
+        fill(tmp_path, record)
 
 
-def test_a_policy_name_that_only_resembles_a_number_is_allowed_and_read_back_from_csv():
-    names = ("e1", "7b", "na1", "pi0.5", "nan-net", "3d", "1e5x")
-    plan = make_plan([f"{name}=random" for name in names], tasks="PickXtimes", episodes="1")
-    assert tuple(policy.name for policy in plan.policies) == names
+@pytest.mark.parametrize("name", ["e1", "7b", "na1", "pi0.5", "nan-net", "3d", "1e5x"])
+def test_a_policy_name_that_only_resembles_a_number_is_allowed_and_read_back_from_csv(name):
+    (policy,) = make_plan([f"{name}=random"], tasks="PickXtimes", episodes="1").policies
+    table = io.StringIO(csv_lines([["name"], [policy.name]]))
 
-    table = csv_lines([["name"], *([name] for name in names)])
-    assert (*pd.read_csv(io.StringIO(table))["name"],) == names
+    assert pd.read_csv(table)["name"].tolist() == [name]
 
 
 @pytest.mark.parametrize("content", ["{", "words", "[]"])
@@ -456,13 +506,14 @@ def test_a_run_that_has_no_plan_file_is_not_reported(tmp_path, caplog):
 
 
 def test_a_setting_named_next_to_all_is_added_for_the_tasks_that_have_it():
-    """*grounded* asks where a thing is; StopCube has no such setting."""
+    """*grounded* asks where a thing is; StopCube has no such setting, and VideoUnmask has."""
     plan = make_plan(
-        ["random"], tasks="StopCube,VideoUnmask", settings="grounded,All", episodes="2"
+        ["random"], tasks="StopCube,VideoUnmask", settings="grounded,All", episodes="1"
     )
-    assert plan.setting_names == (*plain_settings(), "grounded")
 
-    played = {(job.task, job.options.setting) for job in plan.jobs()}
-    assert ("VideoUnmask", "grounded") in played
-    assert ("StopCube", "direct") in played
-    assert ("StopCube", "grounded") not in played
+    settings_of = {"StopCube": set(), "VideoUnmask": set()}
+    for job in plan.jobs():
+        settings_of[job.task].add(job.options.setting)
+    assert plan.setting_names == (*plain_settings(), "grounded")
+    assert settings_of["StopCube"] == {"explicit", "direct", "reasoning", "contextual"}
+    assert "grounded" in settings_of["VideoUnmask"]

@@ -1,7 +1,5 @@
 """Runs in words from outside: plans, jobs, and a real run with worker processes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -48,30 +46,38 @@ def plan_in_words_of(path, **options):
 
 
 def test_each_episode_in_words_of_a_file_has_their_digest_and_the_path(wording_file):
-    """Other words make other episodes; the same words at another path do not."""
-    plan = plan_in_words_of(wording_file)
-    jobs = plan.jobs()
-    assert len(jobs) == 2 * 3
+    """Two episodes in three settings."""
+    jobs = plan_in_words_of(wording_file).jobs()
 
-    (identity,) = {job.options.wordings for job in jobs}
-    assert identity.startswith("test@")
+    assert len(jobs) == 2 * 3
+    (digest,) = {job.options.wordings for job in jobs}
+    assert digest.startswith("test@")
     assert {job.wordings_file for job in jobs} == {str(wording_file)}
 
-    own = make_plan(["random"], tasks="PickXtimes", settings="explicit", episodes="2")
-    assert {(job.options.wordings, job.wordings_file) for job in own.jobs()} == {(None, None)}
 
-    # The same episodes in other words are other episodes; a file may be moved.
-    moved = replace(jobs[0], wordings_file="elsewhere.toml")
-    assert identity_key(moved) == identity_key(jobs[0]) != identity_key(own.jobs()[0])
+def test_episodes_in_other_words_are_other_episodes_and_the_file_may_be_moved(wording_file):
+    job, *_ = plan_in_words_of(wording_file).jobs()
+
+    in_our_words = job.with_options(wordings=None)
+    moved = replace(job, wordings_file="elsewhere.toml")
+
+    assert identity_key(in_our_words) != identity_key(job)
+    assert identity_key(moved) == identity_key(job)
+
+
+def test_episodes_in_the_benchmarks_words_have_neither_a_digest_nor_a_path():
+    plan = make_plan(["random"], tasks="PickXtimes", settings="explicit", episodes="1")
+    (job,) = plan.jobs()
+    assert (job.options.wordings, job.wordings_file) == (None, None)
 
 
 def test_a_stored_plan_is_read_although_its_file_of_words_is_gone(wording_file, tmp_path):
     plan = plan_in_words_of(wording_file)
     write_plan(plan, tmp_path)
+
     wording_file.unlink()
 
     stored = read_plan(tmp_path)
-
     assert stored == plan
     assert stored.jobs() == plan.jobs()
 
@@ -82,19 +88,22 @@ def test_a_plan_stores_the_absolute_path_of_its_file_of_words(wording_file, monk
     assert found.file == str(wording_file)
 
 
-@pytest.mark.usefixtures("no_file_is_open")
-def test_a_worker_reads_the_file_of_words_and_refuses_it_if_it_has_changed(
-    wording_file, monkeypatch
-):
-    job = plan_in_words_of(wording_file).jobs()[0]
-    monkeypatch.setattr(wording_store, "_OPEN", {})
+def test_a_worker_reads_the_file_of_words(wording_file, monkeypatch):
+    job, *_ = plan_in_words_of(wording_file).jobs()
+
+    monkeypatch.setattr(wording_store, "_OPEN", {})  # as in a process that has opened no file
+
     assert instruct_job(job).text.startswith("pick up the ")
+
+
+def test_a_worker_refuses_a_file_of_words_that_has_changed(wording_file, monkeypatch):
+    job, *_ = plan_in_words_of(wording_file).jobs()
 
     monkeypatch.setattr(wording_store, "_OPEN", {})
     wording_file.write_text(FILE_OF_SENTENCES.replace("pick up", "grab"))
-    with pytest.raises(
-        InvalidValueError, match=rf"but the episodes need {job.options.wordings}; put"
-    ):
+
+    words = rf"but the episodes need {job.options.wordings}; put"
+    with pytest.raises(InvalidValueError, match=words):
         instruct_job(job)
 
 
@@ -108,47 +117,60 @@ def test_a_worker_reads_the_file_of_words_and_refuses_it_if_it_has_changed(
         ("tasks = ['PickXtimes']", {}, r"test.toml has the name '';"),
         ("name = 'a'\ntasks = ['PickXtime']", {}, r"test.toml: There is no task 'PickXtime'"),
     ],
+    ids=["task", "goal", "name", "unknown task"],
 )  # fmt: skip
 def test_a_plan_is_refused_if_its_file_of_words_lacks_a_task_a_goal_or_a_name(
     wording_file, content, options, words
 ):
     wording_file.write_text(content)
+
     with pytest.raises(InvalidValueError, match=words):
         plan_in_words_of(wording_file, **options)
+
+
+def test_a_plan_is_refused_if_its_file_of_words_is_not_there(tmp_path):
     with pytest.raises(InvalidValueError, match=r"^The file '.*missing.toml' cannot be "):
-        plan_in_words_of(wording_file.with_name("missing.toml"), **options)
+        plan_in_words_of(tmp_path / "missing.toml")
 
 
 @pytest.mark.usefixtures("no_file_is_open")
 def test_an_episode_in_the_benchmarks_own_words_opens_no_file_of_words(wording_file):
     job = plan_in_words_of(wording_file).jobs()[0].with_options(wordings=None)
-    own = instruct_job(job)
-    assert own.metadata["wordings"] is None
 
     missing = replace(job, wordings_file="missing.toml")
-    assert instruct_job(missing) == own
+
+    assert instruct_job(missing) == instruct_job(job)
+
+
+@pytest.fixture
+def record_in_words_of_file(wording_file):
+    """A record of an episode in words of a file with a template; it has a digest of them."""
+    wording_file.write_text(FILE_WITH_A_TEMPLATE)
+    job, *_ = plan_in_words_of(wording_file).jobs()
+    return begin_record(PreparedJob(job))
 
 
 @pytest.mark.usefixtures("no_file_is_open")
-def test_words_of_a_record_are_compared_with_those_of_its_file_unless_that_is_gone_or_changed(
-    wording_file, monkeypatch
+def test_words_of_a_record_are_compared_with_those_of_its_file(record_in_words_of_file):
+    """Or of none: here with our words of the same task."""
+    ours = words_of("PickXtimes", record_in_words_of_file.pool)
+    in_our_words = replace(record_in_words_of_file, words=ours)
+
+    assert not other_versions(record_in_words_of_file)
+    assert [mismatch.what for mismatch in other_versions(in_our_words)] == [WORDS]
+
+
+@pytest.mark.usefixtures("no_file_is_open")
+@pytest.mark.parametrize("content", [FILE_WITH_A_TEMPLATE.replace("Do", "Move"), None])
+def test_words_of_a_record_are_not_compared_if_its_file_is_gone_or_changed(
+    record_in_words_of_file, wording_file, monkeypatch, content
 ):
-    """A record has a digest of its words. A report can be made without the file."""
-    wording_file.write_text(FILE_WITH_A_TEMPLATE)
-    job = plan_in_words_of(wording_file).jobs()[0]
-    record = begin_record(PreparedJob(job))
-    assert record.words == words_of("PickXtimes", job.pool, wordings=job.options.wordings)
-    assert record.words != words_of("PickXtimes", job.pool)
+    """So that a report can be made without the file."""
+    ours = words_of("PickXtimes", record_in_words_of_file.pool)
+    monkeypatch.setattr(wording_store, "_OPEN", {})
+    wording_file.unlink()
+    if content is not None:
+        wording_file.write_text(content)
 
-    other = replace(record, words=words_of("PickXtimes", job.pool))
-    assert not other_versions(record)
-    assert [mismatch.what for mismatch in other_versions(other)] == [WORDS]
-
-    for text in (FILE_WITH_A_TEMPLATE.replace("Do", "Move"), None):
-        monkeypatch.setattr(wording_store, "_OPEN", {})
-        if text is None:
-            wording_file.unlink()
-        else:
-            wording_file.write_text(text)
-        assert not other_versions(record)
-        assert not other_versions(other)
+    assert not other_versions(record_in_words_of_file)
+    assert not other_versions(replace(record_in_words_of_file, words=ours))

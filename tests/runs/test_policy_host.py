@@ -1,7 +1,5 @@
 """Policies in a process of their own: same records, whoever shares the host, whatever dies."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random
@@ -12,7 +10,6 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
@@ -28,7 +25,6 @@ from selection import slow_but
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies.by_name.finding import read_policy
-from roboirg.records.record import Job
 from roboirg.records.store import read_records
 from roboirg.runs.episode_errors import EpisodeError, EpisodeLostError
 from roboirg.runs.hosting import host_pool, policy_line
@@ -49,16 +45,13 @@ from roboirg.runs.hosting.messages import (
 from roboirg.runs.hosting.policy_child import PolicyChild
 from roboirg.runs.hosting.policy_line import PolicyLine
 from roboirg.runs.hosting.policy_opening import open_policy
-from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_sections import Hosting
 from roboirg.runs.run import ray_machines
-from roboirg.runs.run.executor import Executor, InProcess, LocalProcesses
+from roboirg.runs.run.executor import InProcess, LocalProcesses
 from roboirg.runs.run.ray_machines import MachineAgent, MachineVersions
 from roboirg.runs.run.runner import run_plan
 from roboirg.util.process_guard import descendants
 
-Write = Callable[[str, str], str]
-Host = Callable[[str, str], HostedPolicy]
 NUMBER_OF_KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "8"))
 THREE_POLICIES = tuple(f"hosting_fakes:{name}" for name in ("Dice", "BatchedDice", "Picky"))
 
@@ -71,7 +64,10 @@ def host_pool_of_test():
 
 @pytest.fixture
 def write_policy(tmp_path, monkeypatch):
-    """Return what writes a module of a name with a class ``It``, and returns its spec."""
+    """Return what writes a module of a name with a class ``It``, and returns its spec.
+
+    The module has imported os, pathlib, sys, time, numpy and hostile_policies.
+    """
 
     def write(name, text):
         (tmp_path / f"{name}.py").write_text(
@@ -91,7 +87,8 @@ def begun_policy(host_pool_of_test, write_policy):
     )
 
 
-def records_by_job(plan: Plan, folder: Path, executor: Executor) -> dict[Job, dict[str, Any]]:
+def records_by_job(plan, folder, executor):
+    """Run a plan in worlds without a simulator, and return what its records have in common."""
     folder.mkdir(exist_ok=True)
     run_plan(plan, folder, fake_world_runner(plan, folder), executor)
     return {record.identity: comparable(record) for record in read_records(folder)}
@@ -100,7 +97,7 @@ def records_by_job(plan: Plan, folder: Path, executor: Executor) -> dict[Job, di
 # Arrays
 
 
-def relayed(call: Call) -> Call:
+def relayed(call):
     """Return a call as it arrives at the other end of a line."""
     ours, theirs = socket.socketpair()
     with ours, theirs:
@@ -108,19 +105,29 @@ def relayed(call: Call) -> Call:
         return receive_call(theirs)
 
 
-def test_arrays_of_every_kind_arrive_unchanged_over_two_sockets_and_can_be_written_to():
+@pytest.mark.parametrize(
+    "value",
+    [
+        [{"a": np.arange(6, dtype=np.int16).reshape(2, 3)}, {"a": np.float32(2.5)}],
+        np.zeros((0, 256, 256, 3), np.uint8),
+        np.arange(12.0).reshape(3, 4).T,
+        np.arange(10**6),
+        "pick",
+    ],
+    ids=["nested", "empty", "not contiguous", "large", "text"],
+)
+def test_values_of_every_kind_arrive_unchanged_over_two_sockets(value):
     """Between the world's process and the policy's stands a third: two sockets."""
-    value = {
-        "history": [{"a": np.arange(6, dtype=np.int16).reshape(2, 3)}, {"a": np.float32(2.5)}],
-        "none": np.zeros((0, 256, 256, 3), np.uint8),
-        "turned": np.arange(12.0).reshape(3, 4).T,
-        "large": np.arange(10**6),
-        "text": "pick",
-    }
     found = relayed(relayed(Call("act", value=value))).value
     np.testing.assert_equal(found, value)
 
-    found["turned"][0, 0] = 7.0  # a policy may write into what it gets
+
+def test_a_policy_may_write_into_an_array_that_it_gets():
+    found = relayed(Call("act", value=np.zeros(2))).value
+
+    found[0] = 7.0
+
+    assert found.tolist() == [7.0, 0.0]
 
 
 @pytest.mark.parametrize("value", [object(), np.array([object()]), {"world": FakeWorldRunner}])
@@ -130,67 +137,112 @@ def test_objects_are_not_sent_to_the_process_of_a_policy(value):
         send(socket.socket(), Call("act", value=value))
 
 
-def test_a_policy_in_its_own_process_gets_and_gives_what_it_would_next_to_the_world(
-    host_pool_of_test, write_policy
+def test_a_policy_in_its_own_process_gets_the_instruction_the_video_and_later_utterances(
+    begun_policy,
 ):
-    spec = write_policy(
-        "curious",
+    """It tells in its metadata what it got, in which numbers of NumPy become plain ones."""
+    policy = begun_policy(
+        "notes_what_it_gets",
         """
 class It:
-    observe_every = 4
-    depth = grounded = True  # pixels of subgoals are for privileged policies only
-    prompt_tokens = property(lambda self: 7)
-    def __init__(self, seed=0):
-        self.metadata = {"seed": seed}
     def reset(self, instruction, demonstration):
-        self.metadata["instruction"] = instruction
-        self.metadata["fields"] = list(demonstration)
-        self.video = demonstration["front_rgb"]
-        self.metadata["sum"] = self.video.sum(dtype=np.int64)
-        self.metadata["shape"] = np.array(self.video.shape)
+        video = demonstration["front_rgb"]
+        self.metadata = {"instruction": instruction, "fields": list(demonstration)}
+        self.metadata |= {"sum": video.sum(dtype=np.int64), "shape": np.array(video.shape)}
     def hear(self, text, step):
         self.metadata["heard"] = [text, step]
     def act(self, observation):
-        assert isinstance(observation["history"], tuple)
-        first, *_ = observation["history"]
-        rows = np.full((2, 8), first["front_rgb"].mean())
-        observation["front_rgb"][:] = 0
-        return rows
+        pass
     def usage(self):
         return {"calls": 2, "cost": float("nan")}
 """,
     )
-    policy = HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 5)
-    assert PolicyNeeds.of(policy) == PolicyNeeds(observe_every=4, depth=True, prompt_tokens=7)
+    frames = np.ones((30, 256, 256, 3), np.uint8)
 
-    frames = np.random.default_rng(0).integers(0, 255, (30, 256, 256, 3), np.uint8)
     policy.reset("Pick it.", {"front_rgb": frames, "joint_positions": np.zeros((30, 7))})
+    policy.hear("The blue one.", 3)
+
     assert policy.metadata == {
-        "seed": 5,
         "instruction": "Pick it.",
         "fields": ["front_rgb", "joint_positions"],
-        "sum": int(frames.sum(dtype=np.int64)),
+        "sum": 30 * 256 * 256 * 3,
         "shape": [30, 256, 256, 3],
+        "heard": ["The blue one.", 3],
     }
+    assert policy.usage() == {"calls": 2.0}, "what is no finite number is no usage"
+    policy.close()
+    policy.close()  # again does no harm
 
+
+def test_a_policy_in_its_own_process_answers_to_an_observation_and_cannot_change_it(begun_policy):
+    policy = begun_policy(
+        "writes_into_pictures",
+        """
+class It(hostile_policies.Hostile):
+    def act(self, observation):
+        assert isinstance(observation["history"], tuple)
+        observation["front_rgb"][:] = 0
+        return np.full((2, 8), observation["history"][0]["front_rgb"].mean())
+""",
+    )
     picture = np.full((256, 256, 3), 9, np.uint8)
-    observation: Any = {"front_rgb": picture, "history": ({"front_rgb": picture},)}
-    assert np.array_equal(policy.act(observation), np.full((2, 8), 9.0))
-    assert picture.all()  # the world's own is untouched
+    policy.reset("Pick it.", {})
 
-    policy.hear("The blue one.", 3)
-    assert policy.metadata["heard"] == ["The blue one.", 3]
-    assert policy.usage() == {"calls": 2.0}
+    actions = policy.act({"front_rgb": picture, "history": ({"front_rgb": picture},)})
 
+    assert np.array_equal(actions, np.full((2, 8), 9.0))
+    assert (picture == 9).all()
     policy.close()
+
+
+def test_needs_and_seed_of_a_policy_in_its_own_process_are_those_that_it_has_there(
+    host_pool_of_test, write_policy
+):
+    """`grounded` is left out: pixels of subgoals are for privileged policies only."""
+    spec = write_policy(
+        "needy",
+        """
+class It(hostile_policies.Hostile):
+    observe_every = 4
+    depth = grounded = True
+    cameras = ("front",)
+    prompt_tokens = property(lambda self: 7)
+    def __init__(self, seed=0):
+        self.metadata = {"seed": seed}
+    def reset(self, instruction, demonstration):
+        pass
+""",
+    )
+
+    policy = HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 5)
+
+    assert PolicyNeeds.of(policy) == PolicyNeeds(
+        observe_every=4, depth=True, prompt_tokens=7, cameras=("front",)
+    )
+    policy.reset("Pick it.", {})
+    assert policy.metadata == {"seed": 5}
     policy.close()
+
+
+class VideoThatNotesWhatIsDrawn(dict[str, Any]):
+    """A video whose pictures are drawn when they are read; `drawn` has their names."""
+
+    def __init__(self):
+        pictures = np.zeros((2, 4, 4, 3), np.uint8)
+        super().__init__(joint_positions=np.zeros((2, 7)), front_rgb=pictures, wrist_rgb=pictures)
+        self.drawn = []
+
+    def __getitem__(self, field):
+        self.drawn.append(field)
+        return super().__getitem__(field)
 
 
 def test_pictures_of_a_video_are_drawn_only_for_a_policy_that_reads_them(
     host_pool_of_test, write_policy
 ):
+    """In its first episode the policy asks for each; in the next all that it read are sent."""
     spec = write_policy(
-        "choosy",
+        "reads_wrist_later",
         """
 class It:
     def reset(self, instruction, demonstration):
@@ -198,34 +250,24 @@ class It:
         self.video = demonstration
         self.metadata = {}
     def act(self, observation):
-        self.video.draw()
+        self.video["wrist_rgb"]
         return np.zeros((1, 8))
 """,
     )
-
-    class Video(dict[str, Any]):
-        drawn: list[str]
-
-        def __getitem__(self, field):
-            self.drawn.append(field)
-            return super().__getitem__(field)
-
-    drawn = []
+    drawn_by_reset = []
 
     for _ in range(2):
-        video = Video(front_rgb=np.zeros((2, 4, 4, 3), np.uint8), joint_positions=np.zeros((2, 7)))
-        video["wrist_rgb"] = video["wrist_depth"] = np.zeros((2, 4, 4, 3), np.uint8)
-        video.drawn = []
+        video = VideoThatNotesWhatIsDrawn()
         policy = HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 0)
         policy.reset("Pick it.", video)
-        drawn.append(list(video.drawn))
-        policy.act({})  # type: ignore[typeddict-item]
+        drawn_by_reset.append(sorted(video.drawn))
+        policy.act({})
         policy.close()
-        assert sorted(video.drawn) == sorted(video)
 
-    assert drawn[0] == ["joint_positions", "front_rgb"]
-    # The second episode knows what the first one read.
-    assert sorted(drawn[1]) == sorted(video)
+    assert drawn_by_reset == [
+        ["front_rgb", "joint_positions"],
+        ["front_rgb", "joint_positions", "wrist_rgb"],
+    ]
 
 
 # Records
@@ -242,28 +284,37 @@ def records_without_a_host(tmp_path_factory):
 def test_records_are_the_same_whatever_the_number_of_workers_or_the_size_of_batches(
     tmp_path, monkeypatch, records_without_a_host, workers, batch
 ):
+    """Some episodes of `Picky` raise: what fails for one of a batch costs only that one.
+
+    BatchedDice and Picky note how many episodes they were asked about at once.
+    """
     monkeypatch.setenv("ROBOIRG_TEST_SIZES", str(tmp_path / "sizes"))
     plan = changed(fake_world_plan("Dice", batch=batch), policies=THREE_POLICIES)
+    executor = InProcess()
+    if workers:
+        executor = LocalProcesses(workers)
 
-    found = records_by_job(
-        plan, tmp_path / "run", LocalProcesses(workers) if workers else InProcess()
-    )
+    found = records_by_job(plan, tmp_path / "run", executor)
 
     assert found == records_without_a_host
     assert {record["outcome"] for record in found.values()} == {"success", "failure", "error"}
-    # What fails for one episode of a batch costs only that one.
-    causes = {record["cause"] for record in found.values() if record["outcome"] == "error"}
-    assert causes == {"policy: ValueError: one of them is bad (hosting_fakes.py, line 187)"}
-
     sizes = [int(line) for line in (tmp_path / "sizes").read_text().split()]
-    assert sum(sizes) == 8 * hosting_fakes.LENGTH / 4
     assert max(sizes) <= min(batch, max(workers, 1))
     if workers > 2:  # of three, two wait while one is asked about
         assert max(sizes) > 1
 
-    # One object, however many worlds there are.
-    batched = [record for record in read_records(tmp_path / "run") if "Batched" in record.policy]
-    assert {record.policy_metadata["made"] for record in batched} == {1}
+
+def test_all_worlds_share_one_object_of_a_batched_policy(host_pool_of_test):
+    """It tells in its metadata how many of it were made."""
+    ref = read_policy("hosting_fakes:BatchedDice")
+    worlds = [HostedPolicy(host_pool_of_test.connect(), ref, seed) for seed in range(3)]
+
+    for world in worlds:
+        world.reset("Pick it.", {})
+
+    assert [world.metadata for world in worlds] == [{"made": 1}] * 3
+    for world in worlds:
+        world.close()
 
 
 def test_a_privileged_policy_runs_in_the_worlds_process_and_reads_its_secret(
@@ -277,57 +328,63 @@ class It:
     def attach(self, env):
         self.env = env
     def reset(self, instruction, demonstration):
-        self.metadata = {"secret": self.env.secret, "process": os.getpid() == os.getppid()}
+        self.metadata = {"secret": self.env.secret, "process": os.getpid()}
     def act(self, observation):
         return np.ones((24, 8))
 """,
     )
-    records_by_job(
-        fake_world_plan(f"privileged:{spec}", 1).checked(), tmp_path / "run", InProcess()
-    )
+    plan = fake_world_plan(f"privileged:{spec}", 1).checked()
+
+    records_by_job(plan, tmp_path / "run", InProcess())
 
     (record,) = read_records(tmp_path / "run")
-
     assert record.privileged
-    assert record.policy == "privileged:insider:It"
-    assert "token" in str(record.policy_metadata["secret"])
+    assert record.policy_metadata["process"] == os.getpid()
+    assert "the goal is the cube" in record.policy_metadata["secret"]
 
 
 def test_worlds_share_one_process_of_a_policy_on_each_device(write_policy):
-    ref = read_policy(
-        write_policy(
-            "located",
-            """
+    spec = write_policy(
+        "located",
+        """
 class It(hostile_policies.Hostile):
     def reset(self, instruction, demonstration):
         self.metadata = {"device": os.environ["CUDA_VISIBLE_DEVICES"], "process": os.getpid()}
 """,
-        )
     )
     with HostPool(Hosting(devices=("0", "3")).settings or HostSettings()) as pool:
-        worlds = [HostedPolicy(pool.connect(), ref, 0) for _ in range(4)]
+        worlds = [HostedPolicy(pool.connect(), read_policy(spec), 0) for _ in range(4)]
         for world in worlds:
             world.reset("Pick it.", {})
         found = [(world.metadata["device"], world.metadata["process"]) for world in worlds]
 
     assert sorted(device for device, _ in found) == ["0", "0", "3", "3"]
-    assert len(set(found)) == 2
+    assert len({process for _, process in found}) == 2
 
 
 # What a policy is
 
 
-def test_policies_of_a_users_code_get_a_process_and_built_in_ones_and_servers_do_not(tmp_path):
+@pytest.mark.parametrize(
+    ("spec", "is_hosted", "is_foreign"),
+    [
+        ("somewhere:Mine", True, True),
+        ("system:{folder}/mine.toml", True, True),
+        ("lerobot://some/checkpoint", True, False),
+        ("oracle", False, False),
+        ("openpi://localhost:1", False, False),
+        ("system:GroundSG-QwenVL", False, False),
+    ],
+)
+def test_policies_of_a_users_code_get_a_process_and_built_in_ones_and_servers_do_not(
+    tmp_path, spec, is_hosted, is_foreign
+):
     """*Hosted* ones get a process; *foreign* is code that is not of this package."""
     (tmp_path / "mine.toml").write_text('name = "mine"\npolicy = "somewhere:Mine"\n')
-    foreign = ["somewhere:Mine", f"system:{tmp_path}/mine.toml"]
-    ours = ["oracle", "random", "openpi://localhost:1", "system:GroundSG-QwenVL"]
 
-    assert [read_policy(spec).is_foreign for spec in foreign] == [True, True]
-    assert [read_policy(spec).is_hosted for spec in foreign] == [True, True]
-    assert not any(read_policy(spec).is_hosted for spec in ours)
-    assert read_policy("lerobot://some/checkpoint").is_hosted
-    assert not read_policy("lerobot://some/checkpoint").is_foreign
+    policy = read_policy(spec.format(folder=tmp_path))
+
+    assert (policy.is_hosted, policy.is_foreign) == (is_hosted, is_foreign)
 
 
 def test_a_policy_whose_import_takes_too_long_is_refused(write_policy):
@@ -339,22 +396,34 @@ def test_version_and_needs_of_a_policy_are_read_without_importing_it_here(write_
     spec = write_policy(
         "versioned",
         """
-class It:
-    version = "\\x1b[2J\\u202e\\n-\\ud800" + "7" * 500
+class It(hostile_policies.Hostile):
+    version = "2.1"
     prompt_tokens = 9
     cameras = property(lambda self: ("front",))
-    def reset(self, instruction, demonstration): pass
-    def act(self, observation): pass
 """,
     )
+
     found = open_policy(read_policy(spec))
 
-    assert found.version.startswith(r"\x1b[2J\u202e\n-?77")  # never controls a terminal
-    assert len(found.version) < 220
+    assert found.version == "2.1"
     assert found.needs == PolicyNeeds(prompt_tokens=9, cameras=("front",))
-    assert not found.is_privileged
     assert "versioned" not in sys.modules
-    assert open_policy(read_policy("oracle")).is_privileged
+
+
+def test_a_policys_version_is_shortened_and_its_control_characters_are_escaped(write_policy):
+    """So that it never controls the terminal that it is printed on."""
+    spec = write_policy(
+        "controls_terminals",
+        """
+class It(hostile_policies.Hostile):
+    version = "\\x1b[2J\\u202e\\n-\\ud800" + "7" * 500
+""",
+    )
+
+    version = open_policy(read_policy(spec)).version
+
+    assert version.startswith(r"\x1b[2J\u202e\n-?77")
+    assert len(version) < 220
 
 
 @pytest.mark.parametrize(
@@ -367,28 +436,26 @@ class It:
             "pip it",
         ),
     ],
+    ids=["exit", "missing package"],
 )
 def test_a_policy_that_cannot_be_loaded_is_reported_before_the_run(
     text, error, words, write_policy
 ):
+    plan = fake_world_plan(write_policy("broken", text), 1)
+
     with pytest.raises(error, match=words):
-        fake_world_plan(write_policy("broken", text), 1).checked()
+        plan.checked()
 
 
 # Deaths
 
 
-def child_of(host_pool_of_test: HostPool) -> PolicyChild:
+def child_of(host_pool_of_test):
     (child,) = host_pool_of_test._children.values()
     return child
 
 
-def test_a_crash_of_a_policys_process_is_an_error_only_for_the_episode_that_caused_it(
-    host_pool_of_test, write_policy
-):
-    spec = write_policy(
-        "fragile",
-        """
+CODE_OF_A_POLICY_THAT_DIES_IF_TOLD = """
 class It:
     def reset(self, instruction, demonstration):
         self.word = instruction
@@ -397,37 +464,45 @@ class It:
             print("last words")
             os._exit(7)
         return np.zeros((1, 8))
-""",
-    )
-    good, bad, over, late = (
-        HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 0) for _ in range(4)
-    )
+"""
+
+
+def test_a_crash_of_a_policys_process_is_an_error_only_for_the_episode_that_caused_it(
+    host_pool_of_test, write_policy
+):
+    """The other episodes are lost, and so played again."""
+    ref = read_policy(write_policy("fragile", CODE_OF_A_POLICY_THAT_DIES_IF_TOLD))
+    good, bad, over = (HostedPolicy(host_pool_of_test.connect(), ref, 0) for _ in range(3))
     good.reset("live", {})
     bad.reset("die", {})
 
-    assert good.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
     with pytest.raises(EpisodeError) as guilty:
-        bad.act({})  # type: ignore[typeddict-item]
+        bad.act({})
+
     assert guilty.value.kind == "policy"
     assert str(guilty.value) == "the process ended with exit code 7 in the policy's act()"
-
-    child = child_of(host_pool_of_test)
-    child.check(0.1)
-
-    # Each episode that asks gets the same answer, even after a check.
-    expected = Loss("policy", "the process ended with exit code 7", b"last words\n")
-    assert child.loss() == child.loss() == expected
     with pytest.raises(EpisodeLostError):
-        good.act({})  # type: ignore[typeddict-item]
+        good.act({})
     with pytest.raises(EpisodeLostError):
         over.usage()  # what it has cost is lost
 
-    for policy in (good, bad, over, late):
-        policy.close()
-    again = HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 0)  # in a new process
-    again.reset("live", {})
-    assert again.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
 
+def test_after_a_crash_a_policy_gets_a_new_process(host_pool_of_test, write_policy):
+    ref = read_policy(write_policy("fragile", CODE_OF_A_POLICY_THAT_DIES_IF_TOLD))
+    bad = HostedPolicy(host_pool_of_test.connect(), ref, 0)
+    bad.reset("die", {})
+    with pytest.raises(EpisodeError):
+        bad.act({})
+    # Each episode that asks gets the same answer.
+    child = child_of(host_pool_of_test)
+    expected = Loss("policy", "the process ended with exit code 7", b"last words\n")
+    assert child.loss() == child.loss() == expected
+    bad.close()
+
+    again = HostedPolicy(host_pool_of_test.connect(), ref, 0)
+
+    again.reset("live", {})
+    assert again.act({}).shape == (1, 8)
     again.close()
 
 
@@ -448,36 +523,43 @@ class It(hostile_policies.Hostile):
     world.reset("Pick it.", {})
 
     with pytest.raises(EpisodeLostError, match="exit code 5") as lost:
-        world.act({})  # type: ignore[typeddict-item]
+        world.act({})
     assert lost.value.alone
 
 
-def test_a_policys_process_serves_others_after_a_world_died_or_was_interrupted(
-    host_pool_of_test, monkeypatch
-):
-    """Would find an interrupt that is forgotten, and a worker whose calls are not answered."""
+def test_an_episode_whose_policy_process_cannot_be_started_is_lost(host_pool_of_test, monkeypatch):
+    monkeypatch.setattr(host_pool, "PolicyChild", lambda _environment: os.open("/nonexistent", 0))
 
-    class Video(dict[str, Any]):
+    with pytest.raises(EpisodeLostError, match="could not be started"):
+        HostedPolicy(host_pool_of_test.connect(), read_policy("hosting_fakes:Dice"), 0)
+
+
+def test_an_interrupt_while_a_picture_is_drawn_stops_the_world_and_not_the_policys_process(
+    host_pool_of_test,
+):
+    class InterruptedVideo(dict[str, Any]):
         def __getitem__(self, field):
             raise KeyboardInterrupt
 
-    hosts = host_pool_of_test.connect()
-    ref = read_policy("hosting_fakes:Dice")
-    with monkeypatch.context() as without:
-        without.setattr(host_pool, "PolicyChild", lambda _environment: os.open("/nonexistent", 0))
-        with pytest.raises(EpisodeLostError, match="could not be started"):
-            HostedPolicy(hosts, ref, 0)
-    world = HostedPolicy(hosts, ref, 0)
+    world = HostedPolicy(host_pool_of_test.connect(), read_policy("hosting_fakes:Dice"), 0)
 
     with pytest.raises(KeyboardInterrupt):
-        world.reset("Pick it.", Video(front_rgb=None))
-    assert world.usage() == {}
+        world.reset("Pick it.", InterruptedVideo(front_rgb=None))
 
+    assert world.usage() == {}
     world.close()
+
+
+def test_a_policys_process_serves_other_worlds_after_one_died_in_the_middle_of_a_message(
+    host_pool_of_test,
+):
+    ref = read_policy("hosting_fakes:Dice")
     line = host_pool_of_test.connect()
     HostedPolicy(line, ref, 0)
+
     line.sendall((1000).to_bytes(8, "big") + b"half a message")
     line.close()
+
     HostedPolicy(host_pool_of_test.connect(), ref, 1).close()
 
 
@@ -510,7 +592,7 @@ class It:
     time.sleep(1)
 
     with pytest.raises(EpisodeLostError, match="began no call within 4 s"):
-        worlds[1].act({})  # type: ignore[typeddict-item]
+        worlds[1].act({})
 
     for world in worlds:
         world.close()
@@ -540,14 +622,16 @@ class It(hostile_policies.Hostile):
     late.close()
 
 
-def test_a_process_that_starts_or_waits_for_a_picture_is_not_ended_as_frozen(
-    host_pool_of_test, begun_policy
-):
+def test_a_process_that_is_starting_is_not_ended_as_frozen():
     starting = PolicyChild(os.environ)
-    starting.check(0.01)
-    assert not starting.is_over
 
+    starting.check(0.01)
+
+    assert not starting.is_over
     starting.end()
+
+
+def test_a_process_that_waits_for_a_picture_is_not_ended_as_frozen(host_pool_of_test, begun_policy):
     text = """
 class It(hostile_policies.Hostile):
     def reset(self, instruction, demonstration):
@@ -555,15 +639,14 @@ class It(hostile_policies.Hostile):
 """
     world = begun_policy("viewer", text)
 
-    class Video(dict[str, Any]):
+    class VideoCheckedWhileDrawn(dict[str, Any]):
         def __getitem__(self, field):
             child_of(host_pool_of_test).check(10.0)  # of a world that waits
             return super().__getitem__(field)
 
-    world.reset("Pick it.", Video(front_rgb=np.ones((2, 4, 4, 3), np.uint8)))
+    world.reset("Pick it.", VideoCheckedWhileDrawn(front_rgb=np.ones((2, 4, 4, 3), np.uint8)))
 
-    assert world.metadata == {"sum": 96}
-
+    assert world.metadata == {"sum": 2 * 4 * 4 * 3}
     world.close()
 
 
@@ -581,7 +664,7 @@ def test_the_time_that_the_world_takes_to_draw_is_not_that_of_the_policy(monkeyp
             for message in (Begun(), Question(("front_rgb",)), Outcome(message="done")):
                 send(process, message)
 
-            def draw(question: Question) -> Call:
+            def draw(question):
                 seconds[0] += 1000.0
                 return Call("answer", value=question.fields)
 
@@ -594,6 +677,7 @@ def test_the_time_that_the_world_takes_to_draw_is_not_that_of_the_policy(monkeyp
 def test_a_frozen_process_is_noticed_although_it_had_sent_many_answers_in_advance(
     host_pool_of_test, begun_policy
 ):
+    """Its answers to *are you alive?*: "!", a thousand times."""
     text = """
 class It(hostile_policies.Hostile):
     def reset(self, instruction, demonstration):
@@ -605,8 +689,8 @@ class It(hostile_policies.Hostile):
     os.kill(pid, signal.SIGSTOP)
 
     child_of(host_pool_of_test).check(0.1)
-    assert child_of(host_pool_of_test).is_over
 
+    assert child_of(host_pool_of_test).is_over
     world.close()
 
 
@@ -637,47 +721,50 @@ class It(hostile_policies.Hostile):
     world._line._limit_s = 0.5
     for name, seconds in (("DRAW_S", 1.0), ("MARGIN_S", 60.0)):
         monkeypatch.setattr(f"roboirg.runs.hosting.policy_child.{name}", seconds)
-    picture: Any = {"front_rgb": np.zeros((2000, 2000, 3), np.uint8)}
+    picture = {"front_rgb": np.zeros((2000, 2000, 3), np.uint8)}
 
     with pytest.raises(EpisodeError, match=r"did not begin the policy's act.., though"):
         world.act(picture)
 
 
-def test_a_message_that_arrives_byte_by_byte_is_ended_at_the_time_limit_of_a_call(
-    host_pool_of_test, write_policy
-):
+def test_a_message_that_arrives_byte_by_byte_is_ended_at_the_time_limit_of_a_call(begun_policy):
     text = """
-from roboirg.runs.hosting import host_process
-from roboirg.runs.hosting.messages import Outcome, send
-head = (1000).to_bytes(8, "big")
 class It(hostile_policies.Hostile):
     def reset(self, instruction, demonstration):
-        if instruction == "slowly":
-            line = hostile_policies.line_of(hostile_policies.host_of(sys._getframe()))
-            line.sendall(head)
-            while True:
-                time.sleep(0.1)
-                line.sendall(b"0")
-        def reply(line, message):
-            send(line, message)
-            if isinstance(message, Outcome):
-                line.sendall(head)
-        host_process.send = reply
+        line = hostile_policies.line_of(hostile_policies.host_of(sys._getframe()))
+        line.sendall((1000).to_bytes(8, "big"))
+        while True:
+            time.sleep(0.1)
+            line.sendall(b"0")
 """
-    ref = read_policy(write_policy("piecemeal", text))
-    early = HostedPolicy(host_pool_of_test.connect(), ref, 0)
-    world = HostedPolicy(host_pool_of_test.connect(), ref, 0)
-    early.reset("too early", {})
-
-    with pytest.raises(EpisodeLostError, match="a message of 1,000 bytes"):
-        early.reset("again", {})
-
+    world = begun_policy("piecemeal", text)
     world._line._limit_s = 0.5
+
     with pytest.raises(EpisodeError, match=r"did not return within 0[.]5 s"):
         world.reset("slowly", {})
 
 
-def host_pids(supervisor: int) -> list[int]:
+def test_a_message_that_begins_before_its_call_loses_the_episode(begun_policy):
+    """It announces 1,000 bytes after the outcome of a call, and sends nothing of them."""
+    text = """
+from roboirg.runs.hosting import host_process
+from roboirg.runs.hosting.messages import Outcome, send
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        def reply(line, message):
+            send(line, message)
+            if isinstance(message, Outcome):
+                line.sendall((1000).to_bytes(8, "big"))
+        host_process.send = reply
+"""
+    world = begun_policy("early", text)
+    world.reset("too early", {})
+
+    with pytest.raises(EpisodeLostError, match="a message of 1,000 bytes"):
+        world.reset("again", {})
+
+
+def host_pids(supervisor):
     """Return the processes that a supervisor started for policies."""
     found = []
     for path in Path("/proc").glob("[0-9]*"):
@@ -693,25 +780,26 @@ def host_pids(supervisor: int) -> list[int]:
 
 @pytest.mark.slow
 def test_a_run_whose_processes_are_killed_at_random_has_the_same_records_in_the_end(tmp_path):
+    """Killed are policies' processes, workers, and the run itself, which is then begun again."""
     folder = tmp_path / "killed"
-    undisturbed = tmp_path / "undisturbed"
     folder.mkdir()
-    expected = records_by_job(hosting_fakes.KILLED_PLAN, undisturbed, InProcess())
+    undisturbed = records_by_job(hosting_fakes.KILLED_PLAN, tmp_path / "undisturbed", InProcess())
     command = [sys.executable, hosting_fakes.__file__, str(folder)]
     rng = random.Random(0)
-    struck = 0
+    kills = 0
+
     child = subprocess.Popen(command)
     for _ in range(NUMBER_OF_KILLS):
         time.sleep(rng.uniform(0.1, 1.5))
         if child.poll() is not None:
             child = subprocess.Popen(command)
             continue
-        worlds = [pid for pid in worker_pids(folder) if is_alive(pid)]
-        victims = rng.choice([host_pids(child.pid), worlds, [child.pid]])
+        workers = [pid for pid in worker_pids(folder) if is_alive(pid)]
+        victims = rng.choice([host_pids(child.pid), workers, [child.pid]])
         for victim in victims[:1]:
             with contextlib.suppress(ProcessLookupError):  # it has just ended
                 os.kill(victim, signal.SIGKILL)
-                struck += 1
+                kills += 1
     child.wait()
     for _ in range(5):  # what ended in an error is played again
         done = subprocess.run(command, check=False)
@@ -720,9 +808,8 @@ def test_a_run_whose_processes_are_killed_at_random_has_the_same_records_in_the_
             break
 
     found = {record.identity: comparable(record) for record in read_records(folder)}
-
-    assert found == expected
-    assert struck
+    assert found == undisturbed
+    assert kills > 0
     assert not any(map(is_alive, worker_pids(folder)))
 
 
@@ -745,7 +832,7 @@ class It:
     )
     monkeypatch.setattr("roboirg.runs.play.rollout.MAX_LOSSES", 2)
     plan = fake_world_plan(spec, 1)
-    runner: FakeWorldRunner = fake_world_runner(plan, tmp_path, seconds=2.0)
+    runner = fake_world_runner(plan, tmp_path, seconds=2.0)
 
     (record,) = InProcess().run(deque(plan.jobs()), runner)
 
@@ -754,14 +841,11 @@ class It:
     assert "last words" in capfd.readouterr().err  # in a worker, of the episode's log
 
 
-def test_a_worker_is_served_while_idle_clients_may_still_send_their_key(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_worker_is_served_while_idle_clients_may_still_send_their_key(tmp_path, monkeypatch):
     """On a machine of a Ray cluster, where they may be silent for longer than this test lasts."""
     monkeypatch.setattr(ray_machines, "KEY_S", 3600.0)
     agent = MachineAgent(tmp_path / "agent", HostSettings())
     address = agent.check(MachineVersions(())).hosts
-    assert address is not None
 
     with socket.socket(socket.AF_UNIX) as idle:
         idle.connect(address.path)

@@ -1,7 +1,5 @@
 """No policy reaches the goal, the next policy or the run; what it breaks is its own."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import re
@@ -12,7 +10,6 @@ import tempfile
 import time
 from collections import deque
 from pathlib import Path
-from typing import Any
 
 import hostile_policies
 import pytest
@@ -24,13 +21,11 @@ from roboirg.cli.options import add_working_directory
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.records.episode_log import logged_slugs
-from roboirg.records.record import Record
 from roboirg.records.record_codec import StoreError, encode, read_record
 from roboirg.records.store import read_records
 from roboirg.runs.episode_errors import EpisodeError, Terminated
 from roboirg.runs.hosting.host_pool import HostPool, HostSettings
 from roboirg.runs.hosting.hosted_policy import HostedPolicy
-from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.play.call_guard import attribute_errors
 from roboirg.runs.run.executor import InProcess, LocalProcesses
@@ -39,23 +34,25 @@ from roboirg.tasks.splits.private_splits import SALT_VARIABLE
 from roboirg.util.process_guard import descendants
 
 HONEST_POLICY = "hosting_fakes:Dice"
+on_linux = pytest.mark.skipif(
+    sys.platform != "linux", reason="subreapers and /proc are those of Linux"
+)
 
 
-def records_of_each_policy(
-    folder: Path, names: tuple[str, ...], episodes: int = 2, **options: Any
-) -> dict[str, list[Record]]:
-    """Play some episodes of each policy, and of an honest one between and after them."""
-    specs = [
-        spec
-        for name in names
-        for spec in (hostile_policies.SPEC(name), f"{name}+1={HONEST_POLICY}")
-    ]
+def records_of_each_policy(folder, names, episodes=2, **options):
+    """Play some episodes of each hostile policy, and of an honest one after it.
+
+    The honest one that comes after ``Leaker`` is called ``Leaker+1``.
+    """
+    specs = []
+    for name in names:
+        specs += [hostile_policies.SPEC(name), f"{name}+1={HONEST_POLICY}"]
     if episodes == 1:  # what is left behind, not what comes after
         specs = specs[::2]
     plan = changed(fake_world_plan("Dice", episodes), policies=specs, tries=1, **options)
     folder.mkdir()
     run_plan(plan, folder, fake_world_runner(plan, folder), LocalProcesses(1))
-    found: dict[str, list[Record]] = {}
+    found = {}
     for record in read_records(folder):
         found.setdefault(record.policy, []).append(record)
     return found
@@ -74,63 +71,81 @@ def hostile_run(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", hostile_policies.SPOILED)
-def test_a_policy_that_breaks_its_process_loses_its_own_episodes(hostile_run, name):
+@pytest.mark.parametrize(("name", "cause"), hostile_policies.SPOILED.items())
+def test_a_policy_that_breaks_its_process_loses_its_own_episodes(hostile_run, name, cause):
     """Each cheats or breaks something: sends rubbish, closes files, raises an interrupt, ..."""
-    _, found = hostile_run
-    records = found[hostile_policies.SPEC(name)]
+    _, records = hostile_run
 
-    assert len(records) == 2
-    for record in records:
-        assert record.error == "policy", record.cause
-        assert str(record.cause).startswith(hostile_policies.SPOILED[name])
+    spoiled = records[hostile_policies.SPEC(name)]
+
+    assert [record.error for record in spoiled] == ["policy", "policy"]
+    assert spoiled[0].cause.startswith(cause)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", hostile_policies.HARMLESS)
 def test_a_policy_that_cheats_in_vain_fails_as_any_policy(hostile_run, name):
     """As one that searches memory for the goal, or declares itself the winner."""
-    _, found = hostile_run
-    records = found[hostile_policies.SPEC(name)]
-    assert [(record.outcome, record.error) for record in records] == [("failure", None)] * 2
+    _, records = hostile_run
+
+    cheating = records[hostile_policies.SPEC(name)]
+
+    assert [record.outcome for record in cheating] == ["failure", "failure"]
 
 
 @pytest.mark.slow
-def test_an_honest_policy_has_the_same_outcomes_after_a_hostile_one_as_alone(hostile_run, tmp_path):
-    folder, found = hostile_run
+@pytest.mark.parametrize("name", [*hostile_policies.SPOILED, *hostile_policies.HARMLESS])
+def test_an_honest_policy_has_the_same_outcomes_after_a_hostile_one_as_alone(
+    hostile_run, tmp_path, name
+):
+    folder, records = hostile_run
     plan = fake_world_plan("Dice", 2, policy_process="shared")
     alone = InProcess().run(deque(plan.jobs()), fake_world_runner(plan, tmp_path))
-    expected = {record.episode: record.outcome for record in alone}
 
-    for name in (*hostile_policies.SPOILED, *hostile_policies.HARMLESS):
-        honest = found[f"{name}+1"]
-        assert {record.episode: record.outcome for record in honest} == expected, name
-        assert len(honest) == 2
-        assert {record.slug for record in honest}.isdisjoint(logged_slugs(folder))
+    honest = records[f"{name}+1"]
+
+    assert {(record.episode, record.outcome) for record in honest} == {
+        (record.episode, record.outcome) for record in alone
+    }
+    assert {record.slug for record in honest}.isdisjoint(logged_slugs(folder)), "it prints nothing"
 
 
 @pytest.mark.slow
-def test_a_policy_finds_the_goal_in_the_worlds_process_but_not_in_its_own(hostile_run, tmp_path):
-    """It searches every object and frame; the second half shows that its search does find it."""
-    _, found = hostile_run
-    for record in found[hostile_policies.SPEC("Searcher")]:
+def test_a_policy_finds_no_goal_in_its_own_process(hostile_run):
+    """It searches every object and frame."""
+    _, records = hostile_run
+
+    for record in records[hostile_policies.SPEC("Searcher")]:
         assert record.policy_metadata == {"world": False, "job": False, "goal": False}
 
-    beside = hostile_policies.Searcher()
+
+def test_a_policy_that_searches_the_worlds_process_finds_the_goal_there():
+    """Without this, not to find it elsewhere would prove nothing."""
+    searcher = hostile_policies.Searcher()
     job = fake_world_plan("Dice", 2, policy_process="shared").jobs()[0]
-    world = FakeWorld(job)  # both alive while it searches
-    beside.reset(world.secret, {})
-    assert beside.metadata == {"world": True, "job": True, "goal": True}, job
+    world = FakeWorld(job)
+
+    searcher.reset(world.secret, {})
+
+    assert searcher.metadata == {"world": True, "job": True, "goal": True}, job
 
 
 @pytest.mark.slow
-def test_usage_and_output_of_a_policy_are_stored_with_its_own_episodes(hostile_run):
-    folder, found = hostile_run
-    for record in found[hostile_policies.SPEC("Debtor")]:
+def test_impossible_usage_that_a_policy_reports_is_left_out(hostile_run):
+    """It reports costs of −1e300 $, 1e308 calls and 5 tokens."""
+    _, records = hostile_run
+
+    for record in records[hostile_policies.SPEC("Debtor")]:
         assert record.usage == {"input_tokens": 5.0}
 
-    printed = {record.slug for record in found[hostile_policies.SPEC("Printer")]}
-    assert printed <= set(logged_slugs(folder))
+
+@pytest.mark.slow
+def test_what_a_policy_prints_is_in_the_logs_of_its_own_episodes(hostile_run):
+    folder, records = hostile_run
+
+    printing = {record.slug for record in records[hostile_policies.SPEC("Printer")]}
+
+    assert printing <= set(logged_slugs(folder))
 
 
 @pytest.mark.slow
@@ -138,61 +153,79 @@ def test_policies_that_print_or_change_the_folder_leave_the_runs_terminal_and_fo
     tmp_path, monkeypatch, capfd
 ):
     monkeypatch.chdir(tmp_path)
-    records_of_each_policy(
-        tmp_path / "run", (*hostile_policies.SPOILED, *hostile_policies.HARMLESS)
-    )
 
-    assert Path.cwd() == tmp_path
+    records_of_each_policy(tmp_path / "run", ("Printer", "Wanderer", "Leaker", "Closer"))
+
     printed = capfd.readouterr()
+    assert Path.cwd() == tmp_path
     assert printed.out + printed.err == ""
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="there are subreapers on Linux")
-def test_forged_replies_are_errors_of_their_episode_and_processes_of_a_policy_end_with_it(
-    tmp_path, monkeypatch
+def test_forged_replies_are_errors_of_their_episode(tmp_path, monkeypatch):
+    """And make it neither privileged nor another robot's."""
+    monkeypatch.setenv("HOSTILE_NOTES", str(tmp_path))
+
+    records = records_of_each_policy(tmp_path / "run", tuple(hostile_policies.FORGED), episodes=1)
+
+    for name, cause in hostile_policies.FORGED.items():
+        (record,) = records[hostile_policies.SPEC(name)]
+        assert (record.outcome, record.cause[: len(cause)]) == ("error", cause), name
+        assert (record.privileged, record.robot, record.server_version) == (False, None, None)
+
+
+@pytest.mark.slow
+@on_linux
+@pytest.mark.parametrize("name", ["Asker", "Forker", "GuardStopper", "Umlauts"])
+def test_a_policy_that_leaves_processes_or_asks_much_fails_as_any_and_its_processes_end(
+    tmp_path, monkeypatch, name
 ):
     notes = tmp_path / "notes"
     notes.mkdir()
     monkeypatch.setenv("HOSTILE_NOTES", str(notes))
-    names = (*hostile_policies.FORGED, "Asker", "Forker", "GuardStopper", "Umlauts")
-    found = records_of_each_policy(tmp_path / "run", names, episodes=1)
 
-    for name in names:
-        cause = hostile_policies.FORGED.get(name)
-        for record in found[hostile_policies.SPEC(name)]:
-            assert record.outcome == ("failure" if cause is None else "error"), record.cause
-            assert str(record.cause).startswith(cause or ""), record.cause
-            assert (record.privileged, record.robot, record.server_version) == (False, None, None)
-    assert len(list(notes.iterdir())) > 2
+    records = records_of_each_policy(tmp_path / "run", (name,), episodes=1)
 
+    (record,) = records[hostile_policies.SPEC(name)]
+    assert record.outcome == "failure", record.cause
     until = time.monotonic() + 60
     while any(is_alive(int(path.name)) for path in notes.iterdir()):
         assert time.monotonic() < until
         time.sleep(0.1)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="there are subreapers on Linux")
-@pytest.mark.parametrize("name", ["Chain", "OutOfMemory"])
+@on_linux
 def test_processes_that_a_policy_starts_end_with_it_however_fast_they_multiply(
-    tmp_path, monkeypatch, name
+    tmp_path, monkeypatch
 ):
+    """Each starts the next one and exits; all hold a lock, which is free when they have ended."""
     monkeypatch.setenv("HOSTILE_NOTES", str(tmp_path))
+
     with HostPool(HostSettings()) as pool:
-        policy = HostedPolicy(pool.connect(), read_policy(hostile_policies.SPEC(name)), 0)
+        policy = HostedPolicy(pool.connect(), read_policy(hostile_policies.SPEC("Chain")), 0)
         policy.reset("Pick it.", {})
-        if name == "Chain":
-            policy.act({})  # type: ignore[typeddict-item]
-        else:  # the machine's error, not the policy's
-            with pytest.raises(EpisodeError, match="died of signal 9") as killed:
-                policy.act({})  # type: ignore[typeddict-item]
-            assert killed.value.kind == "infrastructure"
+        policy.act({})
+
+    with (tmp_path / "lock").open() as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+@on_linux
+def test_a_policy_that_is_killed_for_memory_is_the_machines_error_and_leaves_no_process(
+    tmp_path, monkeypatch
+):
+    """It is killed as the kernel does; the name of the process that it left is no text."""
+    monkeypatch.setenv("HOSTILE_NOTES", str(tmp_path))
+
+    with HostPool(HostSettings()) as pool:
+        policy = HostedPolicy(pool.connect(), read_policy(hostile_policies.SPEC("OutOfMemory")), 0)
+        policy.reset("Pick it.", {})
+        with pytest.raises(EpisodeError, match="died of signal 9") as killed:
+            policy.act({})
+
+    assert killed.value.kind == "infrastructure"
     (note,) = tmp_path.iterdir()
-    if name == "Chain":
-        with note.open() as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    else:
-        assert not is_alive(int(note.name))
+    assert not is_alive(int(note.name))
 
 
 CODE_OF_A_POLICY_THAT_LOOKS_FOR_SECRETS = """
@@ -202,12 +235,11 @@ import numpy as np
 class It:
     cameras = ()
     def reset(self, instruction, demonstration):
-        self.metadata = dict.fromkeys(os.environ)
-        self.metadata["command lines"] = "without a salt"
+        self.metadata = {"variables": sorted(os.environ), "salt in command lines": False}
         for path in pathlib.Path("/proc").glob("[0-9]*/cmdline"):
             with contextlib.suppress(OSError):  # it has ended meanwhile
                 if b"a very secret salt" in path.read_bytes():
-                    self.metadata["command lines"] = "with the salt"
+                    self.metadata["salt in command lines"] = True
     def act(self, observation):
         return np.ones((24, 8))
 """
@@ -222,40 +254,49 @@ def test_a_policys_process_has_no_keys_or_salt_of_the_environment_unless_the_pla
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "reader.py").write_text(CODE_OF_A_POLICY_THAT_LOOKS_FOR_SECRETS)
     plan = fake_world_plan("reader:It", 1, policy_env="HF_TOKEN").checked()
+
     run_plan(plan, tmp_path / "run", fake_world_runner(plan, tmp_path / "run"), LocalProcesses(1))
 
     (record,) = read_records(tmp_path / "run")
-
     assert record.error is None
-    assert record.policy_metadata["command lines"] == "without a salt"
-    assert {"HF_TOKEN", "TOKENIZERS_PARALLELISM"} <= record.policy_metadata.keys()
-    assert {"OPENAI_API_KEY", "AWS_ACCESS_KEY_ID", SALT_VARIABLE}.isdisjoint(record.policy_metadata)
+    assert record.policy_metadata["salt in command lines"] is False
+    variables = set(record.policy_metadata["variables"])
+    assert {"HF_TOKEN", "TOKENIZERS_PARALLELISM"} <= variables
+    assert not {"OPENAI_API_KEY", "AWS_ACCESS_KEY_ID", SALT_VARIABLE} & variables
+
+
+def test_a_plan_that_names_a_variable_for_policies_that_is_not_set_is_refused():
     with pytest.raises(InvalidValueError, match="NOT_SET_HERE is not set here, so policies cannot"):
-        fake_world_plan("reader:It", 1, policy_env="NOT_SET_HERE").checked()
+        fake_world_plan(HONEST_POLICY, 1, policy_env="NOT_SET_HERE").checked()
 
 
+@pytest.fixture
+def few_open_files():
+    """This process may open some 30 files more."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    used = max(map(int, os.listdir("/dev/fd")))  # noqa: PTH208
+    resource.setrlimit(resource.RLIMIT_NOFILE, (used + 30, hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+@pytest.mark.usefixtures("few_open_files")
 def test_an_honest_policy_plays_alike_with_a_long_path_few_files_and_a_leaking_neighbor(
     tmp_path, monkeypatch
 ):
-    folder = tmp_path / ("long" * 40)
-    folder.mkdir()
-    monkeypatch.setenv("TMPDIR", str(folder))
+    long_folder = tmp_path / ("long" * 40)
+    long_folder.mkdir()
+    monkeypatch.setenv("TMPDIR", str(long_folder))
     monkeypatch.setattr(tempfile, "tempdir", None)
     plan = fake_world_plan("Dice", 2, policy_process="shared")
     alone = InProcess().run(deque(plan.jobs()), fake_world_runner(plan, tmp_path))
 
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    used = max(map(int, os.listdir("/dev/fd")))  # noqa: PTH208
-    resource.setrlimit(resource.RLIMIT_NOFILE, (used + 30, hard))
-    try:
-        beside = records_of_each_policy(tmp_path / "beside", ("Leaker",))["Leaker+1"]
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    after_leaker = records_of_each_policy(tmp_path / "run", ("Leaker",))["Leaker+1"]
 
-    assert unnamed(beside) == unnamed(alone)
+    assert alike_but_for_the_policys_name(after_leaker) == alike_but_for_the_policys_name(alone)
 
 
-def unnamed(records):
+def alike_but_for_the_policys_name(records):
     """Return records without times and the names of their policy, in an order of their own."""
     return sorted((comparable(record) | {"policy": "", "ref": None} for record in records), key=str)
 
@@ -268,66 +309,89 @@ def honest_policy_in_an_episode():
         world = FakeWorld(fake_world_plan("Dice", 1).jobs()[0])
         _, info = world.reset()
         policy.reset("Pick the needle in the haystack.", info["demonstration"])
-        policy.act(world.observation())  # type: ignore[arg-type]
+        policy.act(world.observation())
         yield policy
         policy.close()
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@on_linux
 @pytest.mark.usefixtures("honest_policy_in_an_episode")
 def test_no_socket_of_the_run_accepts_connections():
     """In /proc/net/unix flags that are not 0 mean that a socket listens."""
-    ours = {str(path.readlink()) for path in Path("/proc/self/fd").iterdir() if path.is_socket()}
+    own_sockets = set()
+    for path in Path("/proc/self/fd").iterdir():
+        if path.is_socket():
+            own_sockets.add(str(path.readlink()))
+    assert own_sockets
+
     for line in Path("/proc/net/unix").read_text().splitlines()[1:]:
-        *_, flags, _kind, _state, inode = line.split()[:7]
-        assert f"socket:[{inode}]" not in ours or int(flags, 16) == 0, "it listens"
-    assert ours
+        _slot, _count, _protocol, flags, _kind, _state, inode = line.split()[:7]
+        if f"socket:[{inode}]" in own_sockets:
+            assert int(flags, 16) == 0, f"{inode} listens"
 
 
 def test_each_episode_begins_in_the_runs_folder_although_the_last_one_left_it(
     tmp_path, monkeypatch
 ):
+    """`Wanderer` notes in which folder it is called, and goes to the root folder."""
     monkeypatch.chdir(tmp_path)
     with HostPool(HostSettings()) as pool:
-        for _ in range(2):  # the first one left for elsewhere
+        for _ in range(2):
             policy = HostedPolicy(pool.connect(), read_policy(hostile_policies.SPEC("Wanderer")), 0)
             policy.reset("Pick it.", {})
-            policy.act({})  # type: ignore[typeddict-item]
-            policy.hear("The red one.", 1)
+            policy.act({})
+            policy.hear("The red one.", 1)  # metadata come with its reply
+
             assert policy.metadata == {"before": str(tmp_path)}
             policy.close()
 
 
-def test_a_policys_module_and_its_neighbors_are_imported_only_in_the_policys_process(
-    tmp_path, monkeypatch
-):
-    """Next to it lie files that shadow json, numpy and others; each notes where it is imported."""
+@pytest.mark.parametrize("executor", [LocalProcesses(1), InProcess()], ids=["worker", "here"])
+def test_a_policys_module_is_imported_only_in_its_own_process(tmp_path, monkeypatch, executor):
+    """Once to read its version, and once to play; it notes where it is imported."""
+    (tmp_path / "tattler.py").write_text(
+        "import sys\nimport numpy as np\n"
+        "with open('imports', 'a') as file: file.write(f'{sys.orig_argv}\\n')\n"
+        "class It:\n    cameras = ()\n    def act(self, o): return np.ones((24, 8))\n"
+        "    def reset(self, i, d): self.metadata = {}\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
+    add_working_directory(last=True)
+    plan = make_plan(["tattler:It"], tasks="PickXtimes", settings="direct", episodes="1")
+
+    run_plan(plan, tmp_path / "run", fake_world_runner(plan, tmp_path / "run"), executor)
+
+    command_lines = (tmp_path / "imports").read_text().splitlines()
+    assert len(command_lines) == 2
+    assert "host_process" in command_lines[0]
+    assert "host_process" in command_lines[1]
+
+
+def test_files_next_to_a_policy_shadow_no_module_but_in_its_own_process(tmp_path, monkeypatch):
+    """They are called as json, numpy and others; each notes that it was imported, and raises.
+
+    In the policy's process the folder comes first among the places for modules.
+    """
     for module in ("json", "multiprocessing", "numpy", "roboirg"):
         (tmp_path / f"{module}.py").write_text(
             f"open('imported {module}', 'w').close()\nraise ImportError('shadowed')\n"
         )
-    (tmp_path / "tattler.py").write_text(
-        "import os, sys\nimport numpy as np\n"
-        "with open('imports', 'a') as file: file.write(f'{sys.orig_argv}\\n')\n"
-        "class It:\n    cameras = ()\n    def act(self, o): return np.ones((24, 8))\n"
+    (tmp_path / "neighbor.py").write_text(
+        "import os, sys\nimport numpy as np\nclass It:\n    cameras = ()\n"
+        "    def act(self, o): return np.ones((24, 8))\n"
         "    def reset(self, i, d): self.metadata = {'first': sys.path[0] == os.getcwd()}\n"
     )
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
     add_working_directory(last=True)
-    run = tmp_path / "run"
-    for executor, limit in ((LocalProcesses(1), 99), (InProcess(), 9)):  # versions are compared
-        plan = make_plan(["tattler:It"], tasks="PickXtimes", settings="direct", episodes="1",
-                         max_steps=limit)  # fmt: skip
-        run_plan(plan, run, fake_world_runner(plan, run), executor)
+    plan = make_plan(["neighbor:It"], tasks="PickXtimes", settings="direct", episodes="1")
 
-    imports = (tmp_path / "imports").read_text().splitlines()
+    run_plan(plan, tmp_path / "run", fake_world_runner(plan, tmp_path / "run"), LocalProcesses(1))
 
-    assert len(imports) == 4
-    assert all("host_process" in module for module in imports)
+    (record,) = read_records(tmp_path / "run")
+    assert (record.error, record.policy_metadata) == (None, {"first": True})
     assert not list(tmp_path.glob("imported*"))
-    for record in read_records(run):
-        assert (record.error, record.policy_metadata) == (None, {"first": True})
 
 
 def memory_of(pid, needle):
@@ -349,17 +413,22 @@ def memory_of(pid, needle):
     return False
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@on_linux
 @pytest.mark.usefixtures("honest_policy_in_an_episode")
 def test_the_memory_of_a_policys_process_holds_its_instruction_but_not_the_goal():
-    """Nor has it the terminal. The search is tried on this process, which does know the goal."""
+    """The search is tried on this process, which does know the goal."""
     *_, pid = descendants(os.getpid())
     secret = FakeWorld(fake_world_plan("Dice", 1).jobs()[0]).secret.encode()
 
-    assert memory_of(os.getpid(), secret)  # the search finds what is there
+    assert memory_of(os.getpid(), secret)
     assert memory_of(pid, b"Pick the needle in the haystack.")
     assert not memory_of(pid, secret)
-    assert os.getsid(pid) == pid
+
+
+@pytest.mark.usefixtures("honest_policy_in_an_episode")
+def test_a_policys_process_has_no_terminal():
+    *_, pid = descendants(os.getpid())
+    assert os.getsid(pid) == pid, "it has a session of its own"
 
 
 def test_a_policy_name_that_cannot_be_written_as_utf8_is_refused():
@@ -377,32 +446,37 @@ class CallsFailuresSuccess(FakeWorldRunner):
 
 def test_a_failure_that_was_turned_into_a_success_is_noticed_by_its_cause(tmp_path):
     """A success has no cause; a policy that patches the outcome alone leaves one."""
-    plan: Plan = small_plan(1)
-    run_plan(plan, tmp_path, CallsFailuresSuccess(tmp_path), InProcess())
+    run_plan(small_plan(1), tmp_path, CallsFailuresSuccess(tmp_path), InProcess())
+
     for record in read_records(tmp_path):
-        assert (record.outcome, record.error, record.goals) == ("error", "policy", None)
+        assert (record.outcome, record.error) == ("error", "policy")
         assert record.cause == "policy: a success came with a cause (picked the wrong cube)"
 
-    (honest, *_) = (FakePlay()(job) for job in plan.jobs())
-    line = encode(replace(honest, outcome="success", cause="no"))
+
+def test_a_stored_success_that_has_a_cause_is_refused(tmp_path):
+    record = FakePlay()(small_plan(1).jobs()[0])
+    line = encode(replace(record, outcome="success", cause="no"))
+
     with pytest.raises(StoreError, match="a success has no cause, but there is 'no'"):
         read_record(line, tmp_path, 1)
 
 
-def test_in_the_background_sigterm_ends_the_run_and_an_interrupt_is_the_policys_error(monkeypatch):
+@pytest.mark.parametrize(
+    ("raised", "becomes"), [(Terminated, Terminated), (KeyboardInterrupt, EpisodeError)]
+)
+def test_in_the_background_sigterm_ends_the_run_and_an_interrupt_is_the_policys_error(
+    monkeypatch, raised, becomes
+):
     """There Ctrl-C is ignored (SIG_IGN), so an interrupt can only come from a policy."""
     monkeypatch.setattr(signal, "getsignal", lambda _number: signal.SIG_IGN)
-    with pytest.raises(Terminated), attribute_errors("environment"):
-        raise Terminated
-    with pytest.raises(EpisodeError), attribute_errors("environment"):
-        raise KeyboardInterrupt
+
+    with pytest.raises(becomes), attribute_errors("environment"):
+        raise raised
 
 
 def test_a_policy_that_raises_an_interrupt_in_a_worker_loses_only_its_own_episodes(tmp_path):
-    found = records_of_each_policy(
-        tmp_path / "run", ("Interrupter", "Unspeakable"), policy_process="shared"
-    )
-    for name in ("Interrupter", "Unspeakable"):
-        for record in found[hostile_policies.SPEC(name)]:
-            assert str(record.cause).startswith(hostile_policies.SPOILED[name])
-        assert {record.error for record in found[f"{name}+1"]} == {None}
+    records = records_of_each_policy(tmp_path / "run", ("Interrupter",), policy_process="shared")
+
+    for record in records[hostile_policies.SPEC("Interrupter")]:
+        assert record.cause.startswith("policy: KeyboardInterrupt")
+    assert [record.error for record in records["Interrupter+1"]] == [None, None]

@@ -1,18 +1,13 @@
 """A checkpoint's results are never another's: which version a policy has, and what refuses it."""
 
-from __future__ import annotations
-
 import linecache
 import os
 import sys
-from typing import Any
 
 import pytest
 from hosting_fakes import fake_world_plan, fake_world_runner
-from run_fakes import comparable
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.policy_ref import PolicyRef
 from roboirg.policies.by_name.finding import policy_of, read_policy
 from roboirg.policies.contract.policy_version import file_fingerprint
 from roboirg.policies.opening import opened
@@ -48,7 +43,7 @@ def write_policy_module(tmp_path, monkeypatch):
     monkeypatch.delitem(sys.modules, "checkpointed", raising=False)
     monkeypatch.setenv("CKPT", "7")
 
-    def write_policy(**parts: str) -> PolicyRef:
+    def write_policy(**parts):
         (tmp_path / "checkpointed.py").write_text(code(**parts))
         return read_policy("checkpointed:It", "mine")
 
@@ -59,9 +54,9 @@ def code(**parts):
     return CODE_OF_A_POLICY.format(**{"on_class": "", "made": "pass", "reset": "pass", **parts})
 
 
-def policy_opened_here(**parts: str) -> PolicyRef:
+def policy_opened_here(**parts):
     """Open a class in this process, as a policy's own process does."""
-    namespace: dict[str, Any] = {"__name__": "no_module"}
+    namespace = {"__name__": "no_module"}
     exec(code(**parts), namespace)  # noqa: S102 - as a notebook does
     return open_policy(policy_of(namespace["It"]))
 
@@ -93,28 +88,36 @@ def test_a_policy_may_give_its_version_as_text_number_or_path_when_made_or_reset
 def test_a_run_does_not_go_on_with_another_checkpoint_of_its_policy(
     write_policy_module, tmp_path, monkeypatch
 ):
-    """Nor with one whose version cannot be read; would find results of two under one name."""
+    """Would find results of two checkpoints under one name."""
     write_policy_module(**NUMBER_BEHIND_TEXT)
-    for _ in range(2):  # the same one goes on
-        play_one_episode(tmp_path / "run")
-    before = read_records(tmp_path / "run")
-    assert {record.policy_version for record in before} == {"7.0"}
+    play_one_episode(tmp_path)
 
     monkeypatch.setenv("CKPT", "8")
+
     with pytest.raises(StoreError, match=r"mine whose policy version is 7\.0, but now it is 8\.0"):
-        play_one_episode(tmp_path / "run")
+        play_one_episode(tmp_path)
+    assert [record.policy_version for record in read_records(tmp_path)] == ["7.0"]
+
+
+def test_a_run_does_not_go_on_with_a_policy_whose_version_cannot_be_read(
+    write_policy_module, tmp_path
+):
+    write_policy_module(**NUMBER_BEHIND_TEXT)
+    play_one_episode(tmp_path)
 
     write_policy_module(made="self.version = 'b'", reset="raise KeyError('front')")
+
     with pytest.raises(StoreError, match=r"7.0, but the policy cannot be opened .*KeyError"):
-        play_one_episode(tmp_path / "run")
-    assert list(map(comparable, read_records(tmp_path / "run"))) == list(map(comparable, before))
+        play_one_episode(tmp_path)
 
 
 @pytest.mark.parametrize("value", ["None", "''", "(1, 2)", "True", "object()"])
-def test_a_version_that_is_neither_text_nor_number_is_refused(value):
-    for parts in ({"made": f"self.version = {value}"}, {"on_class": f"version = {value}"}):
-        with pytest.raises(InvalidValueError, match=r"version of It is .*; it must be a text, num"):
-            policy_opened_here(**parts)
+@pytest.mark.parametrize("part", ["made", "on_class"])
+def test_a_version_that_is_neither_text_nor_number_is_refused(part, value):
+    name = {"made": "self.version", "on_class": "version"}[part]
+
+    with pytest.raises(InvalidValueError, match=r"version of It is .*; it must be a text, num"):
+        policy_opened_here(**{part: f"{name} = {value}"})
 
 
 def test_a_policy_whose_version_differs_from_process_to_process_gets_no_verdict(
@@ -144,55 +147,68 @@ def test_making_a_plan_opens_each_policy_once(write_policy_module, tmp_path):
     assert note.read_text() == "Put the red cube on the target."
 
 
-def test_a_policy_whose_version_raises_is_refused_rather_than_taken_for_one_without():
-    for value in ("self.nett.name", 'os.environ["NOT_SET"]'):
-        with pytest.raises(InvalidValueError, match="version of It cannot be read"):
-            policy_opened_here(on_class=f"version = property(lambda self: {value})")
+@pytest.mark.parametrize("value", ["self.nett.name", 'os.environ["NOT_SET"]'])
+def test_a_policy_whose_version_raises_is_refused_rather_than_taken_for_one_without(value):
+    with pytest.raises(InvalidValueError, match="version of It cannot be read"):
+        policy_opened_here(on_class=f"version = property(lambda self: {value})")
 
 
 def test_versions_that_differ_only_in_unprintable_characters_stay_different():
     """They are escaped for records; would find two versions that are escaped alike."""
-    values = (r"'a\n'", r"'a\\n'", r"'a\udc80'", "'a?'")
-    assert (
-        len({policy_opened_here(made=f"self.version = {value}").version for value in values}) == 4
-    )
+    escaped = set()
+    for value in (r"'a\n'", r"'a\\n'", r"'a\udc80'", "'a?'"):
+        escaped.add(policy_opened_here(made=f"self.version = {value}").version)
+
+    assert len(escaped) == 4
+
+
+CODE_OF_POLICIES_WITHOUT_A_VERSION = """
+class Other(It): pass
+class Hands(It):
+    def follow(self, subgoal): pass
+class Slots:
+    __slots__ = ("reports",)
+    def reset(self, instruction, demonstration): pass
+    def plan(self, observation, step): return None
+class Planner(Slots):
+    version = property(lambda self: self.late)
+    def reset(self, instruction, demonstration): self.late = "set late"
+"""
+HANDS = "hands=checkpointed:Hands"
 
 
 def test_policies_without_a_version_differ_by_class_code_and_by_planner_or_hands(
     write_policy_module, tmp_path
 ):
-    """Four policies, before and after their module changed: eight versions."""
+    """Three policies, before and after their module changed: six versions."""
     write_policy_module()
     file = tmp_path / "checkpointed.py"
-    file.write_text(
-        file.read_text()
-        + """
-class Other(It): pass
-class Hands(It):
-    def follow(self, subgoal): pass
-class Planner:
-    version = property(lambda self: self.late)
-    def reset(self, instruction, demonstration): self.late = "set late"
-    def plan(self, observation, step): return None
-class Slots:
-    __slots__ = ("reports",)
-    def reset(self, instruction, demonstration): pass
-    def plan(self, observation, step): return None
-"""
-    )
-    planner = "planner:checkpointed:Planner"
-    hands = "?hands=checkpointed:Hands"
-    specs = ("checkpointed:It", "checkpointed:Other", planner + hands,
-             f"planner:checkpointed:Slots{hands}")  # fmt: skip
-    found = [opened(read_policy(spec)).version for spec in specs]
-    file.write_text(file.read_text() + "\n")  # the code of the class has changed
+    file.write_text(file.read_text() + CODE_OF_POLICIES_WITHOUT_A_VERSION)
+    specs = ("checkpointed:It", "checkpointed:Other", f"planner:checkpointed:Slots?{HANDS}")
 
-    found += [opened(read_policy(spec)).version for spec in specs]
+    before = {opened(read_policy(spec)).version for spec in specs}
+    file.write_text(file.read_text() + "\n")
+    after = {opened(read_policy(spec)).version for spec in specs}
 
-    assert len(set(found)) == 8
-    assert found[2].partition(" + ")[0] == "set late"
-    assert open_policy(read_policy(planner)).version == "set late + scripted hands"
-    assert "unknown" not in "".join(found)
+    assert len(before | after) == 6
+    assert "unknown" not in "".join(before | after)
+
+
+@pytest.mark.parametrize(
+    ("hands", "end"), [("", "scripted hands"), (f"?{HANDS}", "")], ids=["scripted", "of a user"]
+)
+def test_a_hierarchical_policy_has_the_versions_of_planner_and_hands(
+    write_policy_module, tmp_path, hands, end
+):
+    """The planner's is set in its reset."""
+    write_policy_module()
+    file = tmp_path / "checkpointed.py"
+    file.write_text(file.read_text() + CODE_OF_POLICIES_WITHOUT_A_VERSION)
+
+    version = open_policy(read_policy(f"planner:checkpointed:Planner{hands}")).version
+
+    assert version.startswith("set late + ")
+    assert version.endswith(end)
 
 
 def test_a_policy_whose_version_cannot_be_read_cannot_go_on_in_its_run(
@@ -221,7 +237,8 @@ def test_a_run_whose_policy_could_not_be_opened_goes_on_once_it_can(write_policy
     assert record.policy_version != "unknown"
 
 
-def test_the_version_of_a_class_in_this_process_is_read_anew_for_each_run(monkeypatch):
+@pytest.mark.parametrize("checkpoint", ["7", "8"])
+def test_the_version_of_a_class_in_this_process_is_read_when_it_is_opened(monkeypatch, checkpoint):
     """Would find the version of a checkpoint that was loaded for an earlier run."""
 
     class Batched:
@@ -232,21 +249,30 @@ def test_the_version_of_a_class_in_this_process_is_read_anew_for_each_run(monkey
 
         def act_batch(self, states, observations): ...
 
-    for checkpoint in ("7", "8"):
-        monkeypatch.setenv("CKPT", checkpoint)
-        assert open_policy(policy_of(Batched)).version == checkpoint
+    policy = policy_of(Batched)
+    monkeypatch.setenv("CKPT", checkpoint)
+
+    assert open_policy(policy).version == checkpoint
+
+
+def class_of_a_notebook_cell(code, number):
+    """Execute a cell that defines a class ``It``, as IPython does, and return the class."""
+    place = f"<cell {number}>"
+    linecache.cache[place] = len(code), None, code.splitlines(keepends=True), place
+    namespace = {"__name__": "no_module"}
+    exec(compile(code, place, "exec"), namespace)  # noqa: S102 - as a notebook does
+    return namespace["It"]
 
 
 def test_a_policy_class_of_a_notebook_is_another_after_its_cell_was_changed():
     """And the first one again if the change is undone: the version follows from the code."""
-    found = []
-    for value in ("1", "2", "1"):
-        cell = f"class It:\n    def act(self): return {value}\n"
-        place = f"<cell {len(found)}>"
-        linecache.cache[place] = len(cell), None, cell.splitlines(keepends=True), place
-        namespace: dict[str, Any] = {"__name__": "no_module"}
-        exec(compile(cell, place, "exec"), namespace)  # noqa: S102 - as a notebook does
-        found.append(file_fingerprint(namespace["It"]))
+    code = "class It:\n    def act(self): return 1\n"
+    changed = "class It:\n    def act(self): return 2\n"
 
-    assert None not in found
-    assert found[0] == found[2] != found[1]
+    first = file_fingerprint(class_of_a_notebook_cell(code, 1))
+    second = file_fingerprint(class_of_a_notebook_cell(changed, 2))
+    third = file_fingerprint(class_of_a_notebook_cell(code, 3))
+
+    assert first is not None
+    assert first == third
+    assert second not in (first, None)

@@ -1,9 +1,5 @@
 """Private episodes: drawn by a salt, which is written nowhere and which no policy's process has."""
 
-from __future__ import annotations
-
-import itertools
-import os
 import tempfile
 import zipfile
 from pathlib import Path
@@ -42,27 +38,39 @@ def _no_salt(monkeypatch):
     monkeypatch.setenv(SALT_VARIABLE, "")  # so that what a test sets is undone
 
 
-def seeds_of(episodes: int, task: str, split: str) -> list[int]:
+def seeds_of(episodes, task, split):
     return [get_episode(task, split, index).seed for index in range(episodes)]
 
 
 def test_each_salt_draws_episodes_of_its_own_that_are_in_no_public_split():
-    """A salt is a secret text from which the scenes' seeds of a private split follow."""
-    first = use_salt(SALT)
-    assert is_private(first)
-    seeds = {task: seeds_of(4, task, first) for task in find_tasks([ALL])}
-    second = use_salt(OTHER)
-    other_seeds = {task: seeds_of(4, task, second) for task in find_tasks([ALL])}
+    """A salt is a secret text from which the scenes' seeds of a private split follow.
 
-    found = [*itertools.chain(*seeds.values(), *other_seeds.values())]
-    assert len(set(found)) == len(found)
-    # No public seed is as large: 10,000,000 + 100 for each of a million episodes.
-    assert min(found) > 1 << 40
-    assert max(found) < 1 << 53  # a page's script can hold it
+    No public seed is as large: 10,000,000 + 100 for each of a million episodes.
+    """
+    seeds = []
+    for salt in (SALT, OTHER):
+        split = use_salt(salt)
+        for task in find_tasks([ALL]):
+            seeds += seeds_of(4, task, split)
+
+    assert len(set(seeds)) == len(seeds)
+    assert min(seeds) > 1 << 40
+    assert max(seeds) < 1 << 53, "a page's script can hold it"
+
+
+def test_a_salt_draws_the_same_episodes_again_after_another_was_used():
+    split = use_salt(SALT)
+    seeds = seeds_of(4, "PickXtimes", split)
+    use_salt(OTHER)
 
     use_salt(SALT)
-    assert seeds_of(4, "PickXtimes", first) == seeds["PickXtimes"]
-    assert split_size(first) == split_size("random")
+
+    assert is_private(split)
+    assert seeds_of(4, "PickXtimes", split) == seeds
+
+
+def test_a_private_split_has_as_many_episodes_as_the_random_one():
+    assert split_size(use_salt(SALT)) == split_size("random")
 
 
 def test_the_name_and_episodes_of_a_salt_never_change():
@@ -82,27 +90,28 @@ def test_private_episodes_repeat_the_difficulties_and_their_scenes_follow_from_t
 
 
 def test_a_private_episode_takes_the_first_seed_for_which_a_scene_can_be_made():
+    """All seeds before it are rejected: of 30 episodes of this task some need a second try."""
     split = use_salt(SALT)
     task = "VideoPlaceOrder"
-    rejected = 0
+    rejected_seeds = 0
 
     for index in range(30):
         episode = get_episode(task, split, index)
-        tried = 0
-        while private_seed(task, split, index, tried) != episode.seed:
-            seed = private_seed(task, split, index, tried)
+        tries = 0
+        while private_seed(task, split, index, tries) != episode.seed:
             with pytest.raises(SceneRejectedError):
-                make_episode(task, seed, episode.difficulty)
-            tried += 1
-        rejected += tried
+                make_episode(task, private_seed(task, split, index, tries), episode.difficulty)
+            tries += 1
+        rejected_seeds += tries
 
-    assert rejected > 0
+    assert rejected_seeds > 0
 
 
 @pytest.mark.parametrize("salt", ["", OTHER])
-def test_a_private_split_is_refused_without_its_salt_or_with_another(salt):
+def test_a_private_split_is_refused_without_its_salt_or_with_another(monkeypatch, salt):
     split = use_salt(SALT)
-    os.environ[SALT_VARIABLE] = salt
+
+    monkeypatch.setenv(SALT_VARIABLE, salt)
 
     with pytest.raises(MissingSaltError, match=SALT_VARIABLE):
         get_episode("PickXtimes", split, 0)
@@ -111,10 +120,10 @@ def test_a_private_split_is_refused_without_its_salt_or_with_another(salt):
 
 
 def test_a_short_salt_is_refused_without_being_printed():
-    with pytest.raises(InvalidValueError, match="at least 12") as found:
+    with pytest.raises(InvalidValueError, match="at least 12") as caught:
         use_salt("short")
 
-    assert "short" not in str(found.value)
+    assert "short" not in str(caught.value)
     assert known_salt() is None
 
 
@@ -145,28 +154,51 @@ def all_bytes_written_in(folder):
     return b"\n".join(found)
 
 
-def test_results_of_a_private_split_are_shown_merged_and_packed_without_its_salt(tmp_path):
-    """Playing, verifying and showing scenes needs it, and no file that is written contains it."""
-    split = use_salt(SALT)
-    run = tmp_path / "run"
-    run.mkdir()
-    plan = make_plan(["oracle"], tasks="PickXtimes", split=split, episodes="3")
-    fake_run(run, plan)
+@pytest.fixture
+def private_run(tmp_path, monkeypatch):
+    """A run of three private episodes, and its plan; the salt is known no longer."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    plan = make_plan(["oracle"], tasks="PickXtimes", split=use_salt(SALT), episodes="3")
+    fake_run(folder, plan)
+    monkeypatch.setenv(SALT_VARIABLE, "")
+    return folder, plan
 
-    assert "are private" not in write_report(Source(run)).read_text()
 
-    os.environ[SALT_VARIABLE] = ""
-    assert plan.drawable_jobs() == ()
+def test_results_of_a_private_split_are_shown_merged_and_packed_without_its_salt(
+    private_run, tmp_path
+):
+    run, plan = private_run
 
     merge_runs([run], tmp_path / "merged")
     pack_run(run, tmp_path / "run.roboirg.zip")
-    assert f"The episodes of {split} are private" in write_report(Source(run)).read_text()
-
     call("tables", run)
-    for command in (("leaderboard", "verify", run), ("show", "PickXtimes", 0, "--split", split)):
-        with pytest.raises(MissingSaltError):
-            call(*command)
+    page = write_report(Source(run)).read_text()
+
+    assert f"The episodes of {plan.split} are private" in page
+    assert plan.drawable_jobs() == ()
     assert SALT.encode() not in all_bytes_written_in(tmp_path)
+
+
+def test_the_page_of_a_private_split_says_nothing_of_it_if_the_salt_is_known(
+    private_run, monkeypatch
+):
+    run, _ = private_run
+    monkeypatch.setenv(SALT_VARIABLE, SALT)
+
+    assert "are private" not in write_report(Source(run)).read_text()
+
+
+def test_verifying_a_run_of_a_private_split_needs_its_salt(private_run):
+    run, _ = private_run
+    with pytest.raises(MissingSaltError):
+        call("leaderboard", "verify", run)
+
+
+def test_showing_a_private_episode_needs_its_salt(private_run):
+    _, plan = private_run
+    with pytest.raises(MissingSaltError):
+        call("show", "PickXtimes", 0, "--split", plan.split)
 
 
 def test_a_command_neither_prints_nor_writes_the_salt(tmp_path, monkeypatch):
@@ -179,17 +211,18 @@ def test_a_command_neither_prints_nor_writes_the_salt(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_workers_of_a_cluster_get_the_salt_and_write_it_into_no_log(tmp_path):
+    """The cluster was started without it."""
     ray = pytest.importorskip("ray")
     with tempfile.TemporaryDirectory(prefix="ray-") as logs:  # short: sockets are in it
         ray.init(num_cpus=1, log_to_driver=False, include_dashboard=False, _temp_dir=logs)
+        split = use_salt(SALT)
+        plan = make_plan(["oracle"], tasks="PickXtimes", split=split, episodes="1")
         try:
-            split = use_salt(SALT)
-            run = tmp_path / "run"  # the cluster was started without it
-            plan = make_plan(["oracle"], tasks="PickXtimes", split=split, episodes="1")
-            run_plan(plan, run, FakePlay(), RayCluster(1))
+            run_plan(plan, tmp_path, FakePlay(), RayCluster(1))
         finally:
             ray.shutdown()
-        assert {record.split for record in read_records(run)} == {split}
-        written = all_bytes_written_in(Path(logs))
-        assert b"raylet" in written
-        assert SALT.encode() not in written
+        log = all_bytes_written_in(Path(logs))
+
+    assert {record.split for record in read_records(tmp_path)} == {split}
+    assert b"raylet" in log
+    assert SALT.encode() not in log

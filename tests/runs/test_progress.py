@@ -1,72 +1,72 @@
-from __future__ import annotations
-
 import io
 import itertools
-import re
 from types import SimpleNamespace
 
 from msgspec.structs import replace
 from rich.console import Console
 from run_fakes import FakePlay, small_plan
 
-from roboirg.records.record import Record
 from roboirg.runs.run import progress
 from roboirg.runs.run.progress import ConsoleReporter
 
-FOUR_RECORDS = [FakePlay()(job) for job in small_plan(2).jobs()]
+
+def record_of(setting, outcome, **fields):
+    """Return the record of an episode told in a setting, with this outcome."""
+    job = small_plan(1).jobs()[0].with_options(setting=setting)
+    return replace(FakePlay()(job), outcome=outcome, **fields)
 
 
-def printed_report(records: list[Record], *, terminal: bool) -> str:
+FOUR_RECORDS = [
+    record_of("direct", "failure"),
+    record_of("explicit", "success"),
+    record_of("direct", "success"),
+    record_of("explicit", "success"),
+]
+
+
+def printed_report(records, *, terminal):
+    """Return what is printed if 2 of 6 episodes are stored already and these are played."""
     console = Console(file=io.StringIO(), force_terminal=terminal, width=80)
     with ConsoleReporter(console) as reporter:
         reporter.start(6, 2)
         for record in records:
             reporter.advance(record, is_new=record.attempt == 1)
-    return console.file.getvalue()  # type: ignore[attr-defined]
+    return console.file.getvalue()
 
 
 def test_a_terminal_sees_pace_time_left_and_score_in_80_columns():
+    """Of direct one of two was a success, of explicit both."""
     text = printed_report(FOUR_RECORDS, terminal=True)
+
     last = text[text.rindex("episodes") :]
     assert "6/6" in last
     assert "0:00:00 left" in last
     assert "/min" in last
-
-    won = {
-        setting: sum(
-            record.outcome == "success" for record in FOUR_RECORDS if record.setting == setting
-        )
-        for setting in ("direct", "explicit")
-    }
-    assert f"direct {won['direct']}/2 · explicit {won['explicit']}/2" in last
+    assert "direct 1/2 · explicit 2/2" in last
 
 
 def test_outside_a_terminal_each_episode_is_reported_in_one_plain_line():
-    lines = printed_report(
-        [
-            FOUR_RECORDS[0],
-            replace(FOUR_RECORDS[1].with_options(form="resolved"), arm="silent"),
-            *FOUR_RECORDS[2:],
-        ],
-        terminal=False,
-    ).splitlines()
+    lines = printed_report(FOUR_RECORDS, terminal=False).splitlines()
 
     assert lines[0] == "2 of 6 episodes already stored."
-    assert [*lines[1].split()[:6], *lines[2].split()[4:8]] == [
-        "[3/6]", "random", "PickXtimes", "test/0", "direct:", "failure:",
-        "explicit", "(resolved)", "(silent):", "success",
-    ]  # fmt: skip
+    assert lines[1].startswith("[3/6] random PickXtimes test/0 direct: failure:")
+    assert lines[2].startswith("[4/6] random PickXtimes test/0 explicit: success")
     assert "\x1b" not in "".join(lines)
 
 
-def lines_of_six_episodes(workers: int | None) -> list[str]:
+def test_the_line_of_an_episode_names_its_form_and_its_arm():
+    record = replace(record_of("explicit", "success").with_options(form="resolved"), arm="silent")
+    assert "explicit (resolved) (silent): success" in printed_report([record], terminal=False)
+
+
+def lines_of_six_episodes(workers):
     """Return what is printed if 4 of 44 episodes are stored, and six more take 100 s each."""
     console = Console(file=io.StringIO(), width=200)
     with ConsoleReporter(console) as reporter:
         reporter.start(44, 4, workers)
         for _ in range(6):
             reporter.advance(replace(FOUR_RECORDS[0], duration_s=100.0))
-    return console.file.getvalue().splitlines()[1:]  # type: ignore[attr-defined]
+    return console.file.getvalue().splitlines()[1:]
 
 
 def test_the_time_left_is_estimated_from_the_fifth_episode_of_a_run_on():
@@ -97,7 +97,11 @@ def test_a_warning_is_printed_at_once_on_stderr(capsys):
 
 def test_errors_are_counted_apart_and_an_episode_played_again_is_done_once():
     """Two of six were stored; one is played, fails, and is repeated with an error: 3 of 6."""
-    text = printed_report(
-        [FOUR_RECORDS[0], replace(FOUR_RECORDS[0], outcome="error", attempt=2)], terminal=True
-    )
-    assert re.search(r"3/6.*direct 0/1 · errors 1", text[text.rindex("episodes") :], re.DOTALL)
+    failure = record_of("direct", "failure")
+    error = record_of("direct", "error", attempt=2)
+
+    text = printed_report([failure, error], terminal=True)
+
+    last = text[text.rindex("episodes") :]
+    assert "3/6" in last
+    assert "direct 0/1 · errors 1" in last

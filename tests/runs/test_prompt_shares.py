@@ -1,7 +1,5 @@
 """Cut prompts in plans, dry runs, records and reports."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections import Counter
@@ -10,10 +8,9 @@ from pathlib import Path
 import pytest
 from flat_jobs import job_of
 from made_records import make_record
+from page_text import call
 from plan_files import plan_file
-from typer.testing import CliRunner
 
-from roboirg import main
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.planners.systems import all_systems
@@ -25,6 +22,7 @@ from roboirg.runs.plan.plan_file import read_plan_file
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.play.episode_record import audit_record, utterances_at
 from roboirg.runs.play.prompt_shares import (
+    PromptShares,
     audit_job,
     check_prompt,
     prompt_shares,
@@ -60,63 +58,62 @@ def test_every_model_of_the_paper_reads_all_instructions_of_the_papers_plan_to_t
     assert not list(warning_lines(shares))
 
 
-def test_a_dry_run_warns_which_share_of_longer_instructions_a_model_does_not_read():
-    """16 distractors make contextual ones too long for a's 64 tokens, but not for b's 1,000.
-
-    The random policy declares no limit. *Unknown* ones may be cut: 0 or 1 of 2.
-    """
+def test_shares_of_cut_prompts_are_by_policy_and_setting():
+    """16 distractors make contextual ones too long for a's 64 tokens, but not for b's 1,000."""
     plan = make_plan(
         ["a=system:pi0.5", "b=openpi://localhost:1?prompt_tokens=1000", "random"],
-        settings="explicit,contextual",
-        tasks="PickXtimes",
-        distractors=16,
-    )
-    cut, whole, silent = prompt_shares(plan.jobs())
-    assert share_text(cut.settings["contextual"]) == "100 %"
-    assert share_text(cut.settings["explicit"]) == "0 %"
-    assert share_text(whole.settings["contextual"]) == "0 %"
-    assert silent.limit is None
+        settings="explicit,contextual", tasks="PickXtimes", distractors=16,
+    )  # fmt: skip
 
-    line, other = warning_lines(
-        [
-            cut,
-            whole,
-            silent,
-            whole._replace(settings={"direct": Counter(unknown=1, heard=1)}),
-        ]
-    )
-    assert line.startswith("a reads 64 tokens of a prompt")
-    assert line.endswith("contextual 100 %.")
-    assert other.endswith("instructions does not reach it: direct 0–50 %.")
+    a, b, without_limit = prompt_shares(plan.jobs())
+
+    assert share_text(a.settings["contextual"]) == "100 %"
+    assert share_text(a.settings["explicit"]) == "0 %"
+    assert share_text(b.settings["contextual"]) == "0 %"
+    assert without_limit.limit is None
+
+
+@pytest.mark.parametrize(
+    ("settings", "line"),
+    [
+        (
+            {"explicit": Counter(heard=4), "contextual": Counter(cut=4)},
+            r"a reads 64 tokens of a prompt.* contextual 100 %\.",
+        ),
+        (
+            {"direct": Counter(unknown=1, heard=1)},
+            r".*instructions does not reach it: direct 0–50 %\.",
+        ),
+    ],
+    ids=["cut", "may be cut"],
+)
+def test_a_warning_names_the_settings_whose_instructions_are_not_read_to_the_end(settings, line):
+    share = PromptShares("a", LIMIT_OF_64_TOKENS, settings)
+
+    (warning,) = warning_lines([share])
+
+    assert re.fullmatch(line, warning)
 
 
 def test_each_episode_is_counted_by_its_own_words_and_its_policys_limit():
     """The counts are made fast, for groups; here they are compared with one by one.
 
-    Would find a group whose members differ in task, split, form, delivery, arm or limit.
+    Would find a group whose members differ in task, form, delivery, arm or limit.
     """
-    options = {"settings": "explicit,contextual", "forms": "implicit,resolved", "episodes": "0-2"}
-    options |= {"tasks": "StopCube,BinFill", "in_turns": "contextual", "arms": "told,silent"}
-    specs = [f"p{tokens}=openpi://localhost:1?prompt_tokens={tokens}" for tokens in (40, 60, 80)]
-    jobs = [
-        played
-        for split in ("test", "val")
-        for played in make_plan(specs, split=split, **options).jobs()
-    ]
-    shares = prompt_shares(jobs)
+    plan = make_plan(
+        [f"p{tokens}=openpi://localhost:1?prompt_tokens={tokens}" for tokens in (40, 60, 80)],
+        tasks="StopCube,BinFill", settings="explicit,contextual", forms="implicit,resolved",
+        episodes="0-2", in_turns="contextual", arms="told,silent",
+    )  # fmt: skip
+
+    shares = prompt_shares(plan.jobs())
+
+    one_by_one = {share.policy: {} for share in shares}
     limits = {share.policy: share.limit for share in shares}
-
-    each = Counter(
-        (played.policy, played.setting, audit_job(played, limits[played.policy])[1])
-        for played in jobs
-    )
-
-    assert each == {
-        (share.policy, setting, verdict): count
-        for share in shares
-        for setting, verdicts in share.settings.items()
-        for verdict, count in verdicts.items()
-    }
+    for job in plan.jobs():
+        _, verdict = audit_job(job, limits[job.policy])
+        one_by_one[job.policy].setdefault(job.setting, Counter())[verdict] += 1
+    assert one_by_one == {share.policy: share.settings for share in shares}
 
 
 @pytest.mark.parametrize(
@@ -129,7 +126,7 @@ def test_each_episode_is_counted_by_its_own_words_and_its_policys_limit():
     ],
 )
 def test_a_share_of_cut_prompts_is_a_range_if_some_are_unknown(counts, text):
-    assert share_text(Counter(counts)) == text  # type: ignore[arg-type]
+    assert share_text(Counter(counts)) == text
 
 
 @pytest.mark.parametrize(
@@ -146,31 +143,49 @@ def test_utterances_of_the_same_step_are_sent_as_one_message(utterances, steps, 
 
 def test_an_instruction_too_long_as_one_prompt_fits_if_it_comes_in_turns():
     """Each message may have 64 tokens."""
-    at_once = job_with(**LONG_INSTRUCTION)
-    in_turns = job_with(**LONG_INSTRUCTION, delivery="turns")
-    assert audit_job(at_once, LIMIT_OF_64_TOKENS)[1] == "cut"
+    _, at_once = audit_job(job_with(**LONG_INSTRUCTION), LIMIT_OF_64_TOKENS)
+    audit, in_turns = audit_job(job_with(**LONG_INSTRUCTION, delivery="turns"), LIMIT_OF_64_TOKENS)
 
-    audit, verdict = audit_job(in_turns, LIMIT_OF_64_TOKENS)
-    assert verdict == "heard"
+    assert (at_once, in_turns) == ("cut", "heard")
     assert audit.needed[1] < 64
-    assert [len(turn) for turn in instruct_job(in_turns).turns] == list(audit.reached)
 
 
-def test_a_record_notes_how_far_the_prompt_was_read_and_which_mentions_were_lost():
-    """The command stands at the end of the instruction, so it is what is lost."""
+@pytest.fixture
+def record_of_cut_prompt():
+    """The record of an episode whose instruction is longer than 64 tokens."""
     record = make_record(job_with(**LONG_INSTRUCTION), "failure", "because")
     audit_record(record, PreparedJob(job_with(**LONG_INSTRUCTION)), LIMIT_OF_64_TOKENS)
+    return record
 
-    audit = record.prompt
 
-    assert record.prompt_verdict == "cut"
+def test_a_record_notes_how_many_tokens_a_cut_prompt_needed(record_of_cut_prompt):
+    audit = record_of_cut_prompt.prompt
+
+    assert record_of_cut_prompt.prompt_verdict == "cut"
     assert audit.needed[0] == audit.needed[1] > 64
     assert audit.tokenizer == "some.model"
-    # Characters read of each utterance: all of the first, none of the last.
-    assert audit.reached[-1] == 0 < audit.reached[0] == len(record.instruction[0].text)
-    assert record.mentions[-1].utterance == len(record.instruction) - 1
-    assert len(record.mentions) - 1 in audit.lost
-    assert read_record(encode(record), Path(), 1) == record
+    assert read_record(encode(record_of_cut_prompt), Path(), 1) == record_of_cut_prompt
+
+
+def test_a_record_notes_how_far_each_utterance_of_a_cut_prompt_was_read(record_of_cut_prompt):
+    """In characters: all of the first utterance, and none of the last."""
+    first, *_, last = record_of_cut_prompt.prompt.reached
+
+    assert first == len(record_of_cut_prompt.instruction[0].text)
+    assert last == 0
+
+
+def test_a_record_notes_the_mentions_in_what_was_not_read(record_of_cut_prompt):
+    """The last mention is in the command, which stands at the end of the instruction."""
+    last = len(record_of_cut_prompt.mentions) - 1
+
+    assert record_of_cut_prompt.mentions[last].utterance == (
+        len(record_of_cut_prompt.instruction) - 1
+    )
+    assert last in record_of_cut_prompt.prompt.lost
+
+
+def test_episodes_are_the_same_although_their_prompts_were_cut_differently():
     assert not {"prompt", "prompt_verdict"} & set(IDENTITY)
 
 
@@ -181,17 +196,25 @@ def test_a_record_of_a_policy_without_a_declared_limit_is_unknown_not_heard():
 
 def test_utterances_that_were_never_sent_count_neither_as_read_nor_as_lost():
     """The episode ended after the first of several turns. The limit is 3 tokens."""
-    played = job_with(setting="contextual", delivery="turns")
-    prepared = PreparedJob(played)
-    limit = LIMIT_OF_64_TOKENS._replace(tokens=3)
-    record = make_record(played, "failure", "because", instruction=utterances_at(prepared, [0]))
-    audit_record(record, prepared, limit)
+    job = job_with(setting="contextual", delivery="turns")
+    prepared = PreparedJob(job)
+    heard = utterances_at(prepared, heard_steps=[0])
+    record = make_record(job, "failure", "because", instruction=heard)
+
+    audit_record(record, prepared, LIMIT_OF_64_TOKENS._replace(tokens=3))
 
     assert len(record.prompt.reached) == 1 < len(record.instruction)
-    assert all(record.mentions[index].utterance == 0 for index in record.prompt.lost)
+    assert {record.mentions[index].utterance for index in record.prompt.lost} <= {0}
 
-    record.instruction = utterances_at(prepared, [])
-    audit_record(record, prepared, limit)
+
+def test_all_utterances_count_in_an_episode_of_which_no_steps_are_known():
+    job = job_with(setting="contextual", delivery="turns")
+    prepared = PreparedJob(job)
+    heard = utterances_at(prepared, heard_steps=[])
+    record = make_record(job, "failure", "because", instruction=heard)
+
+    audit_record(record, prepared, LIMIT_OF_64_TOKENS)
+
     assert len(record.prompt.reached) == len(record.instruction)
 
 
@@ -205,10 +228,9 @@ def test_long_prompts_refuse_ends_an_episode_before_it_costs_anything(tmp_path):
     record = EpisodeRunner(tmp_path, refuse_long=True)(job)
 
     assert (record.outcome, record.error, record.steps) == ("error", "prompt", 0)
-    said = r"prompt: the instruction needs \d+ to \d+ tokens, .* model reads 64; "
-    assert re.match(said, record.cause)
-    assert record.attribution is None
-    assert record.prompt_verdict == "cut"
+    assert re.match(
+        r"prompt: the instruction needs \d+ to \d+ tokens, .* model reads 64; ", record.cause
+    )
     assert "env_reset" not in record.timings
 
 
@@ -246,12 +268,13 @@ def test_of_a_tokenizer_that_is_a_pipe_the_policy_and_the_file_are_named(tmp_pat
 
 
 def test_a_dry_run_prints_the_share_of_cut_prompts_and_the_policies_without_a_limit(tmp_path):
-    words = ["run", "--dry-run", "--out", str(tmp_path), "--tasks", "PickXtimes"]
-    words += ["--policy", "system:pi0.5", "--policy", "far=openpi://localhost:1"]
-    said = CliRunner().invoke(main.app, [*words, "--plan", plan_file(distractors=16)])
-    assert said.exit_code == 0, said.output
+    printed = call(
+        "run", "--dry-run", "--out", tmp_path, "--tasks", "PickXtimes",
+        "--policy", "system:pi0.5", "--policy", "far=openpi://localhost:1",
+        "--plan", plan_file(distractors=16),
+    )  # fmt: skip
 
-    row = next(line for line in said.output.splitlines() if "64 tokens" in line)
+    (row,) = [line for line in printed.splitlines() if "64 tokens" in line]
     assert "system:pi0.5" in row
     assert "100 %" in row
-    assert "No limit declared (prompt_tokens=N), so cuts are unknown: far." in said.output
+    assert "No limit declared (prompt_tokens=N), so cuts are unknown: far." in printed

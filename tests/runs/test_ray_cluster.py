@@ -1,7 +1,5 @@
 """A real Ray cluster of several nodes on this machine."""
 
-from __future__ import annotations
-
 import socket
 import threading
 import time
@@ -26,7 +24,7 @@ from roboirg.records.store import read_records
 from roboirg.runs.hosting.host_pool import HostSettings
 from roboirg.runs.hosting.hosted_policy import HostedPolicy
 from roboirg.runs.run import ray_machines
-from roboirg.runs.run.executor import InProcess, LocalProcesses
+from roboirg.runs.run.executor import InProcess
 from roboirg.runs.run.ray_cluster import RayCluster
 from roboirg.runs.run.ray_machines import MachineAgent, MachineVersions
 from roboirg.runs.run.runner import run_plan
@@ -58,31 +56,27 @@ def cluster():
 def test_a_cluster_that_loses_a_machine_half_way_gives_the_same_records_as_one_process(
     cluster, tmp_path, records_of_one_process
 ):
+    """Three machines; the episodes from number 2 on wait for a gate that opens after the loss."""
     doomed = cluster.add_node(num_cpus=1)
     cluster.add_node(num_cpus=1)
     ray.init(address=cluster.address, log_to_driver=False)
-    killed = threading.Event()
 
-    def kill():
-        # Until each of the three machines has one of the endless episodes in hand.
+    def lose_a_machine():
+        # Until each of the three machines has one of the waiting episodes in hand.
         while line_count(tmp_path) < 8 or len(players := worker_pids(tmp_path, "waiting")) < 3:
             time.sleep(0.05)
         cluster.remove_node(doomed, allow_graceful=False)
         while all(map(is_alive, players)):  # they outlive their node for a moment
             time.sleep(0.05)
         (tmp_path / "gate").touch()
-        killed.set()
 
-    killer = threading.Thread(target=kill, daemon=True)
+    killer = threading.Thread(target=lose_a_machine, daemon=True)
     killer.start()
-    summary = run_plan(
-        changed(PLAN_OF_TWO_ARMS, tries=3),
-        tmp_path,
-        FakePlayer(tmp_path, gate=tmp_path / "gate", closed=2),
-        RayCluster(),
-    )
+    plan = changed(PLAN_OF_TWO_ARMS, tries=3)
+    player = FakePlayer(tmp_path, gate=tmp_path / "gate", closed=2)
+    summary = run_plan(plan, tmp_path, player, RayCluster())
     killer.join(300)
-    assert killed.is_set()
+
     assert (summary.errors, summary.missing) == ((), 0)
     # The episode that it had in hand was tried again.
     assert line_count(tmp_path) > len(records_of_one_process)
@@ -90,35 +84,41 @@ def test_a_cluster_that_loses_a_machine_half_way_gives_the_same_records_as_one_p
     for record in read_records(tmp_path):
         assert (tmp_path / str(record.video)).read_text() == record.slug
 
-    # What would end every episode ends the run if all machines say so.
+
+def test_a_run_ends_if_no_machine_of_the_cluster_can_render(cluster, tmp_path):
+    ray.init(address=cluster.address, log_to_driver=False)
+
     with pytest.raises(RoboIRGError, match=r"No machine of the Ray cluster.*No Vulkan device"):
-        run_plan(PLAN_OF_TWO_ARMS, tmp_path / "b", FakePlayer(tmp_path, fatal=0), RayCluster(1))
+        run_plan(PLAN_OF_TWO_ARMS, tmp_path, FakePlayer(tmp_path, fatal=0), RayCluster(1))
+
+
+def without_usage(folder):
+    """Return the comparable fields of a run's records, but for their usage."""
+    return [record | {"usage": None} for record in all_comparable(folder)]
 
 
 def test_all_workers_of_a_machine_ask_one_process_for_their_policy(cluster, tmp_path, monkeypatch):
-    """Three workers on two machines, two processes with the policy, which all end with the run."""
+    """Three workers on two machines, two processes with the policy, which all end with the run.
+
+    The policy tells its process as its usage; all else in its records is as on one machine.
+    """
     monkeypatch.syspath_prepend(Path(hosting_fakes.__file__).parent)
     plan = fake_world_plan("Resident", 12)
     local = tmp_path / "local"
     far = tmp_path / "far"
-    for folder in (local, far):
-        folder.mkdir()
-    run_plan(plan, local, fake_world_runner(plan, local), LocalProcesses(2))
+    local.mkdir()
+    far.mkdir()
     cluster.add_node(num_cpus=2)
     ray.init(address=cluster.address, log_to_driver=False)
-    run_plan(
-        plan,
-        far,
-        PatientRunner(far, hosting=plan.hosting.settings, notes=far, wanted=3),
-        RayCluster(),
-    )
 
-    assert [record | {"usage": None} for record in all_comparable(far)] == [
-        record | {"usage": None} for record in all_comparable(local)
-    ]
-    assert len(worker_pids(far)) == 3
+    run_plan(plan, local, fake_world_runner(plan, local), InProcess())
+    runner = PatientRunner(far, hosting=plan.hosting.settings, notes=far, wanted=3)
+    run_plan(plan, far, runner, RayCluster())
+
+    assert without_usage(far) == without_usage(local)
     hosts = {int(record.usage["process"]) for record in read_records(far)}
-    assert len(hosts) == 2  # one on each of the two machines
+    assert len(worker_pids(far)) == 3
+    assert len(hosts) == 2
     for _ in range(600):
         if not any(map(is_alive, hosts)):
             return
@@ -127,10 +127,11 @@ def test_all_workers_of_a_machine_ask_one_process_for_their_policy(cluster, tmp_
 
 
 def test_a_cluster_that_cannot_be_joined_is_reported_in_one_sentence(tmp_path):
+    executor = RayCluster(address="127.0.0.1:1")
+
     with pytest.raises(RoboIRGError, match=r"cluster '127\.0\.0\.1:1' cannot be joined") as caught:
-        run_plan(
-            PLAN_OF_TWO_ARMS, tmp_path, FakePlayer(tmp_path), RayCluster(address="127.0.0.1:1")
-        )
+        run_plan(PLAN_OF_TWO_ARMS, tmp_path, FakePlayer(tmp_path), executor)
+
     assert "\n" not in str(caught.value)
 
 
@@ -139,41 +140,25 @@ def test_a_cluster_with_no_worker_is_refused():
         RayCluster(0)
 
 
-def test_a_silent_client_keeps_no_other_from_the_policy_processes_of_a_machine(
-    tmp_path, monkeypatch
-):
-    monkeypatch.setattr(ray_machines, "KEY_S", 3600.0)
-    hosts = MachineAgent(tmp_path / "agent", HostSettings())
-    address = hosts.check(MachineVersions(())).hosts
-
-    try:
-        with socket.socket(socket.AF_UNIX) as silent:
-            silent.connect(address.path)
-            with address.connect() as line:
-                HostedPolicy(line, read_policy("hosting_fakes:Dice"), 0).close()
-    finally:
-        hosts.close()
-
-
 @pytest.mark.parametrize(
-    ("name", "owner", "ended"),
-    [("{}.pid", 0, True), ("{}.pid", 1, False), ("-{}.pid", 0, False)],
+    ("file", "is_own", "killed"),
+    [("123456.pid", True, [123456]), ("123456.pid", False, []), ("-1.pid", True, [])],
 )
 def test_an_agent_ends_only_processes_that_its_own_user_has_noted(
-    tmp_path, monkeypatch, name, owner, ended
+    tmp_path, monkeypatch, file, is_own, killed
 ):
-    """``-1.pid`` would stand for all processes of the user."""
+    """``-1`` would stand for all processes of the user."""
     folder = tmp_path / "agent"
     folder.mkdir()
-    (folder / name.format(123456)).touch()
-    killed = []
-    monkeypatch.setattr(ray_machines.os, "kill", lambda pid, _signal: killed.append(pid))
-    user = folder.lstat().st_uid + owner
-    monkeypatch.setattr(ray_machines.os, "getuid", lambda: user)
+    (folder / file).touch()
+    owner = folder.lstat().st_uid
+    ended = []
+    monkeypatch.setattr(ray_machines.os, "kill", lambda pid, _signal: ended.append(pid))
+    monkeypatch.setattr(ray_machines.os, "getuid", lambda: owner if is_own else owner + 1)
 
     MachineAgent(folder, None)
 
-    assert killed == ([123456] if ended else [])
+    assert ended == killed
 
 
 def test_only_a_client_with_the_key_reaches_the_policy_processes_of_a_machine(tmp_path):

@@ -1,16 +1,12 @@
 """One bad machine of a Ray cluster costs no record, and is named once."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 from unittest import mock
 
 import pytest
@@ -44,7 +40,7 @@ def cluster(monkeypatch):
     nodes.shutdown()
 
 
-def process_ids_of_actors(cluster: Any, name: str) -> list[int]:
+def process_ids_of_actors(cluster, name):
     """Return the processes of this cluster's actors, as other tests may have clusters, too."""
     raylets = [node.all_processes["raylet"][0].process.pid for node in cluster.list_all_nodes()]
     command = ["pgrep", "-P", ",".join(map(str, raylets)), "-f", f"ray::{name}"]
@@ -52,9 +48,7 @@ def process_ids_of_actors(cluster: Any, name: str) -> list[int]:
     return list(map(int, found.stdout.split()))
 
 
-def act_after_records(
-    folder: Path, count: int, act: Callable[[], object], run_ended: Callable[[], bool] | None = None
-) -> threading.Thread:
+def act_after_records(folder, count, act, run_ended=None):
     """Act in a thread as soon as that many records are stored; never, if the run ends before."""
 
     def run():
@@ -69,43 +63,44 @@ def act_after_records(
     return thread
 
 
-FAULTY_PLAYERS = (
-    (WithoutVulkan, "random", "No Vulkan device can render; install one."),
-    (WithoutModule, "random", "No module named 'needed_here'"),
-    (FakePlayer, "local_policy:Local", "No module named 'their_model'"),
+@pytest.mark.parametrize(
+    ("play", "policy", "fault"),
+    [
+        (WithoutVulkan, "random", "No Vulkan device can render; install one"),
+        (WithoutModule, "random", "No module named 'needed_here'"),
+        (FakePlayer, "local_policy:Local", "No module named 'their_model'"),
+    ],
 )
-
-
 def test_a_machine_that_cannot_play_is_left_out_and_named_once_and_the_others_play_all(
-    cluster, tmp_path
+    cluster, tmp_path, play, policy, fault
 ):
+    """The last episode waits for a gate, which opens when the machine has been left out."""
     cluster.add_node(num_cpus=1, env_vars={BAD_MACHINE: "1"})
-    for number, (play, policy, fault) in enumerate(FAULTY_PLAYERS):
-        folder = tmp_path / str(number)
-        gate = tmp_path / f"left-out-{number}"
-        reporter = mock.Mock(spec=Reporter)
-        reporter.warn.side_effect = lambda text, gate=gate: "left out" in text and gate.touch()
-        plan = changed(small_plan(8, (policy,)), tries=3)
-        player = play(folder, gate=gate, closed=7)  # Ray may start the bad machine's worker late
+    gate = tmp_path / "gate"
+    reporter = mock.Mock(spec=Reporter)
+    reporter.warn.side_effect = lambda text: "left out" in text and gate.touch()
+    plan = changed(small_plan(8, (policy,)), tries=3)
+    player = play(tmp_path, gate=gate, closed=7)
 
-        executor = RayCluster(address=cluster.address)
-        summary = run_plan(plan, folder, player, executor, reporter=reporter)
+    executor = RayCluster(address=cluster.address)
+    summary = run_plan(plan, tmp_path, player, executor, reporter=reporter)
 
-        assert (summary.errors, summary.missing) == ((), 0)
-        assert line_count(folder) == len(plan.jobs())  # nothing that it played was stored
-        warnings = [call.args[0] for call in reporter.warn.call_args_list]
-        (named,) = [text for text in warnings if "left out" in text]
-        assert fault.rstrip(".") in named
+    assert (summary.errors, summary.missing) == ((), 0)
+    assert line_count(tmp_path) == len(plan.jobs())  # nothing that it played was stored
+    warnings = [call.args[0] for call in reporter.warn.call_args_list]
+    (warning,) = [text for text in warnings if "left out" in text]
+    assert fault in warning
 
 
 @pytest.mark.parametrize("actor", ["RemoteWorker", "MachineAgent"])
 def test_a_worker_or_machine_that_freezes_is_ended_and_its_episode_played_elsewhere(
     cluster, tmp_path, monkeypatch, actor
 ):
+    """It is stopped after four episodes; the last one waits until its process has been ended."""
     monkeypatch.setattr(ray_pool, "BEAT_S", 1.0)
     monkeypatch.setattr(ray_pool, "SILENCE_S", 300.0)
     cluster.add_node(num_cpus=1)
-    frozen: list[int] = []
+    frozen = []
 
     def freeze():
         frozen.append(process_ids_of_actors(cluster, actor)[0])
@@ -114,10 +109,8 @@ def test_a_worker_or_machine_that_freezes_is_ended_and_its_episode_played_elsewh
         os.kill(frozen[0], signal.SIGSTOP)
 
     play = FakePlayer(tmp_path, 0.5, gate=tmp_path / "gate", closed=7)
-    run = threading.Thread(
-        target=run_plan,
-        args=(PLAN_OF_16_EPISODES, tmp_path, play, RayCluster(address=cluster.address)),
-    )
+    executor = RayCluster(address=cluster.address)
+    run = threading.Thread(target=run_plan, args=(PLAN_OF_16_EPISODES, tmp_path, play, executor))
     run.start()
     act_after_records(tmp_path, 4, freeze, lambda: not run.is_alive()).join()
     deadline = time.monotonic() + 300
@@ -130,12 +123,9 @@ def test_a_worker_or_machine_that_freezes_is_ended_and_its_episode_played_elsewh
 
     assert frozen, "the run ended before anything was frozen"
     assert not Path(f"/proc/{frozen[0]}").exists()
-
-    kept = list(read_records(tmp_path))
-    assert (len(kept), [record.error for record in kept if record.error]) == (
-        len(PLAN_OF_16_EPISODES.jobs()),
-        [],
-    )
+    records = read_records(tmp_path)
+    assert len(records) == len(PLAN_OF_16_EPISODES.jobs())
+    assert {record.error for record in records} == {None}
     assert "has not answered" in (tmp_path / RECORDS_FILE).read_text()
 
 
@@ -143,25 +133,29 @@ def test_a_run_waits_for_a_free_machine_and_uses_one_that_joins_later(tmp_path, 
     from ray.cluster_utils import Cluster
 
     nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
-    warnings = mock.Mock(spec=Reporter)
+    reporter = mock.Mock(spec=Reporter)
     monkeypatch.setattr(ray_pool, "WAIT_S", 2.0)
-    play = FakePlayer(tmp_path)
-    executor = RayCluster(address=nodes.address)
     run = threading.Thread(
         target=run_plan,
-        args=(PLAN_OF_16_EPISODES, tmp_path, play, executor),
-        kwargs={"reporter": warnings},
+        args=(
+            PLAN_OF_16_EPISODES,
+            tmp_path,
+            FakePlayer(tmp_path),
+            RayCluster(address=nodes.address),
+        ),
+        kwargs={"reporter": reporter},
     )
     try:
         run.start()
-        while not warnings.warn.called and run.is_alive():
+        while not reporter.warn.called and run.is_alive():
             time.sleep(0.1)
         nodes.add_node(num_cpus=1)
         run.join()
     finally:
         ray.shutdown()
         nodes.shutdown()
-    assert "Waiting for a free CPU" in warnings.warn.call_args_list[0].args[0]
+
+    assert "Waiting for a free CPU" in reporter.warn.call_args_list[0].args[0]
     assert line_count(tmp_path) == len(PLAN_OF_16_EPISODES.jobs())
 
 
@@ -170,7 +164,6 @@ def test_a_worker_gets_the_label_gpu_share_variables_and_folder_that_the_plan_as
 ):
     """Each notes its variable A_KEY, a file of the copied folder and the label of its machine."""
     folder = tmp_path / "policies"
-    out = tmp_path / "run"
     folder.mkdir()
     (folder / "note.txt").write_text("copied")
     here = Path(ray_fakes.__file__).parent
@@ -182,18 +175,21 @@ def test_a_worker_gets_the_label_gpu_share_variables_and_folder_that_the_plan_as
     needs = WorkerNeeds(
         gpus=0.5, labels={"rack": "b"}, variables=("A_KEY",), working_dir=str(folder)
     )
-    executor = RayCluster(address=cluster.address, needs=needs)
-    summary = run_plan(PLAN_OF_16_EPISODES, out, NotingPlace(out), executor)
-    assert (summary.errors, summary.missing) == ((), 0)
-    assert {(out / str(record.video)).read_text() for record in read_records(out)} == {
-        "secret copied b"
-    }
+    out = tmp_path / "run"
 
+    executor = RayCluster(address=cluster.address, needs=needs)
+    run_plan(PLAN_OF_16_EPISODES, out, NotingPlace(out), executor)
+
+    notes = {(out / str(record.video)).read_text() for record in read_records(out)}
+    assert notes == {"secret copied b"}
+
+
+def test_a_variable_for_workers_that_is_not_set_here_is_refused(cluster, tmp_path):
     needs = WorkerNeeds(variables=("NOT_SET_HERE",))
+    executor = RayCluster(address=cluster.address, needs=needs)
+
     with pytest.raises(InvalidValueError, match="NOT_SET_HERE is not set here"):
-        run_plan(
-            small_plan(9), out, NotingPlace(out), RayCluster(address=cluster.address, needs=needs)
-        )
+        run_plan(small_plan(1), tmp_path, FakePlayer(tmp_path), executor)
 
 
 def test_a_run_that_loses_the_head_of_its_cluster_ends_in_one_sentence_and_keeps_its_records(

@@ -1,7 +1,5 @@
 """A policy behind a rewriter, played by a run: each part where it belongs."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,14 +1,10 @@
 """Real processes, real signals."""
 
-from __future__ import annotations
-
 import dataclasses
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from pathlib import Path
 from unittest import mock
 
 import pytest
@@ -24,7 +20,6 @@ from run_fakes import (
     is_alive,
     line_count,
     small_plan,
-    starts,
     worker_pids,
 )
 
@@ -43,29 +38,30 @@ from roboirg.runs.plan.stored_plans import read_plan, read_plans
 from roboirg.runs.play import episode_record
 from roboirg.runs.run.executor import InProcess, LocalProcesses, choose_executor
 from roboirg.runs.run.progress import Reporter
-from roboirg.runs.run.runner import RunSummary, run_plan
+from roboirg.runs.run.ray_machines import MachineVersions
+from roboirg.runs.run.runner import run_plan
 
-Comparable = list[dict[str, object]]
 WAIT_S = 300.0
 OTHER_WORDS = "PickXtimes/test@0a0a0a0a0a0a"
 
 
-def wait_until(condition: Callable[[], bool]) -> None:
+def wait_until(condition):
     deadline = time.monotonic() + WAIT_S
     while not condition():
         assert time.monotonic() < deadline, "it takes too long"
         time.sleep(0.02)
 
 
-def begun_run(folder: Path, workers: int = 1) -> subprocess.Popen[bytes]:
-    """The run of `run_fakes` in a process of its own, until three episodes have ended."""
+def begun_run(folder, workers=1):
+    """Start the run of `run_fakes`, 16 episodes, in a process; return when three have ended."""
     child = subprocess.Popen([sys.executable, run_fakes.__file__, folder, str(workers)])
     wait_until(lambda: line_count(folder) >= 3 or child.poll() is not None)
     assert child.poll() is None
     return child
 
 
-def finish_run(folder: Path) -> RunSummary:
+def finish_run(folder):
+    """Play what is missing of the run of `run_fakes`."""
     return fake_run(folder, small_plan(8))
 
 
@@ -79,23 +75,28 @@ def records_of_an_uninterrupted_run(tmp_path_factory):
 def test_a_killed_run_goes_on_with_the_same_command_and_has_the_same_records_in_the_end(
     tmp_path, records_of_an_uninterrupted_run
 ):
-    """Of 16 episodes at least 3 had ended. A line of 22 bytes that was cut off is set aside."""
     child = begun_run(tmp_path, workers=2)
     child.send_signal(signal.SIGKILL)
     child.wait()
     wait_until(lambda: not any(map(is_alive, worker_pids(tmp_path))))
     stored = len(read_records(tmp_path))
-    assert 3 <= stored < 16
-    # The worst that a kill can leave behind:
-    with (tmp_path / RECORDS_FILE).open("ab") as file:
-        file.write(b'{"policy":"random","ta')
 
     summary = finish_run(tmp_path)
 
+    assert 3 <= stored < 16
     assert summary.played == 16 - stored
-    assert len((tmp_path / TORN_FILE).read_bytes().rstrip()) == 22
     assert all_comparable(tmp_path) == records_of_an_uninterrupted_run
-    assert line_count(tmp_path) == 16
+
+
+def test_a_line_that_a_kill_cut_off_is_set_aside_and_its_episode_played_again(tmp_path):
+    """As all of a record is written at once, this is the worst that a kill can leave behind."""
+    torn_line = b'{"policy":"random","ta'
+    (tmp_path / RECORDS_FILE).write_bytes(torn_line)
+
+    fake_run(tmp_path, small_plan(1))
+
+    assert (tmp_path / TORN_FILE).read_bytes().rstrip() == torn_line
+    assert len(read_records(tmp_path)) == len(small_plan(1).jobs())
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -103,40 +104,58 @@ def test_ctrl_c_or_sigterm_ends_the_workers_and_keeps_the_records_of_ended_episo
     tmp_path, number, records_of_an_uninterrupted_run
 ):
     child = begun_run(tmp_path)
+
     child.send_signal(number)
+
     assert child.wait(WAIT_S) != 0
     assert not any(map(is_alive, worker_pids(tmp_path)))
     assert 3 <= len(read_records(tmp_path)) < 16
-
     finish_run(tmp_path)
     assert all_comparable(tmp_path) == records_of_an_uninterrupted_run
 
 
 def test_an_episode_in_which_the_worker_dies_twice_is_one_error_and_the_rest_is_played(tmp_path):
     """A dead process may be bad luck, so it is tried twice; then it is an error of its own kind."""
-    plan = changed(small_plan(), settings="direct")
+    plan = changed(small_plan(4), settings="direct")
 
     summary = run_plan(plan, tmp_path, FakePlay(tmp_path, deadly=2), LocalProcesses(1))
 
-    assert (summary.total, summary.played, len(summary.errors), summary.missing) == (4, 4, 1, 0)
+    assert (summary.played, summary.missing) == (4, 0)
     (error,) = (record for record in read_records(tmp_path) if record.outcome == "error")
     assert (error.episode, error.error, error.attempt) == (2, "infrastructure", 2)
     assert error.cause == "infrastructure: the process died of signal 9 (Killed) in the environment"
-    assert len(starts(tmp_path, error.identity)) == 2
 
 
-def test_the_same_command_plays_errors_again_unless_asked_not_to(tmp_path):
-    """One of 4 episodes was an error. A third attempt succeeds, and nothing is left to play."""
-    plan = changed(small_plan(), settings="direct")
-    run_plan(plan, tmp_path, FakePlay(tmp_path, deadly=2), LocalProcesses(1))
+def run_with_one_error(folder):
+    """Play four episodes, of which number 2 is an error after two attempts; return their plan."""
+    plan = changed(small_plan(4), settings="direct")
 
-    same = fake_run(tmp_path, plan, retry_errors=False)
-    assert (same.played, len(same.errors)) == (0, 1)
+    def fail_episode_2(job):
+        record = FakePlay()(job)
+        if job.episode != 2:
+            return record
+        return replace(record, outcome="error", error="environment", cause="environment: x")
+
+    run_plan(plan, folder, fail_episode_2, InProcess())
+    return plan
+
+
+def test_the_same_command_plays_errors_again(tmp_path):
+    """A third attempt succeeds, and nothing is left to play."""
+    plan = run_with_one_error(tmp_path)
 
     assert fake_run(tmp_path, plan).played == 1
     assert max(record.attempt for record in read_records(tmp_path)) == 3
     assert fake_run(tmp_path, plan).played == 0
     assert not earlier_plans(tmp_path)  # it was the same one each time
+
+
+def test_errors_are_not_played_again_if_asked_not_to(tmp_path):
+    plan = run_with_one_error(tmp_path)
+
+    summary = fake_run(tmp_path, plan, retry_errors=False)
+
+    assert (summary.played, len(summary.errors)) == (0, 1)
 
 
 def test_missing_graphics_stop_the_run_and_the_records_before_are_kept(tmp_path):
@@ -145,17 +164,23 @@ def test_missing_graphics_stop_the_run_and_the_records_before_are_kept(tmp_path)
     assert {record.episode for record in read_records(tmp_path)} == {0, 1}
 
 
-def test_a_run_may_be_repeated_with_more_or_fewer_episodes_in_its_folder(tmp_path):
+def test_a_run_may_be_repeated_with_more_episodes_in_its_folder(tmp_path):
     """Each episode is told in two settings: 2 are 4 results, 4 are 8, of which 4 are new."""
-    fake_run(tmp_path, small_plan(2))
-    more = fake_run(tmp_path, small_plan(4))
+    fake_run(tmp_path, small_plan(episodes=2))
+
+    more = fake_run(tmp_path, small_plan(episodes=4))
+
     assert (more.played, more.total) == (4, 8)
 
-    fewer = fake_run(tmp_path, small_plan(1))
+
+def test_what_a_repeated_run_with_fewer_episodes_leaves_out_is_kept_and_not_missing(tmp_path):
+    fake_run(tmp_path, small_plan(episodes=4))
+
+    fewer = fake_run(tmp_path, small_plan(episodes=1))
+
     assert (fewer.played, fewer.total, fewer.missing) == (0, 2, 0)
     assert len(read_records(tmp_path)) == 8
-    # What the larger one lacks is not missing any more.
-    assert (read_plan(tmp_path), *read_plans(tmp_path)) == (small_plan(1), small_plan(1))
+    assert list(read_plans(tmp_path)) == [small_plan(1)]
 
 
 @pytest.mark.parametrize(
@@ -189,21 +214,21 @@ def test_a_run_does_not_go_on_in_a_folder_with_results_of_other_scenes_words_or_
 
     with pytest.raises(StoreError, match=sentence):
         fake_run(tmp_path, small_plan(2))
+
     assert len(read_records(tmp_path)) == 2
     assert read_plan(tmp_path) is None
 
 
 def test_a_line_that_was_cut_off_is_reported_before_an_episode_is_played(tmp_path):
     (tmp_path / RECORDS_FILE).write_bytes(b'{"policy":"random","ta')
-    ears = mock.Mock(spec=Reporter)
-    fake_run(tmp_path, small_plan(1), reporter=ears)
-    heard = [name for name, *_ in ears.method_calls if name in ("warn", "advance")]
+    reporter = mock.Mock(spec=Reporter)
 
-    assert heard == ["warn", "advance", "advance"]
+    fake_run(tmp_path, small_plan(1), reporter=reporter)
 
-    ((notice,), _) = ears.warn.call_args
+    calls = [name for name, *_ in reporter.method_calls if name in ("warn", "advance")]
+    assert calls == ["warn", "advance", "advance"]
+    ((notice,), _) = reporter.warn.call_args
     assert "(22 bytes) to" in notice
-    assert "again" not in notice
 
 
 @pytest.mark.parametrize(
@@ -218,15 +243,13 @@ def test_a_line_that_was_cut_off_is_reported_before_an_episode_is_played(tmp_pat
     ],
 )
 def test_a_run_warns_once_of_a_task_on_which_the_policy_was_not_trained(tmp_path, trained, warned):
-    ears = mock.Mock(spec=Reporter)
-    needs = PolicyNeeds(trained_tasks=trained)
-    plan = changed(
-        small_plan(2), policies=(dataclasses.replace(read_policy("random"), needs=needs),)
-    )
+    """None: the policy does not say on which tasks it was trained."""
+    policy = dataclasses.replace(read_policy("random"), needs=PolicyNeeds(trained_tasks=trained))
+    reporter = mock.Mock(spec=Reporter)
 
-    fake_run(tmp_path, plan, reporter=ears)
+    fake_run(tmp_path, changed(small_plan(2), policies=(policy,)), reporter=reporter)
 
-    assert [warning.args[0] for warning in ears.warn.call_args_list] == warned
+    assert [warning.args[0] for warning in reporter.warn.call_args_list] == warned
 
 
 @pytest.mark.parametrize(
@@ -247,21 +270,16 @@ def test_a_negative_number_of_workers_is_refused():
 
 @pytest.mark.parametrize(
     ("field", "value", "what"),
-    [
-        ("language_version", "7", "language"),
-        ("environment_version", 7, "environment"),
-        ("words", OTHER_WORDS, "words"),
-    ],
+    [("environment_version", 7, "environment"), ("words", OTHER_WORDS, "words")],
 )
 def test_a_record_that_a_worker_of_another_version_made_is_not_stored(tmp_path, field, value, what):
-    plan = small_plan(1).checked()
-
-    def elsewhere(job):
+    def play_elsewhere(job):
         return replace(FakePlay()(job), **{field: value})
 
     with pytest.raises(StoreError, match=f"whose {what} version is {value}, .* was not stored"):
-        run_plan(plan, tmp_path, elsewhere, InProcess())
-    assert not (tmp_path / RECORDS_FILE).read_bytes()
+        run_plan(small_plan(1).checked(), tmp_path, play_elsewhere, InProcess())
+
+    assert (tmp_path / RECORDS_FILE).read_bytes() == b""
 
 
 @pytest.mark.parametrize(
@@ -297,35 +315,29 @@ def test_an_episode_that_lost_its_process_is_repeated_at_once_and_one_with_an_er
     tmp_path, error, place
 ):
     """The first episode fails: it is played again as the second one (1), or as the last (-1)."""
-    played: list[str] = []
+    played = []
 
-    def play(job):
+    def fail_the_first(job):
         played.append(job.slug)
         record = FakePlay()(job)
-        if len(played) > 1:
-            return record
-        return replace(record, outcome="error", error=error, cause=f"{error}: x")
+        if len(played) == 1:
+            return replace(record, outcome="error", error=error, cause=f"{error}: x")
+        return record
 
-    run_plan(small_plan(4), tmp_path, play, InProcess())
+    run_plan(small_plan(4), tmp_path, fail_the_first, InProcess())
 
     assert played[place] == played[0]
-    assert len(played) == len(small_plan(4).jobs()) + 1
 
 
 def test_a_machine_with_another_package_version_is_refused():
-    from roboirg.runs.run.ray_machines import MachineVersions
-
     here = MachineVersions((read_policy("random"),))
-    version = here.installed.package_version
-
     there = dataclasses.replace(here, installed=here.installed._replace(package_version="9"))
 
+    version = here.installed.package_version
     assert here.difference(there) == f"the package version is 9 there and {version} here"
 
 
 def test_a_machine_with_another_version_of_a_policy_is_refused_by_its_name():
-    from roboirg.runs.run.ray_machines import MachineVersions
-
     random = read_policy("random")
     here = MachineVersions((random,))
     there = MachineVersions((dataclasses.replace(random, version="old"),))
@@ -334,8 +346,6 @@ def test_a_machine_with_another_version_of_a_policy_is_refused_by_its_name():
 
 
 def test_policies_of_an_unknown_version_are_not_compared_between_machines():
-    from roboirg.runs.run.ray_machines import MachineVersions
-
     random = read_policy("random")
     here = MachineVersions((unknown_policy("x"), random))
     there = MachineVersions((read_policy("oracle"), random))

@@ -1,14 +1,10 @@
 """The runner with the real world: what the fakes cannot show."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-from click.testing import Result
 from run_fakes import all_comparable
 from typer.testing import CliRunner
 
@@ -37,9 +33,7 @@ class Loud:
 """
 
 
-def run_in_a_process(
-    *words: object, cwd: Path, **environment: str
-) -> subprocess.CompletedProcess[str]:
+def run_in_a_process(*words, cwd, **environment):
     return subprocess.run(
         [sys.executable, "-m", "roboirg", *map(str, words)],
         cwd=cwd,
@@ -50,7 +44,7 @@ def run_in_a_process(
     )
 
 
-def run_here(*words: object) -> Result:
+def run_here(*words):
     return CliRunner().invoke(app, ["run", *map(str, words)])
 
 

@@ -1,9 +1,5 @@
 """Verdicts of two versions of a policy's server do not get into one folder, table or merge."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from made_records import make_record
 from wire_servers import ChallengeServer
@@ -38,7 +34,7 @@ class PlaysWithServerVersions:
         return make_record(job, "success", policy_metadata=metadata, server_version=told)
 
 
-def stored_server_versions(folder: Path) -> list[str | None]:
+def stored_server_versions(folder):
     return [record.server_version for record in read_records(folder)]
 
 
@@ -101,11 +97,11 @@ def test_the_server_version_is_that_of_the_server_and_not_of_its_client_or_plann
     """The planner has version 7 and the client was given "mine"; the server says "phase-1"."""
     with ChallengeServer() as server:
         client = make_policy(f"challenge://{server.place}?version=mine", 0)
-        client.reset("go", {})  # type: ignore[typeddict-item]
-        assert server_version(client.metadata) == "phase-1"  # type: ignore[attr-defined]
-        client.follow = print  # type: ignore[attr-defined]
-        system = HierarchicalPolicy(PlannerWithVersion(), client)  # type: ignore[arg-type]
+        client.reset("go", {})
+        assert server_version(client.metadata) == "phase-1"
+        client.follow = print
+        system = HierarchicalPolicy(PlannerWithVersion(), client)
         assert server_version(system.metadata) == "phase-1"
-        client.close()  # type: ignore[attr-defined]
+        client.close()
     for told in ({}, {"version": "1"}, {"server": "x"}, {"server": "x", "version": "unknown"}):
         assert server_version(told) is None

@@ -1,7 +1,5 @@
 """What a policy names as its subgoal: checked, in the record, on the page and in the table."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -34,14 +32,33 @@ def unfinished_video_of_21_frames(folder):
     return video
 
 
-def test_a_video_appears_only_when_it_is_complete_and_is_small(tmp_path):
-    """21 frames; the limit of 20 kB would be broken by frames without compression in time."""
+def test_a_video_appears_only_when_it_is_complete(tmp_path):
     video = unfinished_video_of_21_frames(tmp_path)
     assert not video.path.exists()
 
     assert video.finish()
     assert sorted(path.name for path in video.path.parent.iterdir()) == ["x.jpg", "x.mp4"]
+
+
+def test_a_video_of_21_like_frames_has_less_than_20_kilobytes(tmp_path):
+    """Frames without compression in time would take more."""
+    video = unfinished_video_of_21_frames(tmp_path)
+    video.finish()
+
     assert video.path.stat().st_size < 20_000
+
+
+def test_a_video_is_h264_of_ten_frames_a_second_at_fourfold_speed(tmp_path):
+    """Its last frame is repeated for 0.8 s, on which the page counts."""
+    video = unfinished_video_of_21_frames(tmp_path)
+    video.finish()
+
+    with av.open(str(video.path)) as container:
+        stream = container.streams.video[0]
+        assert (stream.codec_context.name, stream.codec_context.pix_fmt) == ("h264", "yuv420p")
+        assert (stream.width, stream.height, stream.average_rate) == (512 + GAP, 256, 10)
+        assert stream.average_rate * FRAME_STEPS == 4 * CONTROL_RATE
+        assert len(list(container.decode(stream))) == 21 + 8
 
 
 def test_a_video_shows_both_cameras_a_frame_around_the_demonstration_and_the_pointed_place(
@@ -52,46 +69,39 @@ def test_a_video_shows_both_cameras_a_frame_around_the_demonstration_and_the_poi
     video.finish()
 
     with av.open(str(video.path)) as container:
-        stream = container.streams.video[0]
-        assert stream.codec_context.name == "h264"
-        assert stream.codec_context.pix_fmt == "yuv420p"
-        assert (stream.width, stream.height, stream.average_rate) == (512 + GAP, 256, 10)
-        assert stream.average_rate * FRAME_STEPS == 4 * CONTROL_RATE  # fourfold speed
-        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
-    assert len(frames) == 21 + 8  # the last is repeated for 0.8 s; the page counts on it
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
     edges = frames[0][[1, -2, 100, 100], [100, 100, 1, -2]].astype(int)
     assert np.abs(edges - DEMONSTRATION_COLOR).max() < 40
-
-    # Front, wrist, and the ring: 6 rows below its point in the front picture.
-    front, wrist, ring = frames[-1][[128, 128, 46], [128, 384, 200], 0].astype(int)
-    assert front == pytest.approx(90, abs=7)
-    assert wrist == pytest.approx(200, abs=7)
-    assert ring == pytest.approx(240, abs=49)
+    assert frames[-1][128, 128, 0] == pytest.approx(90, abs=7), "front"
+    assert frames[-1][128, 384, 0] == pytest.approx(200, abs=7), "wrist"
+    assert frames[-1][46, 200, 0] == pytest.approx(240, abs=49), "ring, 6 rows below its point"
 
 
-def test_frames_have_one_height_although_the_caption_grows(tmp_path):
-    """With room for the longest caption from the first frame; a short one has less dark ink."""
+def test_a_video_whose_caption_grows_can_be_finished(tmp_path):
+    """All frames of a video have one size."""
     video = VideoWriter(tmp_path / "x.mp4")
-    first = "This one is red."
-    longest = "This one is red. " * 20
-    video.caption = first
-    video.longest_caption = longest
+    video.caption = "This one is red."
+    video.longest_caption = "This one is red. " * 20
     video.add_frame(GreyPictures(), True)
-    video.caption = longest
+    video.caption = video.longest_caption
     video.add_frame(GreyPictures())
 
     assert video.finish(), video.error
 
-    pictures = [GreyPictures().picture("front"), GreyPictures().picture("wrist")]
-    short, long = (
-        compose_frame(pictures, caption, longest_caption=longest) for caption in (first, longest)
-    )
-    assert short.shape == long.shape == compose_frame(pictures, longest).shape
-    assert len(compose_frame(pictures, first)) < len(short)
 
-    dark = [int((frame[256:] < 128).sum()) for frame in (short, long)]
-    assert 0 < dark[0] < dark[1] / 10
+def test_a_frame_has_room_for_the_longest_caption_and_ink_for_its_own():
+    """Ink is dark pixels below the pictures, which are 256 pixels high."""
+    pictures = [np.full((256, 256, 3), 200, np.uint8)] * 2
+    short = "This one is red."
+    long = short * 20
+
+    with_short = compose_frame(pictures, short, longest_caption=long)
+    with_long = compose_frame(pictures, long, longest_caption=long)
+
+    assert with_short.shape == with_long.shape == compose_frame(pictures, long).shape
+    assert len(compose_frame(pictures, short)) < len(with_short)
+    assert 0 < (with_short[256:] < 128).sum() < (with_long[256:] < 128).sum() / 10
 
 
 PROGRAM_THAT_WRITES_A_VIDEO = """
@@ -115,9 +125,11 @@ assert writer.finish(), writer.error
 
 def test_equal_pictures_give_equal_files_whatever_was_in_memory(tmp_path):
     """MALLOC_PERTURB_ fills new memory with a byte; would find bytes that nothing has set."""
-    files = [tmp_path / f"{byte}.mp4" for byte in (50, 200)]
-    for file in files:
-        environment = os.environ | {"MALLOC_PERTURB_": file.stem}
+    contents = set()
+    for byte in ("50", "200"):
+        file = tmp_path / f"{byte}.mp4"
         command = [sys.executable, "-c", PROGRAM_THAT_WRITES_A_VIDEO, str(file)]
-        subprocess.run(command, env=environment, check=True)
-    assert len({file.read_bytes() for file in files}) == 1
+        subprocess.run(command, env=os.environ | {"MALLOC_PERTURB_": byte}, check=True)
+        contents.add(file.read_bytes())
+
+    assert len(contents) == 1

@@ -1,7 +1,5 @@
 """The kit for a machine with a GPU: its parts, its installation, and how pictures are compared."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess
@@ -19,7 +17,7 @@ SETTINGS = "src/roboirg/simulation/rendering/render_settings.py"
 
 
 @pytest.fixture
-def parts(tmp_path: Path) -> Path:
+def parts(tmp_path):
     """The parts of a kit of one wheel and one tree, with `python` as on this machine."""
     kit = tmp_path / "packed"
     (kit / "wheels").mkdir(parents=True)
@@ -41,7 +39,7 @@ def parts(tmp_path: Path) -> Path:
     return out
 
 
-def install(parts: Path) -> subprocess.CompletedProcess[str]:
+def install(parts):
     interpreter = parts.parent / "bin"
     interpreter.mkdir(exist_ok=True)
     if not (interpreter / "python3").exists():
@@ -55,7 +53,7 @@ def install(parts: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_parts_install_on_a_machine_that_reaches_nothing(parts: Path) -> None:
+def test_parts_install_on_a_machine_that_reaches_nothing(parts):
     done = install(parts)
     kit = parts.parent / "kit"
 
@@ -65,7 +63,7 @@ def test_parts_install_on_a_machine_that_reaches_nothing(parts: Path) -> None:
     assert "culling: bool = False" in (kit / "trees" / "unculled" / SETTINGS).read_text()
 
 
-def test_a_damaged_part_is_named_and_nothing_is_installed(parts: Path) -> None:
+def test_a_damaged_part_is_named_and_nothing_is_installed(parts):
     part = parts / "part-01"
     content = bytearray(part.read_bytes())
     content[-1] ^= 1
@@ -78,7 +76,7 @@ def test_a_damaged_part_is_named_and_nothing_is_installed(parts: Path) -> None:
     assert not (parts.parent / "kit").exists()
 
 
-def test_another_python_is_refused_with_what_would_be_right(tmp_path: Path, parts: Path) -> None:
+def test_another_python_is_refused_with_what_would_be_right(tmp_path, parts):
     kit = tmp_path / "packed"
     other = tmp_path / "others"
     (kit / "python").write_text("3.1")
@@ -90,7 +88,7 @@ def test_another_python_is_refused_with_what_would_be_right(tmp_path: Path, part
     assert re.search(r"python3 is 3\.\d+ here; the parts are for 3\.1 \(", done.stderr), done.stderr
 
 
-def test_differences_are_counted_by_pixel_and_motion_by_bit() -> None:
+def test_differences_are_counted_by_pixel_and_motion_by_bit():
     black = np.zeros((4, 5, 3), np.uint8)
     spotted = black.copy()
     spotted[0, 0] = (0, 1, 0)
@@ -112,7 +110,7 @@ def test_differences_are_counted_by_pixel_and_motion_by_bit() -> None:
     assert difference({"a": black}, {"b": black}) == {"only in one": ["a", "b"]}
 
 
-def test_the_container_shows_the_driver_to_vulkan_and_to_egl() -> None:
+def test_the_container_shows_the_driver_to_vulkan_and_to_egl():
     """Both files are JSON and name libraries of NVIDIA's driver, which the host brings."""
     text = (ROOT / "Dockerfile").read_text(encoding="utf-8")
     files = {

@@ -1,9 +1,5 @@
 """A run of made-up records is read in parts with the same results as in whole."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from benchmarks.synthetic_run import write_synthetic_run
 
@@ -20,13 +16,13 @@ COUNT = 100
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("large") / "run"
     write_synthetic_run(folder, COUNT)
     return folder
 
 
-def test_parts_of_records_give_the_cells_of_whole_records(run: Path) -> None:
+def test_parts_of_records_give_the_cells_of_whole_records(run):
     plan = read_plan(run)
     assert plan is not None
 
@@ -37,8 +33,8 @@ def test_parts_of_records_give_the_cells_of_whole_records(run: Path) -> None:
     assert list(whole.items()) == list(parts.items())
 
 
-def test_a_page_reads_one_record_after_the_other(run: Path) -> None:
-    told: list[tuple[int, int]] = []
+def test_a_page_reads_one_record_after_the_other(run):
+    told = []
     page = write_report(
         Source(run), progress=lambda done, total: told.append((done, total))
     ).read_text()

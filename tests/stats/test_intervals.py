@@ -1,7 +1,5 @@
 """Intervals by hand, against a library, and by simulation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,7 +8,6 @@ from interval_coverage import Design, coverage
 
 from roboirg.stats.cells import Cell, Trial, rate_interval
 from roboirg.stats.intervals import (
-    Interval,
     Stratum,
     TaskRates,
     critical_value,
@@ -21,27 +18,37 @@ from roboirg.stats.intervals import (
 )
 
 
-def gap_interval(*, only_first: int, only_second: int, neither: int, tasks: int = 1) -> Interval:
-    """Of paired episodes with one seed, as many in each task; no episode is solved by both."""
+def rates_of_pairs(*, only_first, only_second, neither):
+    """Return the rates of a task of so many paired episodes with one seed.
+
+    No episode is solved by both.
+    """
     numbers = (only_first, only_second, neither)
-    rows = np.repeat([[1, 1, 0, 1], [0, 1, 1, 1], [0, 1, 0, 1]], numbers, axis=0)
-    part = 1 / tasks
-    return mean_interval([TaskRates.of(rows).combined(part, -part)] * tasks)
+    # Successes and trials of the first side, then of the second.
+    return TaskRates.of(np.repeat([[1, 1, 0, 1], [0, 1, 1, 1], [0, 1, 0, 1]], numbers, axis=0))
 
 
-def test_the_critical_value_is_that_of_the_normal_distribution():
-    assert critical_value() == pytest.approx(1.959964)
-    assert critical_value(0.05 / 12) == pytest.approx(2.865, abs=1e-3), "of one of 12 intervals"
+def gap_interval(*, only_first, only_second, neither):
+    """Return the interval of the gap between the two sides, for such a task."""
+    rates = rates_of_pairs(only_first=only_first, only_second=only_second, neither=neither)
+    return mean_interval([rates.combined(1, -1)])
 
 
-@settings(max_examples=30)
-@given(st.integers(2, 400).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
-def test_the_interval_of_a_rate_holds_wilsons_of_statsmodels(counts):
+@pytest.mark.parametrize(
+    ("alpha", "value"), [(0.05, 1.959964), (0.05 / 12, 2.865)], ids=["one", "one of 12 intervals"]
+)
+def test_the_critical_value_is_that_of_the_normal_distribution(alpha, value):
+    assert critical_value(alpha) == pytest.approx(value, abs=1e-3)
+
+
+@pytest.mark.parametrize("trials", [2, 7, 50, 200])
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 1.0])
+def test_the_interval_of_a_rate_holds_wilsons_of_statsmodels(trials, share):
     """It is longer near 0 and 1, on the side of the edge, and by a degree of freedom."""
     from statsmodels.stats.proportion import proportion_confint
 
-    successes, trials = counts
-    low, high = proportion_confint(*counts, method="wilson")
+    successes = round(share * trials)
+    low, high = proportion_confint(successes, trials, method="wilson")
 
     ours = interval_of_values([[1.0] * successes + [0.0] * (trials - successes)])
 
@@ -73,33 +80,42 @@ def test_the_interval_of_a_gap_is_tangos_but_for_a_degree_of_freedom():
         assert abs(6 - 2 - 20 * gap) / np.sqrt(variance * 20 / 19) >= critical_value() - 1e-3
 
 
-def test_gaps_of_episodes_that_all_ended_alike_have_an_interval_of_their_number():
+@pytest.mark.parametrize(
+    ("only_second", "neither", "interval"),
+    [(0, 50, (-0.0727, 0.0727)), (50, 0, (-1, -1 + 2 * 0.0727))],
+    ids=["all lost by both", "all won by the second alone"],
+)
+def test_gaps_of_episodes_that_all_ended_alike_have_an_interval_of_their_number(
+    only_second, neither, interval
+):
     """Resamples would all be 0. Of 50 up to z² / (49 + z²) = 3.8415 / 52.84 may differ."""
-    alike = gap_interval(only_first=0, only_second=0, neither=50)
-    assert alike == pytest.approx((-0.0727, 0.0727), abs=1e-4)
-
-    lost = gap_interval(only_first=0, only_second=50, neither=0)
-    assert lost == pytest.approx((-1, -1 + 2 * 0.0727), abs=1e-4)
+    found = gap_interval(only_first=0, only_second=only_second, neither=neither)
+    assert found == pytest.approx(interval, abs=1e-4)
 
 
 def test_an_interval_over_four_equal_tasks_is_about_half_as_long():
-    one = gap_interval(only_first=6, only_second=2, neither=42)
-    four = gap_interval(only_first=6, only_second=2, neither=42, tasks=4)
-    assert 0.44 < (four.high - four.low) / (one.high - one.low) < 0.5
+    task = rates_of_pairs(only_first=6, only_second=2, neither=42)
+
+    single = mean_interval([task.combined(1, -1)])
+    four = mean_interval([task.combined(1 / 4, -1 / 4)] * 4)
+
+    assert 0.44 < (four.high - four.low) / (single.high - single.low) < 0.5
 
 
-def test_trials_of_one_episode_count_as_one():
-    """50 episodes with three seeds that always agree have the interval of 50, not of 150."""
-    agreeing = Cell({Trial(number, seed): number < 10 for number in range(50) for seed in range(3)})
-    once = Cell({Trial(number, 0): number < 10 for number in range(50)})
-    assert rate_interval([once]) == pytest.approx((0.1062, 0.3318), abs=1e-4)
-    assert rate_interval([agreeing]) == pytest.approx((0.1062, 0.3318), abs=1e-4)
+@pytest.mark.parametrize("seeds", [1, 3])
+def test_trials_of_one_episode_count_as_one(seeds):
+    """50 episodes with three seeds that always agree have the interval of 50, not of 150.
+
+    The first ten episodes are won.
+    """
+    cell = Cell({Trial(number, seed): number < 10 for number in range(50) for seed in range(seeds)})
+    assert rate_interval([cell]) == pytest.approx((0.1062, 0.3318), abs=1e-4)
 
 
 def test_an_episode_with_more_trials_weighs_more():
     """A rate is successes by trials: 3 of 3 and 0 of 1 are 3/4, so its interval is around that."""
-    rates = TaskRates.of(np.array([[3, 3], [0, 1]]))
-    stratum = rates.combined(1)
+    stratum = TaskRates.of(np.array([[3, 3], [0, 1]])).combined(1)
+
     assert stratum.mean == pytest.approx(0.75)
     assert stratum.episodes == pytest.approx(1 / (0.75**2 + 0.25**2))
 
@@ -110,30 +126,45 @@ def test_no_gap_reaches_beyond_100_points_if_one_side_has_more_trials_of_an_epis
     assert -1 <= low < high <= 1
 
 
-def test_one_episode_or_none_has_no_interval():
-    single = Cell({Trial(0, seed): True for seed in range(3)})
-    assert rate_interval([single]) is None
-    assert rate_interval([Cell()]) is None
-    assert rate_interval([single, single]) is None, "as many episodes as tasks"
+ONE_EPISODE_WITH_THREE_SEEDS = Cell({Trial(0, seed): True for seed in range(3)})
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        [ONE_EPISODE_WITH_THREE_SEEDS],
+        [Cell()],
+        [ONE_EPISODE_WITH_THREE_SEEDS, ONE_EPISODE_WITH_THREE_SEEDS],
+    ],
+    ids=["one episode", "none", "as many episodes as tasks"],
+)
+def test_one_episode_or_none_has_no_interval(cells):
+    assert rate_interval(cells) is None
 
 
 def test_the_interval_of_a_ratio_holds_those_for_which_the_weighted_difference_may_be_0():
-    rows = np.repeat(
-        [[1, 1, 1, 1], [1, 1, 0, 1], [0, 1, 1, 1], [0, 1, 0, 1]], [9, 3, 12, 26], axis=0
+    """Of 50 episodes both sides solve 9, the first alone 3 and the second alone 12: 12/21.
+
+    At an end of the interval the difference of the first rate and that many times the second may
+    just be 0.
+    """
+    rates = TaskRates.of(
+        np.repeat([[1, 1, 1, 1], [1, 1, 0, 1], [0, 1, 1, 1], [0, 1, 0, 1]], [9, 3, 12, 26], axis=0)
     )
-    rates = TaskRates.of(rows)
 
     low, high = ratio_interval([rates])
 
     assert low < 12 / 21 < high
-    assert mean_interval([rates.combined(1, -low)]).high > 0
     assert mean_interval([rates.combined(1, -low)]).low == pytest.approx(0, abs=1e-4)
     assert mean_interval([rates.combined(1, -high)]).high == pytest.approx(0, abs=1e-4)
 
 
 def test_values_between_other_bounds_have_the_interval_scaled():
-    ratings = interval_of_values([[4.0, 5.0, 4.5, 5.0]], 1.0, 5.0)
+    """Ratings from 1 to 5 are shares from 0 to 1, times 4 and plus 1."""
     shares = interval_of_values([[0.75, 1.0, 0.875, 1.0]])
+
+    ratings = interval_of_values([[4.0, 5.0, 4.5, 5.0]], 1.0, 5.0)
+
     assert ratings == pytest.approx((1 + 4 * shares.low, 1 + 4 * shares.high), abs=1e-5)
 
 
@@ -141,6 +172,7 @@ def test_values_between_other_bounds_have_the_interval_scaled():
 @given(st.lists(st.sampled_from([-1.0, -0.5, 0.0, 0.5, 1.0]), min_size=2, max_size=40))
 def test_every_interval_holds_its_mean_has_a_length_and_stays_between_the_bounds(values):
     low, high = mean_interval([Stratum.of(values, -1.0, 1.0)])
+
     assert -1 <= low <= np.mean(values) + 1e-9
     assert np.mean(values) - 1e-9 <= high <= 1
     assert high - low > 0.05
@@ -149,24 +181,32 @@ def test_every_interval_holds_its_mean_has_a_length_and_stays_between_the_bounds
 @pytest.mark.parametrize(
     ("design", "rates", "correlation"),
     [
-        (Design("one task", [50], 1), (0.02, 0.04), 0.0),
-        (Design("three seeds", [20], 3), (0.01, 0.01), 0.9),
-        (Design("unequal tasks", [5, 30], 1), (0.98, 0.99), 0.5),
-        (Design("the middle", [20, 20], 1), (0.3, 0.5), 0.5),
+        (Design("one task", episodes=[50], seeds=1), (0.02, 0.04), 0.0),
+        (Design("three seeds", episodes=[20], seeds=3), (0.01, 0.01), 0.9),
+        (Design("unequal tasks", episodes=[5, 30], seeds=1), (0.98, 0.99), 0.5),
+        (Design("the middle", episodes=[20, 20], seeds=1), (0.3, 0.5), 0.5),
     ],
     ids=lambda design: getattr(design, "name", ""),
 )
 def test_intervals_of_rate_gap_and_retention_hold_the_truth_at_the_edge(design, rates, correlation):
-    """In 93 of 100 simulations; resamples covered a gap of 2 % against 4 % in 85."""
-    assert min(coverage(design, rates, correlation, 300).values()) >= 0.93
+    """In 93 of 100 simulations; resamples covered a gap of 2 % against 4 % in 85.
+
+    `rates` are the true ones of both sides.
+    """
+    shares = coverage(design, rates, correlation, simulations=300)
+    assert min(shares.values()) >= 0.93
 
 
-def three_rates(*, rewritten: int, said: int, explicit: int, episodes: int = 40) -> TaskRates:
-    """A task in which each of three solves the first so many episodes, with one seed."""
+def three_rates(*, rewritten, said, explicit, episodes=40):
+    """Return the rates of a task in which each of three solves the first so many episodes.
+
+    The three are how an instruction is told: as said, rewritten, and as an explicit command.
+    """
     numbers = np.arange(episodes)
     rows = np.ones((episodes, 6), dtype=np.int64)
-    for column, solved in ((0, rewritten), (2, said), (4, explicit)):
-        rows[:, column] = numbers < solved
+    rows[:, 0] = numbers < rewritten
+    rows[:, 2] = numbers < said
+    rows[:, 4] = numbers < explicit
     return TaskRates.of(rows)
 
 
@@ -180,9 +220,10 @@ def test_the_interval_of_a_share_holds_the_share_as_measured(rewritten, share):
     assert interval.low < share < interval.high
 
 
-def test_there_is_no_share_of_a_gap_that_may_be_none():
-    assert share_interval([three_rates(rewritten=20, said=20, explicit=21)]) is None
-    assert share_interval([three_rates(rewritten=20, said=21, explicit=20)]) is None
+@pytest.mark.parametrize(("said", "explicit"), [(20, 21), (21, 20)])
+def test_there_is_no_share_of_a_gap_that_may_be_none(said, explicit):
+    """Of 40 episodes; one more or less may be chance."""
+    assert share_interval([three_rates(rewritten=20, said=said, explicit=explicit)]) is None
 
 
 def test_more_episodes_give_a_shorter_interval_of_a_share():
@@ -195,14 +236,16 @@ def test_more_episodes_give_a_shorter_interval_of_a_share():
 def test_the_interval_of_a_share_holds_the_true_one_in_most_simulated_runs():
     """60 % as said, 72 % rewritten, 90 % explicit: 40 % of the gap; episodes differ in ease."""
     rng = np.random.default_rng(3)
-    held = 0
+    # The chance that a mean of two uniform numbers is below these limits is the rate.
+    limits = 1 - np.sqrt(2 * (1 - np.array([0.72, 0.6, 0.9]))) / 2
+
+    runs_that_hold_it = 0
     for _ in range(150):
         ease = rng.random((50, 1)) * 0.5 + rng.random((50, 3)) * 0.5
-        # The chance that a mean of two uniform numbers is below these limits.
-        limits = 1 - np.sqrt(2 * (1 - np.array([0.72, 0.6, 0.9]))) / 2
         rows = np.ones((50, 6), dtype=np.int64)
         rows[:, 0::2] = ease < limits
         interval = share_interval([TaskRates.of(rows)])
-        held += interval is not None and interval.low <= 0.4 <= interval.high
+        if interval is not None and interval.low <= 0.4 <= interval.high:
+            runs_that_hold_it += 1
 
-    assert held >= 0.9 * 150
+    assert runs_that_hold_it >= 0.9 * 150

@@ -38,33 +38,35 @@ def test_the_chance_to_find_a_gap_in_six_episodes_is_the_one_computed_by_hand(
 def test_the_computed_power_is_the_share_of_simulated_studies_that_find_the_gap(
     episodes, gap, discordance
 ):
-    """4,000 studies are drawn; a study finds the gap if its p-value is at most 0.05."""
+    """4,000 studies are drawn; a study finds the gap if its p-value is at most 0.05.
+
+    An episode is won by the first policy alone, by the second alone, or ends alike.
+    """
     rng = np.random.default_rng(2)
-    first = (discordance + gap) / 2
-    second = (discordance - gap) / 2
-    draws = rng.multinomial(episodes, [first, second, 1 - discordance], size=4000)
-    kinds, counts = np.unique(draws, axis=0, return_counts=True)
-    rejected = [
-        sign_flip_test(np.repeat([1, -1], [won, lost])) <= 0.05 for won, lost, _ in kinds.tolist()
-    ]
+    shares = [(discordance + gap) / 2, (discordance - gap) / 2, 1 - discordance]
+    studies = rng.multinomial(episodes, shares, size=4000)
 
-    found = counts @ rejected / 4000
+    finding = 0
+    for (won, lost, _), count in zip(*np.unique(studies, axis=0, return_counts=True), strict=True):
+        if sign_flip_test(np.repeat([1, -1], [won, lost])) <= 0.05:
+            finding += count
 
-    assert mcnemar_power(episodes, gap, discordance) == pytest.approx(found, abs=0.02)
+    assert mcnemar_power(episodes, gap, discordance) == pytest.approx(finding / 4000, abs=0.02)
 
 
 @settings(deadline=None, max_examples=15)
-@given(st.floats(0.05, 1), st.floats(0.05, 1))
+@given(share=st.floats(0.05, 1), discordance=st.floats(0.05, 1))
 def test_the_number_of_episodes_given_for_a_gap_finds_it_in_80_percent_and_half_does_not(
     share, discordance
 ):
+    """If even the most episodes do not find it, no number is given."""
     gap = share * discordance
+
     needed = episodes_needed(gap, discordance)
 
     if needed is None:
         assert mcnemar_power(MAX_EPISODES, gap, discordance) < 0.8
         return
-
     assert mcnemar_power(needed, gap, discordance) >= 0.8
     assert mcnemar_power(max(1, needed // 2), gap, discordance) < 0.8
 
@@ -76,9 +78,15 @@ def test_six_episodes_find_that_one_policy_solves_all_and_the_other_none(gap):
 
 
 def test_the_smallest_gap_that_50_episodes_can_find_is_exact_to_a_thousandth():
-    """*Find* is at least 80 % power. Too few episodes find none, and no number a gap of 0."""
-    gap = smallest_gap(50, 0.3)
+    """*Find* is at least 80 % power."""
+    gap = smallest_gap(50, discordance=0.3)
     assert mcnemar_power(50, gap, 0.3) >= 0.8 > mcnemar_power(50, gap - 0.001, 0.3)
 
-    nothing = smallest_gap(5, 0.5), episodes_needed(0.0, 0.3), episodes_needed(0.0001, 0.3)
-    assert nothing == (None, None, None)
+
+def test_five_episodes_find_no_gap():
+    assert smallest_gap(5, discordance=0.5) is None
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.0001])
+def test_no_number_of_episodes_finds_a_gap_of_nearly_0(gap):
+    assert episodes_needed(gap, discordance=0.3) is None

@@ -27,7 +27,7 @@ HERE = Path(__file__).parent
 
 
 def quiet(*_):
-    pass
+    """Report no progress."""
 
 
 def contents(root):
@@ -60,29 +60,42 @@ def test_a_killed_export_continues_without_a_broken_file(tmp_path, synthetic):
     assert contents(out) == contents(whole)
 
 
-def test_each_trajectory_is_recorded_once(tmp_path, synthetic, make_plan, monkeypatch):
+def test_a_stopped_export_goes_on_and_records_each_trajectory_once(
+    tmp_path, synthetic, make_plan, monkeypatch
+):
+    """It is stopped after three of six trajectories."""
     out = tmp_path / "data"
     played = []
-    progress = []
 
     def record(episode, *args, **options):
-        is_first_export = not progress
-        if is_first_export and len(played) == 3:
-            raise KeyboardInterrupt
         played.append((episode.task, episode.index))
         return synthetic_trajectories.record(episode, *args, **options)
 
-    monkeypatch.setattr(export_run, "record_trajectory", record)
+    def record_three(*args, **options):
+        if len(played) == 3:
+            raise KeyboardInterrupt
+        return record(*args, **options)
+
+    monkeypatch.setattr(export_run, "record_trajectory", record_three)
     with pytest.raises(KeyboardInterrupt):
         export_run.run_export(make_plan(), out, 0, quiet)
-    export_run.run_export(make_plan(), out, 0, lambda *now: progress.append(now))
+    monkeypatch.setattr(export_run, "record_trajectory", record)
+    export_run.run_export(make_plan(), out, 0, quiet)
 
     assert len(set(played)) == len(played) == 6
-    assert progress[0][:3] == ("record", 3, 6)
+    assert not (out / export_run.WORK_FOLDER).exists()
+
+
+def test_progress_counts_recorded_trajectories_with_their_size_and_written_episodes(
+    tmp_path, synthetic, make_plan
+):
+    """Sizes are of all trajectories up to then, so they grow."""
+    progress = []
+    export_run.run_export(make_plan(), tmp_path, 0, lambda *now: progress.append(now))
+
     assert progress[-1][:3] == ("write", 4, 4)
     sizes = [size for work, _, _, size in progress if work == "record"]
-    assert sizes == sorted(set(sizes))  # of all trajectories up to then
-    assert not (out / export_run.WORK_FOLDER).exists()
+    assert sizes == sorted(set(sizes))
 
 
 def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, monkeypatch):
@@ -97,75 +110,97 @@ def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, m
     assert summary.episodes == 4
 
 
-def test_kept_trajectories_of_other_outcomes_words_or_worlds_are_not_taken(
+@pytest.mark.parametrize(
+    ("changes", "recorded"),
+    [
+        ({}, 0),
+        ({"policy": "listener", "episodes": (0,), "forms": ("implicit", "resolved")}, 6),
+        ({"outcomes": "all"}, 2),  # of failures no pictures were kept
+    ],
+    ids=["the same", "other words", "other outcomes"],
+)
+def test_kept_trajectories_of_other_outcomes_or_words_are_not_taken(
+    tmp_path, synthetic, make_plan, changes, recorded
+):
+    """The oracle's trajectories of six episodes are kept."""
+    kept = tmp_path / "kept"
+    export_run.run_export(make_plan(), tmp_path / "first", 0, quiet, kept)
+
+    summary = export_run.run_export(make_plan(**changes), tmp_path / "second", 0, quiet, kept)
+
+    assert summary.recorded == recorded
+
+
+def test_kept_trajectories_of_another_world_are_not_taken(
     tmp_path, synthetic, make_plan, monkeypatch
 ):
     kept = tmp_path / "kept"
-    spoken = {"policy": "listener", "episodes": (0,)}
-    for number, (version, changes, recorded) in enumerate(
-        (
-            (ENVIRONMENT_VERSION, {}, 6),
-            (ENVIRONMENT_VERSION, {"outcomes": "all"}, 2),  # of failures no pictures were kept
-            (ENVIRONMENT_VERSION, spoken, 4),
-            (ENVIRONMENT_VERSION, {**spoken, "forms": ("implicit", "resolved")}, 2),
-            (ENVIRONMENT_VERSION + 1, {}, 6),
-        )
-    ):
-        monkeypatch.setattr(export_run, "ENVIRONMENT_VERSION", version)
-        summary = export_run.run_export(
-            make_plan(**changes), tmp_path / str(number), 0, quiet, kept
-        )
-        assert summary.recorded == recorded
+    export_run.run_export(make_plan(), tmp_path / "first", 0, quiet, kept)
+    monkeypatch.setattr(export_run, "ENVIRONMENT_VERSION", ENVIRONMENT_VERSION + 1)
+
+    assert export_run.run_export(make_plan(), tmp_path / "second", 0, quiet, kept).recorded == 6
 
 
-def test_a_trajectory_s_name_has_all_that_it_depends_on(make_plan):
+OTHER_EPISODES = {
+    "task": "StopCube", "split": "val", "number": 1, "variation": 1, "policy": "forgetful",
+}  # fmt: skip
+OTHER_RECORDINGS = {
+    "coding": "lossless-video", "video": True, "depth": True, "cameras": ("wrist",), "size": 64,
+    "actions": "waypoint", "disturbed": True,
+}  # fmt: skip
+OTHER_WORDS = {
+    "setting": "direct", "form": "resolved", "stages": (1, 5), "frame": "camera",
+    "distractor": "competing", "distractors": 3, "wordings": "train", "delivery": "turns",
+}  # fmt: skip
+
+
+def test_a_trajectorys_name_has_all_that_it_depends_on(make_plan):
     """A field that the name lacked would give the trajectory of another plan."""
     ((job, _), *_) = recording_jobs(make_plan(policy="listener"))
-    fields = {
-        "task": "StopCube", "split": "val", "number": 1, "variation": 1, "policy": "forgetful",
-    }  # fmt: skip
-    spec = {
-        "coding": "lossless-video", "video": True, "depth": True, "cameras": ("wrist",),
-        "size": 64, "actions": "waypoint", "disturbed": True,
-    }  # fmt: skip
-    assert set(spec) == set(job.spec._fields)
+    assert set(OTHER_RECORDINGS) == set(job.spec._fields)
+    assert set(OTHER_WORDS) == set(OPTION_NAMES)
 
-    others = [replace(job, **{name: value}) for name, value in fields.items()]
-    for name, value in spec.items():
-        others.append(replace(job, spec=job.spec._replace(**{name: value})))
-    options = (
-        {"setting": "direct"}, {"form": "resolved"}, {"stages": (1, 5)}, {"frame": "camera"},
-        {"distractor": "competing"}, {"distractors": 3}, {"wordings": "train"},
-        {"delivery": "turns"},
-    )  # fmt: skip
-    assert {name for words in options for name in words} == set(OPTION_NAMES)
-    for words in options:
-        others.append(replace(job, options=replace(job.options, **words)))
+    jobs = [job]
+    for name, value in OTHER_EPISODES.items():
+        jobs.append(replace(job, **{name: value}))
+    for name, value in OTHER_RECORDINGS.items():
+        jobs.append(replace(job, spec=job.spec._replace(**{name: value})))
+    for name, value in OTHER_WORDS.items():
+        if name != "distractors":  # without a kind of distractors their number says nothing
+            jobs.append(replace(job, options=replace(job.options, **{name: value})))
 
-    assert len({exported.path(Path()) for exported in (job, *others)}) == 1 + len(others)
+    assert len({each.path(Path()) for each in jobs}) == len(jobs)
 
 
-def test_a_stopped_export_of_another_version_is_another_one(make_plan, monkeypatch):
-    found = {make_plan().fingerprint()}
-    for name, other in (
-        ("language_label", lambda *_: "another"),  # which names the words of each task
-        ("ENVIRONMENT_VERSION", "another"),
-        ("TRAJECTORY_VERSION", "another"),
-    ):
-        monkeypatch.setattr(export_plan, name, other)
-        found.add(make_plan().fingerprint())
-    assert len(found) == 4
+@pytest.mark.parametrize("name", ["language_label", "ENVIRONMENT_VERSION", "TRAJECTORY_VERSION"])
+def test_a_stopped_export_of_another_version_is_another_one(make_plan, monkeypatch, name):
+    """The label names the words of each task."""
+    before = make_plan().fingerprint()
+
+    other = "another"
+    if name == "language_label":
+        other = lambda *_: "another"  # noqa: E731
+    monkeypatch.setattr(export_plan, name, other)
+
+    assert make_plan().fingerprint() != before
 
 
-def test_failures_are_exported_only_on_request(export):
-    successes = list(read_dataset(export("successes")))
-    root = export("all", outcomes="all")
-    everything = list(read_dataset(root))
-    assert {recorded.status for recorded in successes} == {"success"}
-    assert [recorded.status for recorded in everything].count("failure") == 2
-    assert len(everything) == len(successes) + 2
+@pytest.mark.parametrize(
+    ("options", "statuses"),
+    [({}, ["success"] * 4), ({"outcomes": "all"}, ["success", "failure", "success"] * 2)],
+    ids=["by default", "on request"],
+)
+def test_failures_are_exported_only_on_request(export, options, statuses):
+    """Of three episodes of two tasks each second one fails."""
+    assert [recorded.status for recorded in read_dataset(export(**options))] == statuses
+
+
+def test_the_mean_of_next_success_is_the_share_of_steps_that_end_in_success(export):
+    """Four of six episodes succeed, each in its last step."""
+    root = export(outcomes="all")
 
     stats = json.loads((root / "meta/stats.json").read_text())["next.success"]
+
     assert stats["mean"] == pytest.approx([4 / (6 * synthetic_trajectories.STEPS)])
 
 
@@ -179,46 +214,61 @@ def test_variations_are_trajectories_of_their_own(export):
 
 
 def test_a_policy_is_recorded_in_every_setting(export):
+    """The oracle once for all: it does not hear the words."""
     root = export(tasks=("PickXtimes",), policy="listener", episodes=(0,))
+
     assert [recorded.name for recorded in read_dataset(root)] == [
         "PickXtimes/train/0/0/explicit-implicit",
         "PickXtimes/train/0/0/direct-implicit",
     ]
-
     table = parquet.read_table(root / "meta/demonstrations.parquet")
     assert set(table["policy"].to_pylist()) == {"listener"}
 
 
-def test_the_action_of_a_disturbed_frame_is_what_should_have_been_done(export):
-    root = export(tasks=("PickXtimes",), episodes=(0,), settings=("explicit",), disturbed=True)
-    (executed,) = read_dataset(root)
-    table = parquet.read_table(root / "data/chunk-000/file-000.parquet")
-    labels = np.array(table["action"].to_pylist())
+@pytest.fixture
+def disturbed_export(export):
+    """The folder of one disturbed episode: what was executed is 1.0 less than what was meant."""
+    return export(tasks=("PickXtimes",), episodes=(0,), settings=("explicit",), disturbed=True)
 
-    assert np.allclose(labels, executed.actions + 1.0)
+
+def test_the_action_of_a_disturbed_frame_is_what_should_have_been_done(disturbed_export):
+    (executed,) = read_dataset(disturbed_export)
+
+    table = parquet.read_table(disturbed_export / "data/chunk-000/file-000.parquet")
+
+    assert np.allclose(table["action"].to_pylist(), executed.actions + 1.0)
     assert np.array_equal(table["executed_action"].to_pylist(), executed.actions)
-    assert "**disturbed**" in (root / "README.md").read_text()
 
-    (row,) = parquet.read_table(root / "meta/demonstrations.parquet").to_pylist()
+
+def test_disturbed_episodes_are_marked_on_the_card_and_in_the_table(disturbed_export):
+    (row,) = parquet.read_table(disturbed_export / "meta/demonstrations.parquet").to_pylist()
+
     assert (row["disturbed"], row["actions"]) == (True, "joint_angle")
+    assert "**disturbed**" in (disturbed_export / "README.md").read_text()
 
 
-def test_other_options_and_folders_are_refused(tmp_path, export, make_plan, monkeypatch):
+def test_a_complete_export_is_not_overwritten(export, make_plan):
     root = export()
     with pytest.raises(InvalidValueError, match="complete export already"):
         export_run.run_export(make_plan(), root, 0, quiet)
-    strange = tmp_path / "strange"
-    strange.mkdir()
-    (strange / "thesis.tex").touch()
-    with pytest.raises(InvalidValueError, match="is not empty and no export"):
-        export_run.run_export(make_plan(), strange, 0, quiet)
-    assert [path.name for path in strange.iterdir()] == ["thesis.tex"]
 
+
+def test_a_folder_of_something_else_is_not_written_to(tmp_path, make_plan):
+    (tmp_path / "thesis.tex").touch()
+
+    with pytest.raises(InvalidValueError, match="is not empty and no export"):
+        export_run.run_export(make_plan(), tmp_path, 0, quiet)
+
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_a_stopped_export_does_not_go_on_with_other_options(tmp_path, make_plan, monkeypatch):
     monkeypatch.setattr(export_run, "record_trajectory", None)
     with pytest.raises(TypeError):
-        export_run.run_export(make_plan(), tmp_path / "stopped", 0, quiet)
+        export_run.run_export(make_plan(), tmp_path, 0, quiet)
+
     with pytest.raises(InvalidValueError, match="started with other options"):
-        export_run.run_export(make_plan(settings=("direct",)), tmp_path / "stopped", 0, quiet)
+        export_run.run_export(make_plan(settings=("direct",)), tmp_path, 0, quiet)
 
 
 @pytest.mark.parametrize(
@@ -231,13 +281,10 @@ def test_other_options_and_folders_are_refused(tmp_path, export, make_plan, monk
         ({"cameras": ()}, "cameras is empty; without pictures, ask for"),
         ({"disturbed": True, "policy": "random"}, "only the oracle is disturbed"),
         ({"disturbed": True, "format": "robomme-hdf5"}, "no place for one that was not executed"),
-        *(
-            ({"actions": "waypoint", **other}, "actions is 'waypoint': such frames have the")
-            for other in ({"format": "lerobot-v2.1"}, {"video": True})
-        ),
-        *(
-            ({"cameras": ("front",), **other}, r"cameras is front and size .*; .* both cam")
-            for other in ({"format": "robomme-hdf5"}, {"format": "lerobot-v2.1"})
+        ({"actions": "waypoint", "video": True}, "actions is 'waypoint': such frames have the"),
+        (
+            {"cameras": ("front",), "format": "robomme-hdf5"},
+            r"cameras is front and size .*; .* both cam",
         ),
     ],
 )
@@ -246,40 +293,56 @@ def test_plans_that_make_no_sense_are_refused(make_plan, changes, message):
         make_plan(**changes)
 
 
-def test_the_card_tells_outcomes_and_lines_to_train(export):
+def test_the_card_says_how_many_episodes_of_which_outcome_there_are(export):
     card = (export(pictures="lossy-video") / "README.md").read_text()
+
     assert "4 success, 2 failure" in card
     assert "with loss: H.264, yuv420p" in card
-    assert "solved 0 of 50 episodes" in card.partition("lerobot-train")[2]
-    assert "--dataset.video_backend=pyav" in card
-    assert "--policy.pretrained_backbone_weights=null" in card
-    assert "--policy.push_to_hub=false" in card
 
-    text = (export("v21", format="lerobot-v2.1") / "README.md").read_text()
-    config = text.split("```python\n")[1].split("```")[0]
+
+def test_the_card_of_version_3_has_the_command_that_trains(export):
+    card = (export(pictures="lossy-video") / "README.md").read_text()
+
+    _, _, training = card.partition("lerobot-train")
+
+    assert "--dataset.video_backend=pyav" in training
+    assert "--policy.push_to_hub=false" in training
+    assert "solved 0 of 50 episodes" in training
+
+
+def test_the_card_of_version_2_1_has_a_configuration_that_trains(export):
+    card = (export(format="lerobot-v2.1") / "README.md").read_text()
+
+    config = card.split("```python\n")[1].split("```")[0]
+
     compile(config, "config", "exec")
     assert '"observation/wrist_image": "wrist_image"' in config
 
 
-def test_an_explicit_instruction_is_its_own_resolved_form(make_plan):
-    both = make_plan(forms=("implicit", "resolved"), settings=("explicit", "direct", "spatial"))
-    assert [len(said) for _, said in recording_jobs(both)] == [1 + 2 + 2] * 6
+@pytest.mark.parametrize(
+    ("forms", "instructions"),
+    [(("implicit", "resolved"), 1 + 2 + 2), (("resolved",), 3)],
+)
+def test_an_explicit_instruction_is_its_own_resolved_form(make_plan, forms, instructions):
+    plan = make_plan(forms=forms, settings=("explicit", "direct", "spatial"))
+    assert [len(said) for _, said in recording_jobs(plan)] == [instructions] * 6
 
-    alone = make_plan(forms=("resolved",), settings=("explicit", "direct"))
-    assert [len(said) for _, said in recording_jobs(alone)] == [2] * 6
 
-
-def test_states_alone_need_no_pictures(export):
+def test_an_export_without_pictures_has_no_columns_of_them(export):
     root = export(pictures="none", video=True)
-    card = (root / "README.md").read_text()
-    assert "There are no pictures." in card
-
-    # What `datasets.load_dataset` and the Hub's viewer read: frames, and no table of facts.
-    pattern = yaml.safe_load(card.split("---")[1])["configs"][0]["data_files"]
-    assert {*root.glob(pattern)} == {*(root / "data").rglob("*.parquet")}
-    assert [recorded.task for recorded in read_dataset(root)] == ["PickXtimes"] * 2 + [
-        "VideoUnmask"
-    ] * 2
 
     info = json.loads((root / "meta/info.json").read_text())
+
     assert not [name for name in info["features"] if "image" in name]
+    assert "There are no pictures." in (root / "README.md").read_text()
+    assert len(list(read_dataset(root))) == 4
+
+
+def test_the_card_names_the_files_of_frames_to_who_loads_the_dataset(export):
+    """`datasets.load_dataset` and the Hub's viewer must not take the table of facts for frames."""
+    root = export(pictures="none")
+
+    head = (root / "README.md").read_text().split("---")[1]
+    pattern = yaml.safe_load(head)["configs"][0]["data_files"]
+
+    assert {*root.glob(pattern)} == {*(root / "data").rglob("*.parquet")}

@@ -16,7 +16,6 @@ from roboirg.language import instruct
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import scaled_square
 
-CAMERAS = ("front", "wrist")
 WRIST = "observation.images.wrist"
 COLUMNS = {
     "lerobot-v3": ("observation.state", "action", "observation.images.front", WRIST),
@@ -73,55 +72,77 @@ def texts_of(root):
     return list(pd.read_parquet(root / "meta/tasks.parquet").index)
 
 
+def recorded_arrays(task, video=0):
+    """Return what was recorded of episode 0 of a task, after so many rows of video."""
+    episode = get_episode(task, "train", 0)
+    return synthetic.arrays_of(episode, video + 1 + synthetic.STEPS, video, has_depth=False)
+
+
 @pytest.mark.parametrize("version", COLUMNS)
-def test_every_frame_is_as_recorded(export, version):
-    state, action, *pictures = COLUMNS[version]
+def test_a_frame_has_the_state_before_its_action(export, version):
+    """A row of a recording has the action that led to it, so a frame has that of the next row."""
+    state, action, *_ = COLUMNS[version]
+    recorded = recorded_arrays("PickXtimes")
+
+    _, frames = next(episodes_of(export(format=version)))
+
+    assert len(frames) == synthetic.STEPS
+    for time, frame in enumerate(frames):
+        finger, _ = recorded["gripper"][time]
+        assert frame[state] == [*recorded["joint_positions"][time], finger]
+        assert frame[action] == recorded["actions"][time + 1].tolist()
+        assert frame["timestamp"] == pytest.approx(time / 20, abs=1e-6)
+
+
+@pytest.mark.parametrize("version", COLUMNS)
+def test_a_frame_has_the_pictures_of_both_cameras(export, version):
+    *_, front, wrist = COLUMNS[version]
+    seed = get_episode("PickXtimes", "train", 0).seed
+
+    _, frames = next(episodes_of(export(format=version)))
+
+    for time, frame in enumerate(frames):
+        assert np.array_equal(decoded(frame[front]), synthetic.picture("front", seed, time))
+        assert np.array_equal(decoded(frame[wrist]), synthetic.picture("wrist", seed, time))
+
+
+@pytest.mark.parametrize("version", COLUMNS)
+def test_all_frames_are_numbered_and_counted(export, version):
+    """Two tasks in two settings, of which two of three episodes succeed: eight."""
     root = export(format=version)
 
-    facts = pd.read_parquet(root / "meta/demonstrations.parquet").set_index("episode_index")
-    index = 0
-    for row, frames in episodes_of(root):
-        told = facts.loc[row["episode_index"]]
-        episode = get_episode(told.task, told.split, int(told.episode))
-        expected = synthetic.arrays_of(episode, len(frames) + 1, 0, has_depth=False)
-        for time, frame in enumerate(frames):
-            assert (frame["index"], frame["frame_index"]) == (index, time)
-            assert frame["timestamp"] == pytest.approx(time / 20, abs=1e-6)
-            finger, _ = expected["gripper"][time]
-            assert frame[state] == [*expected["joint_positions"][time], finger]
-            assert frame[action] == expected["actions"][time + 1].tolist()
-            for camera, name in zip(CAMERAS, pictures, strict=True):
-                shown = synthetic.picture(camera, episode.seed, time)
-                assert np.array_equal(decoded(frame[name]), shown)
-            index += 1
+    numbers = []
+    for _, frames in episodes_of(root):
+        assert [frame["frame_index"] for frame in frames] == list(range(synthetic.STEPS))
+        numbers += [frame["index"] for frame in frames]
+
+    assert numbers == list(range(8 * synthetic.STEPS))
     info = read_json(root / "meta/info.json")
-    assert (info["fps"], info["total_frames"]) == (20, index)
-    # Two tasks and settings; episode 1 of each task fails.
-    assert info["total_episodes"] == len(facts) == 8
+    assert (info["fps"], info["total_episodes"], info["total_frames"]) == (20, 8, len(numbers))
 
 
 @pytest.mark.parametrize("version", COLUMNS)
 def test_every_frame_has_the_words_of_its_episode(export, version):
     root = export(format=version)
-
     texts = texts_of(root)
     facts = pd.read_parquet(root / "meta/demonstrations.parquet").set_index("episode_index")
+
     for row, frames in episodes_of(root):
-        told = facts.loc[row["episode_index"]]
-        episode = get_episode(told.task, told.split, int(told.episode))
-        assert told.text == instruct(episode, told.setting, told.form).text == row["tasks"][0]
-        assert told.explicit == instruct(episode).text
-        assert row["length"] == len(frames) == synthetic.STEPS
-        assert {texts[frame["task_index"]] for frame in frames} == {told.text}
+        fact = facts.loc[row["episode_index"]]
+        episode = get_episode(fact.task, fact.split, int(fact.episode))
+        said = instruct(episode, fact.setting, fact.form).text
+        assert (fact.text, row["tasks"][0], fact.explicit) == (said, said, instruct(episode).text)
+        assert {texts[frame["task_index"]] for frame in frames} == {said}
+
     assert read_json(root / "meta/info.json")["total_tasks"] == len(texts)
 
 
 def test_version_3_has_pose_actions_and_subgoals(export):
     """Of a task without a video."""
+    recorded = recorded_arrays("PickXtimes")
+
     _, frames = next(episodes_of(export()))
 
-    episode = get_episode("PickXtimes", "train", 0)
-    recorded = synthetic.arrays_of(episode, synthetic.STEPS + 1, 0, has_depth=False)
     for time, frame in enumerate(frames):
         assert frame["pose_action"] == pytest.approx(recorded["pose_actions"][time + 1])
         assert frame["subgoal"] == recorded["subgoals"][time + 1]
@@ -146,26 +167,47 @@ def test_version_3_names_all_columns_and_all_episodes(export):
     assert None not in [feature["names"] for feature in info["features"].values()]
 
 
-def test_version_3_has_statistics_of_episodes_and_of_all_frames(export):
-    root = export()
+def all_frames(root):
+    """Return the frames of all episodes, one after the other."""
+    frames = []
+    for _, of_episode in episodes_of(root):
+        frames += of_episode
+    return frames
 
-    every = []
-    for row, frames in episodes_of(root):
-        end = len(every) + len(frames)
-        assert (row["dataset_from_index"], row["dataset_to_index"]) == (len(every), end)
+
+def test_version_3_has_statistics_of_each_episode_and_where_it_lies(export):
+    begin = 0
+    for row, frames in episodes_of(export()):
         states = np.array([frame["observation.state"] for frame in frames])
         assert np.allclose(row["stats/observation.state/max"], states.max(axis=0))
-        every += frames
+        assert (row["dataset_from_index"], row["dataset_to_index"]) == (begin, begin + len(frames))
+        begin += len(frames)
+
+
+@pytest.mark.parametrize("name", ["observation.state", "action", "index", "next.success"])
+def test_version_3_has_statistics_of_all_frames(export, name):
+    root = export()
+
+    stats = read_json(root / "meta/stats.json")[name]
+
+    values = np.array([np.atleast_1d(frame[name]) for frame in all_frames(root)], dtype=float)
+    assert np.allclose(stats["min"], values.min(axis=0))
+    assert np.allclose(stats["max"], values.max(axis=0))
+    assert np.allclose(stats["mean"], values.mean(axis=0))
+    assert np.allclose(stats["std"], values.std(axis=0))
+    assert np.allclose(stats["q99"], np.quantile(values, 0.99, axis=0))
+    assert stats["count"] == [len(values)]
+
+
+def test_version_3_has_statistics_of_pictures_between_0_and_1(export):
+    root = export()
+
     stats = read_json(root / "meta/stats.json")
-    assert set(stats) == set(every[0]) - {"subgoal", "grounded_subgoal"}
-    for name in ("observation.state", "action", "index", "next.success"):
-        values = np.array([np.atleast_1d(frame[name]) for frame in every], dtype=float)
-        for what in ("min", "max", "mean", "std"):
-            assert np.allclose(stats[name][what], getattr(values, what)(axis=0))
-        assert np.allclose(stats[name]["q99"], np.quantile(values, 0.99, axis=0))
-        assert stats[name]["count"] == [len(every)]
-    pixels = np.stack([decoded(frame[WRIST]) for frame in every]).reshape(-1, 3) / 255.0
-    assert np.ravel(stats[WRIST]["mean"]) == pytest.approx(pixels.mean(axis=0))
+
+    pictures = np.stack([decoded(frame[WRIST]) for frame in all_frames(root)])
+    mean = pictures.reshape(-1, 3).mean(axis=0) / 255
+    assert np.ravel(stats[WRIST]["mean"]) == pytest.approx(mean)
+    assert not {"subgoal", "grounded_subgoal"} & set(stats), "texts have none"
 
 
 def test_version_3_stores_pictures_of_two_settings_once(export):
@@ -180,48 +222,68 @@ def data_bytes(root):
     return sum(path.stat().st_size for path in (root / "data").rglob("*.parquet"))
 
 
-@pytest.mark.parametrize(
-    ("version", "pictures"), [("lerobot-v3", "png"), ("lerobot-v2.1", "lossless-video")]
-)
-def test_one_camera_in_small_pictures(export, version, pictures):
-    root = export(
+@pytest.fixture(params=[("lerobot-v3", "png"), ("lerobot-v2.1", "lossless-video")], ids=str)
+def small_wrist_export(export, request):
+    """The folder of an export of the wrist's pictures alone, of 96 × 96 pixels."""
+    version, pictures = request.param
+    return export(
         cameras=("wrist",), size=96, pictures=pictures, format=version, settings=("explicit",)
     )
-    info = read_json(root / "meta/info.json")
-    stats = read_json(root / "meta/stats.json")
-    shown = [name for name in info["features"] if "images" in name]
 
-    assert shown == [name for name in stats if "images" in name] == [WRIST]
+
+def test_one_camera_in_small_pictures_is_described_as_such(small_wrist_export):
+    info = read_json(small_wrist_export / "meta/info.json")
+    stats = read_json(small_wrist_export / "meta/stats.json")
+
+    assert [name for name in info["features"] if "images" in name] == [WRIST]
     assert info["features"][WRIST]["shape"] == [96, 96, 3]
-    assert stats[WRIST]["count"] == stats["action"]["count"] == [4 * synthetic.STEPS]
+    assert stats[WRIST]["count"] == [4 * synthetic.STEPS]
+    assert "Cameras: wrist; 96 × 96 pixels." in (small_wrist_export / "README.md").read_text()
 
+
+def test_small_pictures_are_scaled(small_wrist_export):
+    """Of the first episode, the picture at step 3, from its table or its film."""
     seed = get_episode("PickXtimes", "train", 0).seed
-    expected = scaled_square(synthetic.picture("wrist", seed, 3), 96)
-    if pictures == "png":
-        path = min((root / "data").rglob("*.parquet"))
-        found = decoded(read_rows(path)[3][WRIST])
+
+    films = sorted(small_wrist_export.rglob("*.mp4"))
+    if films:
+        shown = frames_of(films[0])[3]
     else:
-        found = frames_of(min(root.rglob("*.mp4")))[3]
-    assert np.array_equal(found, expected)
-    assert "Cameras: wrist; 96 × 96 pixels." in (root / "README.md").read_text()
+        shown = decoded(read_rows(min(small_wrist_export.rglob("data/**/*.parquet")))[3][WRIST])
+
+    assert np.array_equal(shown, scaled_square(synthetic.picture("wrist", seed, 3), 96))
 
 
-def test_the_video_comes_before_the_policy_and_is_marked(export):
-    episode = get_episode("VideoUnmask", "train", 0)
-    key = "videos/observation.images.wrist"
+@pytest.fixture
+def export_with_video(export):
+    """The folder of one episode with four frames of video before the policy's turn."""
+    return export(
+        video=True, pictures="lossless-video", tasks=("VideoUnmask",), episodes=(0,),
+        settings=("explicit",),
+    )  # fmt: skip
 
-    root = export(video=True, pictures="lossless-video", tasks=("VideoUnmask",), episodes=(0,))
 
-    assert read_json(root / "meta/stats.json")[WRIST]["count"] == [2 * (4 + synthetic.STEPS)]
-    for row, frames in episodes_of(root):
-        assert [frame["is_video_demo"] for frame in frames].index(False) == 4
-        expected = synthetic.arrays_of(episode, len(frames) + 1, 4, has_depth=False)
-        assert frames[3]["action"] == expected["actions"][4].tolist()
-        assert row[f"{key}/from_timestamp"] == 0.0
-        assert row[f"{key}/to_timestamp"] == pytest.approx(len(frames) / 20)
-        video = frames_of(root / f"{key}/chunk-000/file-000.mp4")
-        for time in range(len(frames)):
-            assert np.array_equal(video[time], synthetic.picture("wrist", episode.seed, time))
+def test_the_video_comes_before_the_policys_turn_and_is_marked(export_with_video):
+    recorded = recorded_arrays("VideoUnmask", video=4)
+
+    _, frames = next(episodes_of(export_with_video))
+
+    assert [frame["is_video_demo"] for frame in frames] == [True] * 4 + [False] * synthetic.STEPS
+    assert frames[3]["action"] == recorded["actions"][4].tolist()
+
+
+def test_a_film_of_an_episode_shows_the_video_too(export_with_video):
+    seed = get_episode("VideoUnmask", "train", 0).seed
+    key = f"videos/{WRIST}"
+
+    row, frames = next(episodes_of(export_with_video))
+    film = frames_of(export_with_video / f"{key}/chunk-000/file-000.mp4")
+
+    assert row[f"{key}/from_timestamp"] == 0.0
+    assert row[f"{key}/to_timestamp"] == pytest.approx(len(frames) / 20)
+    assert len(frames) == 4 + synthetic.STEPS
+    for time, picture in enumerate(film):
+        assert np.array_equal(picture, synthetic.picture("wrist", seed, time))
 
 
 def test_version_2_1_has_a_file_and_statistics_for_each_episode_and_no_videos(export):
@@ -253,43 +315,32 @@ def test_version_2_1_says_where_the_gripper_is_in_the_state(export):
     assert modality["state"]["gripper"] == {"start": 7, "end": 8, "original_key": "state"}
 
 
-READ_BACK = {
-    ("PickXtimes", 0): 0,
-    ("PickXtimes", 2): 0,
-    ("VideoUnmask", 0): 4,
-    ("VideoUnmask", 2): 4,
-}
-"""Task and number of the episodes that succeed, and the rows of their video."""
-
-
 @pytest.mark.parametrize("version", COLUMNS)
 def test_each_trajectory_is_read_back_once(export, version):
-    """Also where two settings give it different words."""
+    """Also where two settings give it different words. Episode 1 of each task fails."""
     found = read_dataset(export(format=version, video=True))
 
-    assert [(trajectory.task, trajectory.index) for trajectory in found] == list(READ_BACK)
+    assert [(trajectory.task, trajectory.index) for trajectory in found] == [
+        ("PickXtimes", 0), ("PickXtimes", 2), ("VideoUnmask", 0), ("VideoUnmask", 2),
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("version", [*COLUMNS, "robomme-hdf5"])
-def test_actions_and_states_are_read_back_without_the_video(export, version):
+@pytest.mark.parametrize(("task", "video"), [("PickXtimes", 0), ("VideoUnmask", 4)])
+def test_actions_and_states_are_read_back_without_the_video(export, version, task, video):
     """The first row after the video is the state at reset; its action was not taken."""
-    root = export(format=version, video=True)
+    recorded = recorded_arrays(task, video)
 
-    for found, (task, index) in zip(read_dataset(root), READ_BACK, strict=True):
-        episode = get_episode(task, "train", index)
-        video = READ_BACK[task, index]
-        rows = video + 1 + synthetic.STEPS
-        recorded = synthetic.arrays_of(episode, rows, video, has_depth=False)
-        assert (found.task, found.seed) == (task, episode.seed)
-        assert np.array_equal(found.actions, recorded["actions"][video + 1 :])
-        assert np.array_equal(found.states[:, :7], recorded["joint_positions"][video + 1 :])
+    found, _ = read_dataset(export(format=version, video=True, tasks=(task,)))
+
+    assert (found.task, found.seed) == (task, get_episode(task, "train", 0).seed)
+    assert np.array_equal(found.actions, recorded["actions"][video + 1 :])
+    assert np.array_equal(found.states[:, :7], recorded["joint_positions"][video + 1 :])
 
 
 @pytest.mark.parametrize("version", COLUMNS)
 def test_the_last_state_is_read_back_with_the_gripper(export, version):
     """RoboMME's format has no last state."""
-    found = next(iter(read_dataset(export(format=version))))
+    found, *_ = read_dataset(export(format=version))
 
-    episode = get_episode("PickXtimes", "train", 0)
-    recorded = synthetic.arrays_of(episode, 1 + synthetic.STEPS, 0, has_depth=False)
-    assert np.array_equal(found.final_state[7:], recorded["gripper"][-1])
+    assert np.array_equal(found.final_state[7:], recorded_arrays("PickXtimes")["gripper"][-1])

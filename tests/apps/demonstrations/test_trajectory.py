@@ -28,54 +28,72 @@ def frames_of(content):
         return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
-def test_a_trajectory_is_read_as_it_was_written(tmp_path):
-    episode = get_episode("VideoUnmask", "train", 0)
+@pytest.fixture
+def trajectory(tmp_path):
+    """The file of an episode with four rows of video and depth, and its facts."""
     path = tmp_path / "one.zip"
-    facts = synthetic.record(episode, None, path, RecordingSpec(video=True, depth=True))
-    found = load_trajectory(path)
+    episode = get_episode("VideoUnmask", "train", 0)
+    return path, synthetic.record(episode, None, path, RecordingSpec(video=True, depth=True))
 
-    assert found.facts == load_facts(path) == facts
+
+def test_facts_of_a_trajectory_are_read_as_they_were_written(trajectory):
+    path, facts = trajectory
+
+    assert load_trajectory(path).facts == load_facts(path) == facts
     assert (facts.video_length, facts.frames) == (4, 4 + synthetic.STEPS)
-    assert set(found.calibration) == {
-        f"{camera}_{kind}" for camera in ("front", "wrist") for kind in ("extrinsic", "intrinsic")
-    }
+
+
+def test_pictures_and_depth_of_a_trajectory_are_read_as_they_were_written(trajectory):
+    path, facts = trajectory
 
     with zipfile.ZipFile(path) as archive:
         for row in range(facts.frames + 1):
             picture = read_picture(archive, "wrist", row)
             depth = read_depth(archive, "wrist", row)
-            assert np.array_equal(picture, synthetic.picture("wrist", episode.seed, row))
-            assert np.array_equal(depth, synthetic.depth(episode.seed, row))
+            assert np.array_equal(picture, synthetic.picture("wrist", facts.seed, row))
+            assert np.array_equal(depth, synthetic.depth(facts.seed, row))
 
 
-def test_pictures_can_be_dropped_and_nothing_else(tmp_path):
-    path = tmp_path / "one.zip"
-    synthetic.record(get_episode("PickXtimes", "train", 0), None, path, RecordingSpec())
-    before = load_trajectory(path)
+def test_a_trajectory_with_depth_has_the_calibration_of_both_cameras(trajectory):
+    path, _ = trajectory
+    assert set(load_trajectory(path).calibration) == {
+        "front_extrinsic", "front_intrinsic", "wrist_extrinsic", "wrist_intrinsic",
+    }  # fmt: skip
+
+
+def test_pictures_can_be_dropped_and_nothing_else(trajectory):
+    """Twice does no harm."""
+    path, facts = trajectory
+    actions = load_trajectory(path).actions
     assert has_pictures(path)
-    for _ in range(2):
-        drop_pictures(path)
-        assert not has_pictures(path)
 
+    drop_pictures(path)
+    drop_pictures(path)
+
+    assert not has_pictures(path)
     after = load_trajectory(path)
-    assert after.facts == before.facts
-    assert np.array_equal(after.actions, before.actions)
+    assert after.facts == facts
+    assert np.array_equal(after.actions, actions)
 
 
-def test_a_damaged_trajectory_is_named(tmp_path):
+def test_a_damaged_trajectory_is_refused_by_its_name(tmp_path):
     path = tmp_path / "one.zip"
     path.write_bytes(b"no archive")
+
     with pytest.raises(InvalidValueError, match=r"one\.zip' cannot be read"):
         load_trajectory(path)
 
 
-@pytest.mark.parametrize(("coding", "most"), [("lossless-video", 0.0), ("lossy-video", 4.0)])
-def test_a_video_shows_what_was_encoded(coding, most):
-    encoder = VideoEncoder(coding, PICTURE_SIZE)
+@pytest.mark.parametrize(
+    ("coding", "largest_mean_difference"), [("lossless-video", 0.0), ("lossy-video", 4.0)]
+)
+def test_a_video_shows_what_was_encoded(coding, largest_mean_difference):
+    """The difference is that of values from 0 to 255."""
     pictures = np.stack([synthetic.picture("front", 7, row) for row in range(25)])
+    encoder = VideoEncoder(coding, PICTURE_SIZE)
     for picture in pictures:
         encoder.add(picture)
 
-    found = np.stack(frames_of(encoder.finish()))
+    shown = np.stack(frames_of(encoder.finish()))
 
-    assert np.abs(found.astype(int) - pictures).mean() <= most
+    assert np.abs(shown.astype(int) - pictures).mean() <= largest_mean_difference

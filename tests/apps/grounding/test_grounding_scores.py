@@ -35,6 +35,7 @@ TASKS = ("PickXtimes", "BinFill", "VideoUnmask", "VideoPlaceButton", "StopCube")
 
 @functools.cache
 def items(tasks=TASKS, episodes=8):
+    """Return the grounding items of some tasks' first episodes, in all settings."""
     found = []
     for task in tasks:
         for index in range(episodes):
@@ -43,59 +44,57 @@ def items(tasks=TASKS, episodes=8):
 
 
 def rows_of(answers, kind, dataset=None):
-    (score,) = [
-        score for score in score_answers(dataset or items(), answers, "model") if score.kind == kind
-    ]
+    """Score answers; return the score of a kind of question, and its rows by setting."""
+    scores = score_answers(dataset or items(), answers, "model")
+    (score,) = [score for score in scores if score.kind == kind]
     return score, {row.summary.key.options.setting: row for row in score_rows(score)}
 
 
-def item_of(task, setting="direct", index=0):
-    return next(
-        item
-        for item in items()
-        if (item.task, item.setting, item.episode) == (task, setting, index)
-    )
+def item_of(task, setting="direct"):
+    """Return the item of the first episode of a task in a setting."""
+    return next(item for item in items() if (item.task, item.setting) == (task, setting))
 
 
 @pytest.mark.parametrize("kind", QUESTION_KINDS)
 def test_the_oracle_is_always_right(kind):
     score, rows = rows_of(floor_answers("oracle", items()), kind)
+
     assert score.unparsed == score.missing == 0
     assert set(rows) == set(SETTINGS)
-    for row in rows.values():
-        assert row.summary.rate == row.corrected == 1
-        assert row.summary.gap is None or row.summary.gap.value == 0
+    for setting, row in rows.items():
+        assert row.summary.rate == row.corrected == 1, setting
 
 
 @pytest.mark.parametrize("kind", ["slots", "choice"])
 def test_random_answers_are_at_chance(kind):
     """Within three points, over three thousand answers."""
     known = {item.id: item for item in items()}
-    seeds = range(math.ceil(3_000 / len(items())))
-    found = [
-        (
-            judge_reply(known[answer.id], kind, answer.reply).right,
-            guess_chance(known[answer.id], kind),
-        )
-        for seed in seeds
-        for answer in floor_answers("chance", items(), seed)
-        if answer.kind == kind
-    ]
-    assert len(found) >= 3_000
+    right = []
+    chances = []
+    for seed in range(math.ceil(3_000 / len(items()))):
+        for answer in floor_answers("chance", items(), seed):
+            if answer.kind == kind:
+                item = known[answer.id]
+                right.append(judge_reply(item, kind, answer.reply).right)
+                chances.append(guess_chance(item, kind))
 
-    right, expected = np.mean(found, axis=0)
-    assert abs(right - expected) < 0.03
+    assert len(right) >= 3_000
+    assert abs(np.mean(right) - np.mean(chances)) < 0.03
 
 
-def test_random_pixels_hit_as_often_as_masks_are_large():
+MASK = 64 / 256**2
+"""The share of the picture that a mask of the items here covers."""
+
+
+@pytest.mark.parametrize(
+    ("points", "in_order", "chance"),
+    [(1, True, MASK), (2, True, MASK**2), (2, False, 2 * MASK**2)],
+)
+def test_random_pixels_hit_as_often_as_masks_are_large(points, in_order, chance):
     item = item_of("StopCube")
-    single = replace(item, points=item.points[:1])
-    share = 64 / 256**2
-    either = replace(item, points_in_order=False)
+    item = replace(item, points=item.points[:points], points_in_order=in_order)
 
-    chances = [guess_chance(each, "points") for each in (single, item, either)]
-
-    assert chances == pytest.approx([share, share**2, 2 * share**2])
+    assert guess_chance(item, "points") == pytest.approx(chance)
 
 
 @pytest.mark.parametrize(
@@ -104,31 +103,35 @@ def test_random_pixels_hit_as_often_as_masks_are_large():
         ("C. Put the cube there.", "C"),
         ("Let me see. A cube ... The answer is B.", "B"),
         ('{"choice": "B"}', "B"),
-        ("Not A. Answer: D", None),  # there are three choices
+        ("Not A. Answer: D", None),
         ("Because it is red.", None),
     ],
 )
 def test_a_choice_is_read_by_its_letter(reply, understood):
+    """There are three choices."""
     item = next(item for item in items() if len(item.choices) == 3)
+
     verdict = judge_reply(item, "choice", reply)
 
     assert verdict.understood == understood
     assert verdict.right == (understood == item.choice)
 
 
-def test_the_words_of_no_choice_cast_doubt_on_its_letter():
+@pytest.mark.parametrize("form", ["{letter}. {choice}", "The answer is {letter}: {choice}"])
+def test_the_words_of_no_choice_cast_doubt_on_its_letter(form):
     for item in items():
         for letter, choice in zip("ABCD", item.choices, strict=False):
-            for reply in (f"{letter}. {choice}", f"The answer is {letter}: {choice}"):
-                assert judge_reply(item, "choice", reply).understood == letter
+            reply = form.format(letter=letter, choice=choice)
+            assert judge_reply(item, "choice", reply).understood == letter, reply
 
 
-def test_thoughts_in_an_answer_are_not_scored():
+@pytest.mark.parametrize("kind", QUESTION_KINDS)
+def test_thoughts_in_an_answer_are_not_scored(kind):
     item = item_of("PickXtimes")
     thoughts = f"<think>{item.goals[0]} or {item.goals[-1]}, the answer is D</think>"
-    for kind in QUESTION_KINDS:
-        assert judge_reply(item, kind, f"{thoughts}\n{right_reply(item, kind)}").right
-        assert judge_reply(item, kind, thoughts).understood is None
+
+    assert judge_reply(item, kind, f"{thoughts}\n{right_reply(item, kind)}").right
+    assert judge_reply(item, kind, thoughts).understood is None
 
 
 def test_points_in_a_list_are_all_read_and_numbers_may_be_texts():
@@ -138,18 +141,21 @@ def test_points_in_a_list_are_all_read_and_numbers_may_be_texts():
 
 
 def test_slots_are_judged_one_by_one():
+    """The color is right and the number is not."""
     item = item_of("PickXtimes")
     answer = json.loads(item.answer)
     other = {**answer, "repeats": answer["repeats"] % 5 + 1}
+
     verdict = judge_reply(item, "slots", f"I think: ```json\n{json.dumps(other)}\n```")
 
     assert verdict.parts == {"color": True, "repeats": False}
     assert not verdict.right
     assert json.loads(verdict.understood) == other
 
-    nonsense = judge_reply(item, "slots", "red, I guess")
-    assert nonsense == (False, None, {"color": False, "repeats": False})
-    assert judge_reply(item, "slots", json.dumps(answer)).right
+
+def test_a_reply_that_is_no_goal_has_all_slots_wrong():
+    verdict = judge_reply(item_of("PickXtimes"), "slots", "red, I guess")
+    assert verdict == (False, None, {"color": False, "repeats": False})
 
 
 @pytest.mark.parametrize(
@@ -162,86 +168,119 @@ def test_slots_are_judged_one_by_one():
         ([(10, 40), (30, 40), (10, 40)], False, [True, True]),
         ([(-1, 40), (300, 40)], False, [False, False]),
     ],
+    ids=["in both", "just outside", "swapped", "one", "one too many", "outside the picture"],
 )
 def test_points_must_lie_in_the_masks_in_order(points, right, parts):
-    item = item_of("PickXtimes")
+    """The masks are 8 × 8 pixels, at (10, 40) and at (30, 40)."""
     reply = json.dumps({"points": [{"x": x, "y": y} for x, y in points]})
 
-    verdict = judge_reply(item, "points", reply)
+    verdict = judge_reply(item_of("PickXtimes"), "points", reply)
 
     assert verdict.right == right
     assert list(verdict.parts.values()) == parts
 
 
-def test_points_of_amounts_have_no_order():
-    item = item_of("BinFill")
-    assert not item.points_in_order
-
-    swapped = [{"x": 30, "y": 40}, {"x": 10, "y": 40}]
-    assert judge_reply(item, "points", json.dumps({"points": swapped})).right
-    assert not judge_reply(item, "points", json.dumps({"points": [swapped[0]] * 2})).right
+@pytest.mark.parametrize(
+    ("second", "right"), [({"x": 10, "y": 40}, True), ({"x": 30, "y": 40}, False)]
+)
+def test_points_of_amounts_have_no_order(second, right):
+    """But each mask must be met: the second point lies in the first mask, or again in the other."""
+    reply = json.dumps({"points": [{"x": 30, "y": 40}, second]})
+    assert judge_reply(item_of("BinFill"), "points", reply).right == right
 
 
 @pytest.mark.parametrize(
     "reply", ["", "[1, 2]", '{"points": 3}', '{"points": []}', '{"x": true, "y": 1}',
-              '{"points": [{"x": "a", "y": 2}]}', '{"points": [{"x": NaN, "y": 2}]}',
-              '{"points": [{"x": "nan", "y": 2}]}', '{"points": [{"x": 2, "y": 1e400}]}',
-              '{"points": [{"x": "Infinity", "y": 2}]}', '{"x": 1, "y": 2, "x": 3}']
+              '{"points": [{"x": NaN, "y": 2}]}', '{"points": [{"x": "nan", "y": 2}]}',
+              '{"points": [{"x": 2, "y": 1e400}]}', '{"x": 1, "y": 2, "x": 3}']
 )  # fmt: skip
 def test_replies_that_point_nowhere_are_no_answer(reply):
     verdict = judge_reply(item_of("PickXtimes"), "points", reply)
+
     assert verdict.understood is None
     assert not verdict.right
 
 
-def test_scores_are_what_plain_counts_give():
-    """All explicit and no direct answer is right, half of the items have none."""
-    given = [
-        Answer(item.id, "slots", item.answer if item.setting == "explicit" else "{}")
-        for item in items()
-        if item.episode < 4
-    ]
-    score, rows = rows_of(given, "slots")
-    explicit = rows["explicit"]
+@pytest.fixture(scope="module")
+def half_answered():
+    """The score, and rows by setting, of four of eight episodes of five tasks.
+
+    All explicit answers are right, and all others say nothing.
+    """
+    answers = []
+    for item in items():
+        if item.episode < 4:
+            reply = item.answer if item.setting == "explicit" else "{}"
+            answers.append(Answer(item.id, "slots", reply))
+    return rows_of(answers, "slots")
+
+
+def test_rates_and_gap_are_those_of_the_items_that_have_answers(half_answered):
+    _, rows = half_answered
+
+    assert rows["explicit"].summary.rate == 1
+    assert rows["direct"].summary.rate == 0
+    assert rows["direct"].summary.gap.value == -1
+    assert rows["direct"].summary.counts.trials == 4 * 5
+
+
+def test_p_values_are_those_of_the_sign_flip_test_and_holms_of_four_settings(half_answered):
+    """All 20 pairs differ to one side; spatial has fewer tasks, so its p-value is larger."""
+    _, rows = half_answered
+
+    p_value = 2 * 0.5**20
+
+    assert rows["direct"].summary.gap.p_value == pytest.approx(p_value)
+    assert rows["direct"].summary.p_holm == pytest.approx(4 * p_value)
+
+
+def test_a_rate_is_corrected_for_chance(half_answered):
+    """0 at chance, and 1 if all is right; a rate of 0 is as far below as chance allows."""
+    _, rows = half_answered
     direct = rows["direct"]
 
-    assert (explicit.summary.rate, direct.summary.rate, direct.summary.gap.value) == (1, 0, -1)
-    assert direct.summary.counts.trials == 4 * len(TASKS)
-
-    p_value = 2 * 0.5 ** (4 * len(TASKS))
-    assert direct.summary.gap.p_value == pytest.approx(p_value)
-    # Four settings are tested together; spatial has fewer tasks, so its p-value is larger.
-    assert direct.summary.p_holm == pytest.approx(4 * p_value)
-    assert (explicit.hidden, direct.hidden) == (None, 0)
-    # Of three goals or letters, a rate of 0 is as far below chance as that allows.
     assert direct.corrected == pytest.approx(-direct.chance / (1 - direct.chance))
-    assert score.unparsed == sum(item.setting != "explicit" for item in items()) / 2
+
+
+def test_unusable_and_missing_answers_are_counted(half_answered):
+    score, _ = half_answered
+
+    assert score.unparsed == sum(
+        item.setting != "explicit" and item.episode < 4 for item in items()
+    )
     assert score.missing == sum(item.episode >= 4 for item in items())
 
 
-@pytest.mark.parametrize("rule", ["first-mention", "surface", "command"])
-def test_shortcuts_are_right_as_often_as_their_probability_says(rule):
-    """The expected success of the listeners in `roboirg tables --floors`, or of a guess."""
+def test_only_items_with_hidden_slots_have_a_rate_of_them(half_answered):
+    """Explicit words hide nothing."""
+    _, rows = half_answered
+    assert (rows["explicit"].hidden, rows["direct"].hidden) == (None, 0)
+
+
+@pytest.mark.parametrize("rule", ["first-mention", "surface"])
+def test_shortcuts_are_right_as_often_as_the_listeners_that_use_them(rule):
+    """Those of `roboirg tables --floors`, within 15 points."""
     dataset = items(episodes=24, tasks=("PickXtimes", "VideoPlaceButton"))
     _, rows = rows_of(floor_answers(rule, dataset), "slots", dataset)
 
     for setting in ("direct", "reasoning", "contextual"):
-        jobs = [
-            Job(
-                policy=rule,
-                task=item.task,
-                split="test",
-                episode=item.episode,
-                options=InstructionOptions(setting),
-            )
-            for item in dataset
-            if item.setting == setting
-        ]
-        row = rows[setting]
-        expected = row.command_chance if rule == "command" else float(floor_level(rule, jobs))
-        assert float(row.summary.rate) == pytest.approx(expected, abs=0.15)
+        jobs = []
+        for item in dataset:
+            if item.setting == setting:
+                jobs.append(Job(policy=rule, task=item.task, split="test", episode=item.episode,
+                                options=InstructionOptions(setting)))  # fmt: skip
+        expected = float(floor_level(rule, jobs))
+        assert float(rows[setting].summary.rate) == pytest.approx(expected, abs=0.15), setting
 
-    assert rule != "command" or rows["explicit"].summary.rate == 1
+
+def test_who_hears_the_command_alone_is_right_in_explicit_and_guesses_in_direct():
+    dataset = items(episodes=24, tasks=("PickXtimes", "VideoPlaceButton"))
+
+    _, rows = rows_of(floor_answers("command", dataset), "slots", dataset)
+
+    assert rows["explicit"].summary.rate == 1
+    chance = rows["direct"].command_chance
+    assert float(rows["direct"].summary.rate) == pytest.approx(chance, abs=0.15)
 
 
 def test_the_words_alone_are_learned_from_the_train_split():
@@ -257,30 +296,28 @@ def test_the_words_alone_are_learned_from_the_train_split():
 @pytest.mark.parametrize("name", sorted(set(FLOORS) - {"text-only"}))
 def test_a_floor_answers_every_item_whatever_the_others_are(name):
     few = [item for item in items() if item.task == "StopCube" and item.episode < 2]
-    found = list(floor_answers(name, few))
 
-    assert {answer.id for answer in found} == {item.id for item in few}
-    assert all(answer.reply in LETTERS for answer in found if answer.kind == "choice")
-    assert set(found) <= set(floor_answers(name, items()))
+    answers = list(floor_answers(name, few))
+
+    assert {answer.id for answer in answers} == {item.id for item in few}
+    assert set(answers) <= set(floor_answers(name, items()))
+    for answer in answers:
+        assert answer.kind != "choice" or answer.reply in LETTERS
 
 
-def test_answers_are_read_in_every_form(tmp_path):
-    first, second, third = items()[:3]
+def test_answers_of_every_kind_are_read_as_they_were_written(tmp_path):
+    """An empty line between them does no harm."""
     path = tmp_path / "model.jsonl"
-    written = [
-        Answer(first.id, "slots", f"It is {first.answer}"),
-        Answer(second.id, "choice", second.choice),
-        Answer(third.id, "points", right_reply(third, "points")),
+    answers = [
+        Answer(items()[0].id, "slots", f"It is {items()[0].answer}"),
+        Answer(items()[1].id, "choice", items()[1].choice),
+        Answer(items()[2].id, "points", right_reply(items()[2], "points")),
     ]
-    write_answers(path, written)
+
+    write_answers(path, answers)
     path.write_text(path.read_text() + "\n")
-    found = read_answers(path, items())
 
-    assert found == written
-
-    known = {item.id: item for item in items()}
-    for answer in found:
-        assert judge_reply(known[answer.id], answer.kind, answer.reply).right
+    assert read_answers(path, items()) == answers
 
 
 @pytest.mark.parametrize(
@@ -293,50 +330,68 @@ def test_answers_are_read_in_every_form(tmp_path):
         (2 * '{"id": "ID", "kind": "choice", "reply": "A"}\n', "line 2: choice of item"),
         ("", "the file holds no answers"),
     ],
+    ids=["no JSON", "no item", "unknown item", "unknown question", "again", "empty"],
 )
-def test_bad_files_are_one_sentence(tmp_path, line, words):
+def test_a_file_that_holds_no_answers_is_refused_in_one_sentence(tmp_path, line, words):
     path = tmp_path / "answers.jsonl"
     path.write_text(line.replace("ID", items()[0].id))
 
     with pytest.raises(InvalidValueError, match=words):
         read_answers(path, items())
+
+
+def test_a_missing_file_of_answers_is_refused(tmp_path):
     with pytest.raises(InvalidValueError, match="cannot be read"):
         read_answers(tmp_path / "none.jsonl", items())
 
 
 def run(*arguments):
+    """Return what came of ``roboirg score grounding``."""
     words = ["score", "grounding", *map(str, arguments)]
     return CliRunner().invoke(app, words, env={"COLUMNS": "120"})
 
 
-def test_the_command_scores_compares_and_reports(tmp_path, snapshot):
-    """Right, wrong, unusable and missing answers; tasks with more and with fewer of them."""
-    data = tmp_path / "set"
-    report = tmp_path / "report.md"
-    floors = tmp_path / "floors"
-    right = tmp_path / "right.v2.jsonl"
-    mixed = tmp_path / "mixed.jsonl"
-    some = []
+@pytest.fixture
+def scored(tmp_path):
+    """Score a model that is right and one that is mixed, next to the floor; return the command.
+
+    Items are of two episodes of five tasks, BinFill with fewer. Of the mixed one, every seventh
+    answer is missing, the others are right, wrong or unusable; to choices it always says A.
+    """
+    dataset = []
     for number, item in enumerate(items()):
         if item.episode < 2 and (item.task, number % 3) != ("BinFill", 0):
-            some.append(replace(item, video=f"{item.task}.mp4"))
-    write_items(some, data)
-    write_answers(right, [Answer(item.id, "slots", item.answer) for item in some])
-    answers = [Answer(item.id, "choice", "A") for item in some if item.setting == "direct"]
-    for number, item in enumerate(some):
+            dataset.append(replace(item, video=f"{item.task}.mp4"))
+    write_items(dataset, tmp_path / "set")
+    right = [Answer(item.id, "slots", item.answer) for item in dataset]
+    mixed = [Answer(item.id, "choice", "A") for item in dataset if item.setting == "direct"]
+    for number, item in enumerate(dataset):
         replies = (item.answer, item.goals[0], "No idea.", item.goals[-1], item.answer)
         if number % 7:
-            answers.append(Answer(item.id, "slots", replies[number % 5]))
-    write_answers(mixed, answers)
+            mixed.append(Answer(item.id, "slots", replies[number % 5]))
+    write_answers(tmp_path / "right.v2.jsonl", right)
+    write_answers(tmp_path / "mixed.jsonl", mixed)
+    return run(
+        tmp_path / "right.v2.jsonl", tmp_path / "mixed.jsonl", "--data", tmp_path / "set",
+        "--floor", "chance", "--write-floors", tmp_path / "floors",
+        "--report", tmp_path / "report.md",
+    )  # fmt: skip
 
-    done = run(right, mixed, "--data", data, "--floor", "chance",
-               "--write-floors", floors, "--report", report)  # fmt: skip
 
-    assert done.exit_code == 0, done.output
-    assert done.output.replace(str(tmp_path), "FOLDER") == snapshot(name="printed")
-    _, mixed_report = report.read_text().split("\n## mixed, slots\n")
-    assert mixed_report.partition("\n## chance, slots")[0] == snapshot(name="report")
-    assert len(read_answers(floors / "chance.jsonl", items())) == 3 * len(some)
+def test_the_command_prints_a_table_of_scores(scored, tmp_path, snapshot):
+    assert scored.exit_code == 0, scored.output
+    assert scored.output.replace(str(tmp_path), "FOLDER") == snapshot
+
+
+def test_the_command_writes_a_report_of_each_model(scored, tmp_path, snapshot):
+    _, _, report = (tmp_path / "report.md").read_text().partition("\n## mixed, slots\n")
+    assert report.partition("\n## chance, slots")[0] == snapshot
+
+
+def test_the_command_writes_the_answers_of_floors(scored, tmp_path):
+    """To three questions about each item."""
+    answers = read_answers(tmp_path / "floors" / "chance.jsonl", items())
+    assert len(answers) == 3 * len(read_items(tmp_path / "set"))
 
 
 def test_items_of_several_splits_are_not_scored_together():
@@ -361,8 +416,10 @@ def test_items_that_are_a_pipe_are_refused(tmp_path):
         (("--data", "nowhere", "--floor", "chance"), "holds no grounding dataset"),
     ],
 )
-def test_wrong_commands_are_one_sentence(tmp_path, arguments, words):
+def test_a_command_that_has_nothing_to_score_is_refused_in_one_sentence(tmp_path, arguments, words):
     write_items(items(), tmp_path)
+
     done = run("--data", tmp_path, *arguments)
-    with pytest.raises(InvalidValueError, match=words):
-        raise done.exception
+
+    assert isinstance(done.exception, InvalidValueError)
+    assert words in str(done.exception)

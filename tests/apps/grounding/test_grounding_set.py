@@ -1,6 +1,5 @@
 """The grounding dataset: what interpreter and scene say, and pictures that show it."""
 
-import itertools
 import json
 from collections import Counter
 from dataclasses import replace
@@ -10,7 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
 from made_items import SETTINGS, items_of
 from typer.testing import CliRunner
 
@@ -37,7 +36,6 @@ from roboirg.language import FORMS, instruct_with
 from roboirg.language.settings import all_settings
 from roboirg.main import app
 from roboirg.policies.vlm.goal_schema import goal_schema
-from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.reader import interpret
 from roboirg.shortcuts.command_chance import goals_of_command, understood_goals
 from roboirg.tasks import all_tasks, get_task
@@ -53,141 +51,132 @@ SEEN = [
     ("VideoUnmask", 1),
 ]
 """Without and with a video; hidden things, things that come later, amounts."""
-SHOWN = (
-    "id", "text", "stages", "wordings", "choices", "choice", "answers", "command_chance",
-    "hidden_slots", "pattern", "expressions", "points_question",
-)  # fmt: skip
-"""Fields of an item that are compared as they are."""
 
 
 def said_of(item, episode):
-    said = instruct_with(episode, item.options)
-    assert said.text == item.text
-    return said
+    """Return the instruction of an item."""
+    return instruct_with(episode, item.options)
 
 
 @pytest.mark.parametrize("task", BENCHMARK)
 def test_answers_are_what_the_words_mean_in_the_scene(task):
-    schema = goal_schema(task)
-    for index in range(2):
-        is_first = index == 0
-        episode, items = items_of(task, index, forms=FORMS, every_variant=is_first)
-        for item in items:
-            goals = understood_goals(said_of(item, episode), episode)
-            assert [schema.answers[goal] for goal in goals] == item.answers
-            assert item.answer in item.answers
-            assert item.answer in item.goals
-            assert len(set(item.goals)) == len(item.goals)
-            assert set(item.goals) == {
-                schema.answers[goal] for goal in get_task(task).goals(episode.scene)
-            }
+    """In all forms and settings of an episode. The right answers are among the scene's goals."""
+    answers = goal_schema(task).answers
+    episode, items = items_of(task, 0, forms=FORMS, every_variant=True)
+    goals_of_scene = {answers[goal] for goal in get_task(task).goals(episode.scene)}
+
+    for item in items:
+        meant = understood_goals(said_of(item, episode), episode)
+        assert [answers[goal] for goal in meant] == item.answers, item.text
+        assert item.answer in item.answers
+        assert set(item.goals) == goals_of_scene
+        assert len(set(item.goals)) == len(item.goals)
 
 
 @pytest.mark.parametrize("task", BENCHMARK)
 def test_choices_are_goals_of_the_scene_in_other_words_and_one_is_right(task):
-    schema = goal_schema(task)
+    """Each is a command that means one goal, and is not itself in the instruction."""
+    answers = goal_schema(task).answers
     for index in range(1, 5):
         episode, items = items_of(task, index)
         for item in items:
             assert 2 <= len(item.choices) == len(set(item.choices)) <= 4
-            assert item.choice_answers[LETTERS.index(item.choice)] == item.answer
             assert item.choice_answers.count(item.answer) == 1
+            assert item.choice_answers[LETTERS.index(item.choice)] == item.answer
             for command, answer in zip(item.choices, item.choice_answers, strict=True):
                 (goal,) = interpret(command, episode.scene, task).goals
-                assert schema.answers[goal] == answer
+                assert answers[goal] == answer, command
                 assert command not in item.text
 
 
-def test_who_hears_the_command_alone_can_only_guess_among_the_choices():
-    for task, index in itertools.product(BENCHMARK, range(1, 3)):
-        episode, items = items_of(task, index)
-        for item in (item for item in items if item.command_chance < 1):
+@pytest.mark.parametrize("task", BENCHMARK)
+def test_who_hears_the_command_alone_can_only_guess_among_the_choices(task):
+    """All choices fit the command, where it leaves anything open."""
+    episode, items = items_of(task, 1)
+
+    for item in items:
+        if item.command_chance < 1:
             fitting = goals_of_command(said_of(item, episode), episode)
-            answers = [goal_schema(task).answers[goal] for goal in fitting]
-            assert set(item.choice_answers) <= set(answers), item.text
-
-
-def test_items_are_as_stored(snapshot):
-    """Choices, hidden slots, expressions and questions, of amounts, of two things and of one."""
-    lines = []
-    for task, index in SEEN[1:]:
-        _, items = items_of(task, index, forms=FORMS)
-        for item in items:
-            lines.append(json.dumps([getattr(item, name) for name in SHOWN]))
-
-    assert "\n".join(lines) == snapshot
+            answers = {goal_schema(task).answers[goal] for goal in fitting}
+            assert set(item.choice_answers) <= answers, item.text
 
 
 def test_places_of_the_right_choice_are_balanced():
-    places = Counter(
-        (item.setting, item.choice)
-        for index in range(48)
-        for item in items_of("StopCube", index)[1]
-        if item.setting != "reasoning"  # which leaves three goals in some scenes
-    )
+    """48 episodes: each of four letters twelve times in each of three settings.
+
+    Not in reasoning, which leaves three goals in some scenes.
+    """
+    places = Counter()
+    for index in range(48):
+        for item in items_of("StopCube", index)[1]:
+            if item.setting != "reasoning":
+                places[item.setting, item.choice] += 1
+
     assert set(places.values()) == {12}
     assert len(places) == 3 * 4
 
 
-def test_ids_are_unique_and_the_same_whatever_the_answer():
-    found = [
-        item.id
-        for task in BENCHMARK
-        for item in items_of(task, 1, forms=FORMS, every_variant=True)[1]
-    ]
-    assert len(set(found)) == len(found)
+def test_no_two_items_have_the_same_id():
+    ids = []
+    for task in BENCHMARK:
+        _, items = items_of(task, 1, forms=FORMS, every_variant=True)
+        ids += [item.id for item in items]
 
+    assert len(set(ids)) == len(ids)
+
+
+def test_the_id_of_an_item_does_not_depend_on_the_answer():
+    """Or it would give the answer away."""
     episode = get_episode("PickXtimes", "test", 3)
     options = InstructionOptions("direct")
-    name = item_id(episode, options)
-    others = get_task("PickXtimes").goals(episode.scene)
+    goals = get_task("PickXtimes").goals(episode.scene)
 
-    assert {item_id(replace(episode, goal=goal), options) for goal in others} == {name}
-    assert item_id(get_episode("PickXtimes", "val", 3), options) != name
+    ids = {item_id(replace(episode, goal=goal), options) for goal in goals}
+
+    assert len(goals) > 1
+    assert ids == {item_id(episode, options)}
 
 
 def test_the_test_split_has_2550_items():
-    counts = Counter(
-        options.setting
-        for task in BENCHMARK
-        for index in range(SIZES["test"])
-        for options in wanted_options(
-            get_episode(task, "test", index),
-            SETTINGS,
-            ("implicit",),
-            InstructionOptions(),
-            every_variant=False,
-        )
-    )
-    spatial = sum(get_task(task).spatial for task in BENCHMARK)
+    """50 episodes of 11 tasks in four settings, and of seven tasks in spatial, too."""
+    counts = Counter()
+    for task in BENCHMARK:
+        for index in range(SIZES["test"]):
+            episode = get_episode(task, "test", index)
+            wanted = wanted_options(
+                episode, SETTINGS, ("implicit",), InstructionOptions(), every_variant=False
+            )
+            counts.update(options.setting for options in wanted)
 
-    assert counts["spatial"] == 50 * spatial
-    assert counts.total() == 50 * (4 * len(BENCHMARK) + spatial) == 2550
+    assert counts["spatial"] == 50 * 7
+    assert counts.total() == 50 * (4 * 11 + 7) == 2550
 
 
-def test_options_that_a_setting_does_not_read_keep_their_defaults():
+@pytest.mark.parametrize("name", ["delivery", "stages", "frame"])
+def test_options_that_a_setting_does_not_read_keep_their_defaults(name):
+    """The defaults are a prompt, all stages, and the robot's frame of reference."""
     episode = get_episode("PickXtimes", "test", 3)
-    changed = InstructionOptions(delivery="turns", stages=(1, 5), frame="camera", wordings="train")
-    for options in wanted_options(episode, SETTINGS, FORMS, changed, every_variant=True):
-        reads = all_settings()[options.setting].reads
+    asked = InstructionOptions(delivery="turns", stages=(1, 5), frame="camera", wordings="train")
+
+    for options in wanted_options(episode, SETTINGS, FORMS, asked, every_variant=True):
         assert options.wordings == "train"
-        for name in ("delivery", "stages", "frame"):
-            value = getattr(options, name)
-            assert value == getattr(InstructionOptions(), name) or name in reads
+        if name not in all_settings()[options.setting].reads:
+            assert getattr(options, name) == getattr(InstructionOptions(), name), options.setting
 
 
 @settings(max_examples=30)
-@given(st.data())
-def test_masks_survive_their_run_lengths(data):
-    height = data.draw(st.integers(1, 9))
-    width = data.draw(st.integers(1, 9))
-    bits = data.draw(st.lists(st.booleans(), min_size=height * width, max_size=height * width))
-    mask = np.array(bits).reshape(height, width)
-
+@given(mask=arrays(bool, array_shapes(min_dims=2, max_dims=2, max_side=9)))
+def test_a_mask_is_read_back_from_its_run_lengths(mask):
+    """None but the first may be 0."""
     counts = encode_mask(mask)
 
     assert all(counts[1:])
     assert (decode_mask(counts, mask.shape) == mask).all()
+
+
+@settings(max_examples=30)
+@given(mask=arrays(bool, array_shapes(min_dims=2, max_dims=2, max_side=9)))
+def test_the_pixel_nearest_to_the_center_of_a_mask_is_in_it(mask):
     if mask.any():
         assert mask[nearest_to_center(mask)]
 
@@ -217,39 +206,42 @@ def test_things_to_point_at_are_those_that_the_words_tell_apart(task, kinds):
     assert pointed_kinds(task) == kinds
 
 
-def test_what_is_not_there_yet_is_pointed_at_by_what_is_in_its_place():
+def test_a_hidden_cube_that_appears_later_is_pointed_at_where_it_will_be():
     episode = get_episode("ButtonUnmask", "test", 0)
-    (referent,) = find_referents(episode)
-    assert episode.scene[referent.objects[0]].color == episode.goal.texts("colors")[0]
-    assert referent.kind == "hidden_cube"
 
-    episode = get_episode("VideoUnmask", "test", 0)
     (referent,) = find_referents(episode)
-    inside = episode.scene.hidden_in(referent.objects[0])
-    assert inside.color == episode.goal.texts("colors")[0]
+
+    assert referent.kind == "hidden_cube"
+    assert episode.scene[referent.objects[0]].color == episode.goal.texts("colors")[0]
+
+
+def test_a_cube_that_was_hidden_in_the_video_is_pointed_at_by_its_container():
+    episode = get_episode("VideoUnmask", "test", 0)
+
+    (referent,) = find_referents(episode)
+
+    hidden = episode.scene.hidden_in(referent.objects[0])
+    assert hidden.color == episode.goal.texts("colors")[0]
 
 
 def test_of_an_amount_every_thing_of_the_color_will_do():
+    """As in "two red cubes and a blue one"."""
     episodes = (get_episode("BinFill", "test", index) for index in range(50))
     episode = next(drawn for drawn in episodes if len(drawn.goal.texts("colors")) > 1)
+    cubes = episode.scene.of_kind("cube")
+
     for referent in find_referents(episode):
         (color,) = {episode.scene[name].color for name in referent.objects}
-        alike = [cube for cube in episode.scene.of_kind("cube") if cube.color == color]
-        assert len(alike) == len(referent.objects)
+        assert len(referent.objects) == sum(cube.color == color for cube in cubes)
 
 
-def test_the_question_is_the_listener_s_and_the_others_share_its_beginning():
-    own = load_prompts("grounding_questions")
-    listener = load_prompts("listener")
-    assert listener.fill("system").startswith(own.fill("system"))
-
+def test_a_question_has_the_instruction_and_the_choices_with_their_letters():
     _, items = items_of("PickXtimes", 0)
+
     for item in items:
         assert item.text in item.said
-        for line in (
-            f"{letter}. {choice}" for letter, choice in zip(LETTERS, item.choices, strict=False)
-        ):
-            assert line in item.choice_question
+        for letter, choice in zip(LETTERS, item.choices, strict=False):
+            assert f"{letter}. {choice}" in item.choice_question
 
 
 @pytest.fixture(scope="module")

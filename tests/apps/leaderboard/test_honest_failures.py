@@ -47,13 +47,13 @@ def in_process(tmp_path_factory):
     return folder
 
 
-def records_of(folder):
+def records_by_class(folder):
     """Return the records by the name of the policy's class."""
     return {record.policy.partition(":")[2]: record for record in read_records(folder)}
 
 
 def test_the_record_has_the_kind_of_error_that_ended_the_episode(in_process):
-    errors = {name: record.error for name, record in records_of(in_process).items()}
+    errors = {name: record.error for name, record in records_by_class(in_process).items()}
 
     assert errors == {
         **dict.fromkeys(RAISING, "policy"),
@@ -67,7 +67,7 @@ def test_the_record_has_the_kind_of_error_that_ended_the_episode(in_process):
 )
 def test_the_actions_before_an_error_are_kept(name, steps, in_process):
     """Posing raises in its third call."""
-    record = records_of(in_process)[name]
+    record = records_by_class(in_process)[name]
 
     assert record.steps == steps
     assert record.action_log is not None
@@ -84,7 +84,8 @@ def test_a_run_of_policies_that_fail_in_this_process_holds(in_process):
 def test_a_run_of_policies_whose_process_ends_holds(tmp_path):
     play(tmp_path, ENDING_THEIR_PROCESS, LocalProcesses(1), policy_timeout_s=30.0)
 
-    records = read_records(tmp_path)
-    assert {record.error for record in records} == {"policy", "infrastructure", "timeout"}
     found = verify_run(tmp_path)
+
     assert found.holds, found
+    errors = {record.error for record in read_records(tmp_path)}
+    assert errors == {"policy", "infrastructure", "timeout"}

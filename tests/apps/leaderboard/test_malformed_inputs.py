@@ -70,6 +70,7 @@ def refusal(reader, path):
 
 
 def fit(message):
+    """Return a message, which must be short and without the words of a validator."""
     assert len(message) < LONGEST_MESSAGE
     assert "matching regex" not in message
     return message
@@ -81,14 +82,18 @@ def cases(arguments, by_name):
 
 
 def line_of(run):
+    """Return the first record as it is stored."""
     return json.loads((run / RECORDS_FILE).read_text().splitlines()[0])
 
 
 def option(**changes):
+    """Change instruction options of the first record."""
     return lambda run: record(options={**line_of(run)["options"], **changes})(run)
 
 
 def record(**changes):
+    """Change fields of the first record."""
+
     def change(run):
         lines = (run / RECORDS_FILE).read_text().splitlines()
         lines[0] = json.dumps({**json.loads(lines[0]), **changes})
@@ -98,6 +103,8 @@ def record(**changes):
 
 
 def raw(old, new):
+    """Replace bytes of the file of records."""
+
     def change(run):
         content = (run / RECORDS_FILE).read_bytes()
         assert old in content
@@ -121,10 +128,13 @@ def replaced(name, make):
 
 
 def link(target):
+    """Return what makes a path a link to a target."""
     return lambda path: path.symlink_to(target)
 
 
 def sparse(size):
+    """Return what makes a path a file of so many bytes, which take no room on the disk."""
+
     def make(path):
         path.touch()
         os.truncate(path, size)
@@ -133,6 +143,8 @@ def sparse(size):
 
 
 def planned(**changes):
+    """Change entries of the stored plan."""
+
     def change(run):
         plan = json.loads((run / PLAN_FILE).read_text())
         (run / PLAN_FILE).write_text(json.dumps({**plan, **changes}))
@@ -149,15 +161,11 @@ def planned(**changes):
             r"\$\.environment\.max_steps",
         ),
         "seed of 10**40": (record(seed=10**40), r"\$\.seed"),
-        "step 10**25": (record(steps=10**25), r"\$\.steps"),
         "a million stages": (option(stages=[1] * 1_000_000), "length <= 100"),
         "cause of 5 MB": (record(outcome="failure", cause="x" * 5_000_000), r"\$\.cause"),
         "version in bidi marks": (record(language_version="\u202e0.0.2"), "control characters"),
-        "policy with a line end": (record(policy="random\n"), "control characters"),
         "policy that is a formula": (record(policy="=cmd|' /C calc'!A0"), "none of = [+] - @"),
-        "task that is a formula": (record(task="@SUM(1)"), "none of = [+] - @"),
         "setting that is a formula": (option(setting="+1+1"), "none of = [+] - @"),
-        "video with a line end": (record(video="videos/a.mp4\n"), "path below"),
         "video outside": (record(video="videos/../../secret.mp4"), "path below"),
         "line of 65 MiB": (
             lambda run: os.truncate(run / RECORDS_FILE, 65 << 20),
@@ -204,26 +212,30 @@ def test_fields_that_packs_hold_unread_are_refused_by_who_reads_them(
     assert RECORDS_FILE in message
 
 
+DAMAGE = {
+    "bytes that are no UTF-8": raw(b'"policy":"random"', b'"policy":"\xff"'),
+    "lone surrogate": raw(b'"policy":"random"', b'"policy":"\\udfff"'),
+    "deep nesting": raw(b'"policy_metadata":{', b'"policy_metadata":{"a":' + b"[" * 200_000),
+}
+
+
 @pytest.mark.parametrize("reader", [pack, verify])
-@cases(
-    "damage",
-    {
-        "bytes that are no UTF-8": raw(b'"policy":"random"', b'"policy":"\xff"'),
-        "lone surrogate": raw(b'"policy":"random"', b'"policy":"\\udfff"'),
-        "deep nesting": raw(b'"policy_metadata":{', b'"policy_metadata":{"a":' + b"[" * 200_000),
-    },
-)
-def test_a_damaged_run_is_refused_until_it_is_merged(damage, reader, run, caplog):
-    """Merging warns of the line, and leaves it out."""
+@cases("damage", DAMAGE)
+def test_a_run_with_a_damaged_line_is_refused(damage, reader, run):
     damage(run)
     assert "has 1 damaged line, the first is line 1" in refusal(reader, run)
+
+
+@cases("damage", DAMAGE)
+def test_merging_warns_of_a_damaged_line_and_leaves_it_out(damage, run, caplog):
+    damage(run)
 
     merged = merge(run)
 
     (warning,) = caplog.messages
     assert f"{run / RECORDS_FILE} has 1 damaged line, the first is line 1" in warning
     assert len(read_records(merged)) == 1
-    reader(merged)
+    pack(merged)  # is not refused any more
 
 
 def test_a_mark_of_byte_order_before_the_only_line_is_named(run):
@@ -232,13 +244,8 @@ def test_a_mark_of_byte_order_before_the_only_line_is_named(run):
     assert "has 1 damaged line, the first is line 1" in refusal(read_records, run)
 
 
-LEADING_OUT = ("logs", "logs/*.txt", "actions", "actions/*/*.npz", "videos", "videos/*.mp4",
-               "videos/*.jpg", PLAN_FILE, "plans/1.json")  # fmt: skip
-"""Files and folders of a run that could be links."""
-
-
 def lead_out(run, name):
-    """Put a link to a file or folder outside in the place of a file or folder."""
+    """Move a file or folder of the run outside, and put a link to it in its place."""
     path = next(run.glob(name), run / name)
     outside = run.parent / "secret.txt"
     path.parent.mkdir(exist_ok=True)
@@ -249,14 +256,18 @@ def lead_out(run, name):
 
 
 @pytest.mark.parametrize("reader", [pack, merge], ids=lambda reader: reader.__name__)
-@pytest.mark.parametrize("name", LEADING_OUT)
-def test_links_that_lead_out_are_not_followed(name, reader, run):
+@pytest.mark.parametrize(
+    "name", ["logs", "logs/*.txt", "actions/*/*.npz", "videos/*.mp4", PLAN_FILE, "plans/1.json"]
+)
+def test_links_that_lead_out_of_a_run_are_not_followed(name, reader, run):
     lead_out(run, name)
+
     assert "link leads elsewhere" in refusal(reader, run)
 
-    written = [path for path in run.parent.rglob("*") if path.is_file() and not path.is_symlink()]
-    secret = run.parent / "secret.txt"
-    assert [path for path in written if path.read_bytes() == secret.read_bytes()] == [secret]
+    secret = (run.parent / "secret.txt").read_bytes()
+    for path in run.parent.rglob("*"):
+        if path.is_file() and not path.is_symlink() and path.name != "secret.txt":
+            assert path.read_bytes() != secret, path
 
 
 @pytest.mark.parametrize("name", ["videos", "videos/*.mp4", "videos/*.jpg"])
@@ -273,13 +284,14 @@ def test_the_page_follows_no_circle_of_links(run):
     assert "link leads elsewhere" in refusal(report, run)
 
 
-def test_a_huge_poster_is_not_embedded(run):
+def test_a_poster_of_10_gib_is_not_embedded(run):
     sparse(10 << 30)(next(run.glob("videos/*.jpg")))
     assert report(run).stat().st_size < 20 << 20
 
 
-def test_a_run_too_large_for_a_pack_is_refused_before_it_is_read(run):
+def test_a_run_of_a_tebibyte_is_refused_before_it_is_packed(run):
     replaced("logs/large.txt", sparse(1 << 40))(run)
+
     assert "logs/large.txt" in refusal(pack, run)
     assert not list(run.parent.glob("*.part"))
 
@@ -294,7 +306,7 @@ def test_hidden_files_and_pipes_are_not_packed(run):
     assert names == {path.name for path in (run / "logs").iterdir()} - {".DS_Store", "pipe.txt"}
 
 
-def test_a_plan_of_many_jobs_is_read(run):
+def test_a_plan_of_900_000_jobs_is_read(run):
     planned(policy_seeds=list(range(9_000)), episodes=list(range(50)))(run)
     assert len(read_plans(run)) == 1
 
@@ -305,14 +317,13 @@ def test_a_plan_of_many_jobs_is_read(run):
         "1,200,000 jobs": planned(policy_seeds=list(range(12_000)), episodes=list(range(50))),
         "no seeds": planned(policy_seeds=[]),
         "policy that controls the terminal": planned(policies=["\x1b[31m"]),
-        "task that controls the terminal": planned(tasks=["\u202eksat"]),
         "split of half a character": planned(split="\ud800"),
         "deep nesting": replaced(PLAN_FILE, lambda path: path.write_text("[" * 200_000)),
         "pipe": replaced(PLAN_FILE, os.mkfifo),
         "3 GB": replaced(PLAN_FILE, sparse(3 << 30)),
     },
 )
-def test_plans_that_cannot_be_are_missing(change, run):
+def test_a_stored_plan_that_cannot_be_counts_as_missing(change, run):
     change(run)
 
     assert read_plans(run) == ()
@@ -342,7 +353,6 @@ def test_plan_files_are_regular_files(make, tmp_path):
         "deep nesting": ("tasks: " + "[" * 20_000, "nested too deeply"),
         "number of 10,000 digits": ("max_steps: " + "9" * 10_000, "not valid YAML"),
         "date that cannot be": ("split: 2020-99-99", "line 1 has 2020-99-99"),
-        "list as key": ("? [tasks]\n: all\n", "not valid YAML"),
     },
 )
 def test_plan_files_with_other_content_are_refused_by_name(content, complaint, tmp_path):
@@ -398,8 +408,6 @@ UNKNOWN_METHOD = _headers_with(8, 99)
     "damaged",
     {
         "10**12 rows": _rows("(1000000000000, 8)"),
-        "shape of truth values": _rows("(True, 8)", bytes(64)),
-        "complex rows": _rows("(3, 8)", bytes(384), "<c16"),
         "code in a header": _rows("__import__('os').abort()"),
         "encrypted": ENCRYPTED,
         "unknown compression": UNKNOWN_METHOD,
@@ -407,12 +415,15 @@ UNKNOWN_METHOD = _headers_with(8, 99)
     },
 )
 def test_action_files_that_are_none_are_refused_and_named_by_verify(damaged, run):
+    """By verify for both records, which name the same file."""
     digest = line_of(run)["action_log"]
     path = action_path(run, digest)
     path.write_bytes(damaged(path.read_bytes()))
 
-    assert "is not an action log" in refusal(lambda folder: read_actions(folder, digest), run)
-    assert fit(verify(run)).count("is not an action log") == 2  # both records name it
+    message = refusal(lambda folder: read_actions(folder, digest), run)
+
+    assert "is not an action log" in message
+    assert fit(verify(run)).count("is not an action log") == 2
 
 
 def _with(changes, *, manifest_fits=True):
@@ -466,9 +477,7 @@ def _swollen(good, only=b""):
         "absolute path": (_with({"/var/evil": b""}), "not belong to a run"),
         "path that leaves": (_with({"actions/../../evil": b""}), "not belong to a run"),
         "Windows path": (_with({"actions\\..\\..\\evil": b""}), "not belong to a run"),
-        "file of another kind": (_with({"x": b""}), "not belong to a run"),
         "name of 60,000 letters": (_with({"logs/" + "a" * 60_000: b""}), "not belong to a run"),
-        "name with a line end": (_with({"logs/a.txt\n": b""}), "not belong to a run"),
         "other records": (
             _with({RECORDS_FILE: b"{}\n"}, manifest_fits=False),
             "is not the file that its manifest names",
@@ -477,10 +486,6 @@ def _swollen(good, only=b""):
         "no records": (_without(RECORDS_FILE), "exactly the files"),
         "no manifest": (_without(MANIFEST), "cannot be read"),
         "empty manifest": (_with({MANIFEST: b"{}"}, manifest_fits=False), "cannot be read"),
-        "manifest that is no JSON": (
-            _with({MANIFEST: b"no"}, manifest_fits=False),
-            "cannot be read",
-        ),
         "other format": (_manifest_with(format=2), "of format 2; this roboirg reads format 1"),
         "negative number of records": (_manifest_with(records=-1), "cannot be read"),
         "encrypted": (ENCRYPTED, "not a packed run"),
@@ -493,22 +498,31 @@ def _swollen(good, only=b""):
 def test_a_pack_that_is_none_is_refused_and_leaves_nothing_behind(build, complaint, run):
     path = pack(run)
     path.write_bytes(build(path.read_bytes()))
-    before = sorted(run.parent.rglob("*"))
+    files_before = sorted(run.parent.rglob("*"))
 
-    assert complaint in refusal(read_pack, path)
-    assert sorted(run.parent.rglob("*")) == before
+    message = refusal(read_pack, path)
+
+    assert complaint in message
+    assert sorted(run.parent.rglob("*")) == files_before
 
 
 def test_what_a_command_does_not_read_of_a_pack_is_not_unpacked(run, monkeypatch):
-    """Videos that are too large, or not those of the manifest, keep nobody from the records."""
+    """Videos that are too large keep nobody from the records."""
+    monkeypatch.setattr("roboirg.records.packs.MOST_PACKED_BYTES", 10 << 30)
+    path = pack(run)
+    path.write_bytes(_swollen(path.read_bytes(), only=b"videos/"))
+
+    with opened_run(path, [ACTION_FOLDER]) as folder:
+        assert len(read_records(folder)) == 2
+        assert not (folder / "videos").exists()
+
+
+def test_a_pack_of_videos_that_are_too_large_is_refused_by_who_reads_them(run, monkeypatch):
     monkeypatch.setattr("roboirg.records.packs.MOST_PACKED_BYTES", 10 << 30)
     path = pack(run)
     path.write_bytes(_swollen(path.read_bytes(), only=b"videos/"))
 
     assert "unpacks to more than" in refusal(read_pack, path)
-    with opened_run(path, [ACTION_FOLDER]) as folder:
-        assert len(read_records(folder)) == 2
-        assert not (folder / "videos").exists()
 
 
 def test_a_warning_about_a_pack_names_the_pack(run, caplog):
@@ -531,10 +545,8 @@ stated.all = { color = "the {color} cube" }
 @cases(
     ("content", "complaint"),
     {
-        "deep list": ("a=" + "[" * 50_000, "not valid TOML"),
         "deep tables": ("a=" + "{a=" * 3_000 + "1" + "}" * 3_000, "not valid TOML"),
         "key of 20,000 parts": (".".join("a" * 20_000) + "=1", "more than 20 parts"),
-        "number of 10,000 digits": ("name=" + "9" * 10_000, "not valid TOML"),
         "command of 1 MB": (
             WORDINGS.replace("pick up", "pick up " + "very " * 200_000),
             "characters",

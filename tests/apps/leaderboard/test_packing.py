@@ -4,6 +4,8 @@ import json
 import zipfile
 from pathlib import Path
 
+import pytest
+
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.records.packs import MANIFEST, opened_run
 from roboirg.records.run_files import store_plan
@@ -12,29 +14,54 @@ from roboirg.records.store import read_records
 
 def test_the_same_run_comes_out(run, tmp_path):
     (run / "secret.txt").write_text("not packed")
-    store_plan(b"[]", run)  # the other one stays, as an earlier plan
-    manifest = pack_run(run, tmp_path / "a.zip")
-    assert (manifest.records, manifest.policies) == (2, ("oracle", "random"))
-    with zipfile.ZipFile(tmp_path / "a.zip") as archive:
-        assert json.loads(archive.read(MANIFEST)) == manifest.model_dump(mode="json")
+
+    pack_run(run, tmp_path / "a.zip")
 
     with opened_run(tmp_path / "a.zip") as folder:
         assert read_records(folder) == read_records(run)
         kept = {path.suffix for path in folder.rglob("*") if path.is_file()}
         assert kept == {".jsonl", ".json", ".npz"}
     assert not folder.exists()
+
+
+def test_a_pack_has_a_manifest_with_the_number_of_records_and_the_policies(run, tmp_path):
+    manifest = pack_run(run, tmp_path / "a.zip")
+
+    assert (manifest.records, manifest.policies) == (2, ("oracle", "random"))
+    with zipfile.ZipFile(tmp_path / "a.zip") as archive:
+        assert json.loads(archive.read(MANIFEST)) == manifest.model_dump(mode="json")
+
+
+def test_earlier_plans_of_a_run_are_packed(run, tmp_path):
+    store_plan(b"[]", run)  # the other one stays, as an earlier plan
+
+    pack_run(run, tmp_path / "a.zip")
+
     with opened_run(tmp_path / "a.zip", ()) as folder:
         assert {path.name for path in folder.iterdir()} == {"records.jsonl", "plan.json", "plans"}
-        assert read_records(folder) == read_records(run)
 
 
-def test_the_same_run_gives_the_same_bytes(run, tmp_path, monkeypatch):
-    """On another disk, too, which lists files in another order."""
-    found = Path.rglob
-    for name, order in (("a.zip", 1), ("b.zip", -1)):
-        monkeypatch.setattr(Path, "rglob", lambda *own, by=order: sorted(found(*own))[::by])
-        pack_run(run, tmp_path / name, videos=True)
+@pytest.fixture
+def disk_that_lists_files_backward(monkeypatch):
+    """Return what makes the disk list files in the opposite order from now on."""
+    list_files = Path.rglob
+    return lambda: monkeypatch.setattr(
+        Path, "rglob", lambda *given: sorted(list_files(*given), reverse=True)
+    )
+
+
+def test_the_same_run_gives_the_same_bytes_on_another_disk(
+    run, tmp_path, disk_that_lists_files_backward
+):
+    pack_run(run, tmp_path / "a.zip", videos=True)
+    disk_that_lists_files_backward()
+    pack_run(run, tmp_path / "b.zip", videos=True)
 
     assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
+
+
+def test_videos_are_packed_if_asked_for(run, tmp_path):
+    pack_run(run, tmp_path / "a.zip", videos=True)
+
     with opened_run(tmp_path / "a.zip") as folder:
         assert (folder / "videos").is_dir()

@@ -50,12 +50,15 @@ def honest(tmp_path_factory):
 
 def test_an_honest_run_holds(honest):
     found = verify_run(honest)
+
     assert found.holds, found
     assert found.verdicts == {"exact": found.records}
     assert not found.notes
 
-    outcomes = {record.outcome for record in read_records(honest)}
-    assert outcomes == {"success", "failure"}
+
+def test_the_honest_run_has_a_success_and_a_failure(honest):
+    """Or the tests below would not show both ways to change an outcome."""
+    assert {record.outcome for record in read_records(honest)} == {"success", "failure"}
 
 
 @pytest.fixture
@@ -78,23 +81,24 @@ QUICK = (
 
 @pytest.mark.parametrize("name", slow_but(QUICK, FORGERIES))
 def test_what_was_altered_does_not_hold(name, forged):
+    """forgeries.py has, by name, the change of a run and a part of the finding of `verify`."""
     forgery, words = FORGERIES[name]
     forge(forged, forgery, seed=name)
 
-    (found, *_) = verify_run(forged).checks
+    (check, *_) = verify_run(forged).checks
 
-    assert words in "\n".join(found.findings)
+    assert words in "\n".join(check.findings)
 
 
 def test_of_a_flipped_event_both_sides_are_printed(forged):
-    def flipped(lines, _folder, _rng):
+    def flip_the_second_event(lines, _folder, _rng):
         lines[0]["events"][1]["holds"] = False
         return lines
 
-    forge(forged, flipped)
-    (found,) = verify_run(forged).checks
-    (sentence,) = found.findings
+    forge(forged, flip_the_second_event)
 
+    (check,) = verify_run(forged).checks
+    (sentence,) = check.findings
     assert re.fullmatch(
         r"events, entry 2: .* EventRecord\(.*False\); .* EventRecord\(.*True\)\.", sentence
     )
@@ -107,6 +111,7 @@ def test_of_a_flipped_event_both_sides_are_printed(forged):
         ((1,), (1, 5), "goal, entry 2: the record says None; it should be 5."),
         ({"a": 1, "b": (2, 4)}, {"a": 1, "b": (2, 3)}, "goal.b, entry 2: the record says 4; it s"),
     ],
+    ids=["another value", "too few", "inside"],
 )
 def test_of_two_values_the_place_where_they_differ_is_named(recorded, expected, sentence):
     assert record_check._difference("goal", recorded, expected).startswith(sentence)
@@ -123,46 +128,55 @@ def with_all(**fields):
     return change
 
 
-def test_records_in_other_words_of_the_same_pool_are_checked_but_for_their_words(
-    forged,
-):
+@pytest.fixture
+def run_in_other_words(forged):
+    """The honest run, but that its plan and records are in words that this package lacks."""
     words = "StopCube/test@0a0a0a0a0a0a"
     plan = json.loads((forged / PLAN_FILE).read_bytes()) | {"words": [words]}
     (forged / PLAN_FILE).write_text(json.dumps(plan), "utf-8")
     (planned,) = read_plans(forged)
 
-    def in_other_words(lines, folder, rng):
+    def say_it_in_other_words(lines, _folder, _rng):
         for line in lines:
             line |= {"words": words, "plan": planned.fingerprint}
             line["metadata"]["words"] = words
         return lines
 
-    forge(forged, in_other_words)
-    found = verify_run(forged, sample=0.0)
+    forge(forged, say_it_in_other_words)
+    return forged
+
+
+def test_records_in_other_words_of_the_same_pool_hold_with_a_note(run_in_other_words):
+    found = verify_run(run_in_other_words, sample=0.0)
 
     assert found.holds, (found.faults, found.checks)
     assert "in 2 of the records: this roboirg has other words" in "".join(found.notes)
 
-    def heard_later(lines, folder, rng):
+
+def test_steps_of_utterances_are_checked_in_records_in_other_words(run_in_other_words):
+    def hear_it_at_step_7(lines, _folder, _rng):
         lines[0]["instruction"][0]["step"] = 7
         return lines
 
-    forge(forged, heard_later)
-    assert "instruction, entry 1: the record says" in str(verify_run(forged).checks)
+    forge(run_in_other_words, hear_it_at_step_7)
 
-    forge(forged, FORGERIES["failure to success"][0])
-    assert "outcome: the record says 'success'" in str(verify_run(forged).checks)
+    assert "instruction, entry 1: the record says" in str(verify_run(run_in_other_words).checks)
+
+
+def test_outcomes_are_checked_in_records_in_other_words(run_in_other_words):
+    forge(run_in_other_words, FORGERIES["failure to success"][0])
+
+    assert "outcome: the record says 'success'" in str(verify_run(run_in_other_words).checks)
 
 
 def test_a_record_has_the_words_of_its_plan_and_of_its_metadata(forged):
-    def reworded(lines, folder, rng):
+    def reword_the_first(lines, _folder, _rng):
         lines[0]["words"] = "StopCube/test@0a0a0a0a0a0a"
         return lines
 
-    forge(forged, reworded)
+    forge(forged, reword_the_first)
 
     found = verify_run(forged, sample=0.0)
-
     assert found.faults[0] == "1 record in words that the plan does not name."
     assert found.faults[1].startswith("The records have several words of StopCube/test: ")
     assert "words: the record says 'StopCube/test@0a0a0a0a0a0a'; it should" in str(found.checks)
@@ -178,68 +192,100 @@ def test_words_of_another_pool_or_of_no_name_do_not_excuse_from_checking(forged,
 
 
 def test_an_episode_of_the_plan_that_was_left_out_is_named(honest, forged):
-    lines = (forged / "records.jsonl").read_bytes().splitlines(keepends=True)
-    (forged / "records.jsonl").write_bytes(b"".join(lines[1:]))
+    _, second_line = (forged / "records.jsonl").read_bytes().splitlines(keepends=True)
+    (forged / "records.jsonl").write_bytes(second_line)
+
     found = verify_run(forged, sample=0.0)
+
     assert found.missing == (read_records(honest)[0].slug,)
     assert not found.holds
 
+
+def test_records_of_another_plan_than_the_stored_one_do_not_hold(forged):
     plan = json.loads((forged / PLAN_FILE).read_bytes()) | {"video": "all"}
     (forged / PLAN_FILE).write_text(json.dumps(plan), "utf-8")
-    assert verify_run(forged, sample=0.0).faults == ("1 record from no plan that is kept.",)
 
+    assert verify_run(forged, sample=0.0).faults == ("2 records from no plan that is kept.",)
+
+
+def test_a_run_without_a_plan_does_not_hold(forged):
     (forged / PLAN_FILE).unlink()
+
     found = verify_run(forged, sample=0.0)
-    assert found.faults == ("1 record from no plan that is kept.",)
+
+    assert found.faults == ("2 records from no plan that is kept.",)
     assert not found.holds
 
-    # Words that were said in another part of the discourse are other words, played or not.
-    forge(forged, FORGERIES["other stage"][0])
+
+def test_words_of_another_part_of_the_discourse_are_found_in_records_that_are_not_played(forged):
+    forgery, words = FORGERIES["other stage"]
+    forge(forged, forgery)
+
     (check,) = verify_run(forged, sample=0.0).checks
-    assert FORGERIES["other stage"][1] in check.findings[0]
+
+    assert words in check.findings[0]
 
 
 OTHER_PROCESSOR = {"processor": "x86_64 OtherMaker 1"}
 
 
-@pytest.mark.parametrize(
-    ("by", "changes", "holds", "excused"),
-    [
-        (0.001, {}, False, False),
-        (0.001, OTHER_PROCESSOR, True, False),
-        (0.1, {**OTHER_PROCESSOR, "steps": 1, "events": []}, False, True),  # motion decides these
-        (0.1, {**OTHER_PROCESSOR, "seed": 1}, False, False),  # no processor changes that
-        (0.1, {**OTHER_PROCESSOR, "steps": 1}, False, True),
-        (0.001, {**OTHER_PROCESSOR, "end_state": None}, False, True),  # a hash of other numbers
-    ],
-)
-def test_only_other_processors_may_end_a_little_elsewhere(forged, by, changes, holds, excused):
-    def shift(lines, folder, rng):
-        for place, line in enumerate(lines, start=1):  # the first is farthest
+def shift_end_states(run, by, *, is_hash_changed=True, **changes):
+    """Move the end state of the first record by so much, of the second by half, and change more.
+
+    A record has a hash of its end state, which is then another one, unless it is left as it was.
+    """
+    if is_hash_changed:
+        changes["end_state"] = "0" * 64
+
+    def shift(lines, folder, _rng):
+        for place, line in enumerate(lines, start=1):
             log = read_actions(folder, line["action_log"])
             moved = replace(log, end_state=log.end_state + by / place)
-            line["action_log"] = write_actions(moved, folder)
-            new = {"end_state": "0" * 64, **changes}
-            if new["end_state"] is None:
-                del new["end_state"]
-            line.update(new)
+            line |= {"action_log": write_actions(moved, folder), **changes}
         return lines
 
-    forge(forged, shift)
+    forge(run, shift)
+
+
+def test_on_another_processor_a_run_may_end_a_little_elsewhere(forged):
+    shift_end_states(forged, by=0.001, **OTHER_PROCESSOR)
 
     found = verify_run(forged)
 
-    assert found.holds is holds
-    slugs = [check.slug for check in found.checks]
-    assert slugs == sorted(slugs)
-    assert found.verdicts["tolerant"] == (found.records if holds else 0)
-    assert found.deviation == pytest.approx(by if holds else 0)
+    assert found.holds
+    assert found.verdicts["tolerant"] == found.records
+    assert found.deviation == pytest.approx(0.001)
+
+
+def test_on_the_same_processor_no_run_may_end_elsewhere(forged):
+    shift_end_states(forged, by=0.001)
+    assert not verify_run(forged).holds
+
+
+@pytest.mark.parametrize(
+    ("by", "changes", "excused"),
+    [
+        pytest.param(0.1, {"steps": 1, "events": []}, True, id="steps and events"),
+        pytest.param(0.1, {"steps": 1}, True, id="steps"),
+        pytest.param(0.001, {"is_hash_changed": False}, True, id="hash of other numbers"),
+        pytest.param(0.1, {"seed": 1}, False, id="seed, which no processor changes"),
+    ],
+)
+def test_larger_differences_of_another_processor_do_not_hold_and_a_note_may_excuse_them(
+    forged, by, changes, excused
+):
+    """Motion decides how many steps an episode takes and what happens in it."""
+    shift_end_states(forged, by=by, **OTHER_PROCESSOR, **changes)
+
+    found = verify_run(forged)
+
+    assert not found.holds
     assert any("another kind of processor" in note for note in found.notes) is excused
 
 
 def test_a_merged_run_holds_by_the_plans_of_its_parts(honest, tmp_path):
-    """By all plans: each of these has the episodes of one policy only."""
-    parts = [tmp_path / policy for policy in ("listener", "forgetful")]
+    """Each of these has the episodes of one policy only."""
+    parts = [tmp_path / "listener", tmp_path / "forgetful"]
     for part in parts:
         shutil.copytree(honest, part)
         plan = json.loads((part / PLAN_FILE).read_bytes()) | {"policies": [part.name]}
@@ -254,12 +300,13 @@ def test_a_merged_run_holds_by_the_plans_of_its_parts(honest, tmp_path):
     assert not found.notes
 
 
-def test_a_sample_is_drawn_again_from_its_seed(honest):
-    told: list[tuple[int, int]] = []
-    found = verify_run(honest, sample=0.5, seed=3, progress=lambda *now: told.append(now))
+def test_of_a_sample_of_one_half_one_of_two_records_is_played_again(honest):
+    progress = []
 
-    assert told == [(1, 2), (2, 2)]
-    assert found.verdicts["exact"] == found.records // 2
+    found = verify_run(honest, sample=0.5, seed=3, progress=lambda *now: progress.append(now))
+
+    assert progress == [(1, 2), (2, 2)]
+    assert found.verdicts["exact"] == 1
     assert found.holds
 
 
@@ -276,21 +323,31 @@ def test_what_is_printed_of_a_verification(capsys, snapshot):
     assert capsys.readouterr().out == snapshot
 
 
+def verified(run, share):
+    """Return what came of ``roboirg leaderboard verify`` with a sample of this share."""
+    return CliRunner().invoke(app, ["leaderboard", "verify", str(run), "--sample", share])
+
+
 @pytest.mark.usefixtures("in_this_process")
-def test_the_command_tells_what_does_not_hold(honest, forged):
-    def verify(run, share):
-        words = ["leaderboard", "verify", str(run), "--sample", share]
-        return CliRunner().invoke(app, words)
+@pytest.mark.parametrize(("share", "played"), [("10%", "1 was"), ("1.0", "2 were")])
+def test_the_command_says_how_many_records_were_played_again(honest, share, played):
+    done = verified(honest, share)
 
-    for share, played in (("10%", "1 was"), ("1.0", "2 were")):
-        good = verify(honest, share)
-        assert good.exit_code == 0, good.output
-        assert f"2 records; {played} played again" in good.output
+    assert done.exit_code == 0, done.output
+    assert f"2 records; {played} played again" in done.output
 
+
+@pytest.mark.usefixtures("in_this_process")
+def test_the_command_says_what_does_not_hold(forged):
     forge(forged, FORGERIES["failure to success"][0])
-    bad = verify(forged, "100%")
-    assert bad.exit_code == 2
-    assert "outcome: the record says 'success'; it should be 'failure'" in bad.output
-    assert "1 thing does not hold." in bad.output
-    for share in ("many", "5", "0%", "101%", "nan"):
-        assert f"{share!r}; give one such as 5%" in str(verify(honest, share).exception)
+
+    done = verified(forged, "100%")
+
+    assert done.exit_code == 2
+    assert "outcome: the record says 'success'; it should be 'failure'" in done.output
+    assert "1 thing does not hold." in done.output
+
+
+@pytest.mark.parametrize("share", ["many", "5", "0%", "101%", "nan"])
+def test_the_command_refuses_a_share_that_is_none(honest, share):
+    assert f"{share!r}; give one such as 5%" in str(verified(honest, share).exception)

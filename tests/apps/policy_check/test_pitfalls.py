@@ -2,27 +2,15 @@
 
 from collections import deque
 
-import expert_world
 import pytest
-from expert_world import HONEST, Honest, OneByOne, record
+from expert_world import HONEST, Honest, OneByOne, Untrained, record
 
 from roboirg.apps.policy_check.policy_check import check_policy
 
-PLANTED = []
 
-
-def planted(check, words, verdict="warn"):
-    """Declare the check that finds a mistake, words of its message, and the verdict."""
-
-    def note(kind):
-        PLANTED.append((kind, check, words, verdict))
-        return kind
-
-    return note
-
-
-@planted("reset forgets", "belongs to the previous episode: a queue of actions", "fail")
 class KeepsQueue(OneByOne):
+    """Its queue of actions outlives its reset."""
+
     def __init__(self, seed=0):
         super().__init__(seed)
         self.kept = deque()
@@ -37,52 +25,71 @@ class KeepsQueue(OneByOne):
         return self.queue.popleft()
 
 
-@planted("gripper", "got -1 or less and 1 or more; change the sign")
 class InvertsGripper(Honest):
     def gripper(self, observation):
         return -super().gripper(observation)
 
 
-@planted("gripper", "Expected -1 whenever the expert holds a cube, got 0 to 0")
 class GripperFromZero(Honest):
+    """Its gripper is 0 when closed and 1 when open."""
+
     def gripper(self, observation):
         return (super().gripper(observation) + 1) / 2
 
 
 def results_of(kind, **options):
-    found = check_policy(f"{kind.__module__}:{kind.__name__}", record_expert=record, **options)
-    assert all(finding.message.endswith(".") for finding in found)
-    return found
+    """Check a policy class next to the made-up expert of expert_world.py."""
+    return check_policy(f"{kind.__module__}:{kind.__name__}", record_expert=record, **options)
 
 
 @pytest.mark.parametrize(
-    ("kind", "check", "words", "verdict"), PLANTED, ids=[kind.__name__ for kind, *_ in PLANTED]
+    ("kind", "check", "verdict", "words"),
+    [
+        (
+            KeepsQueue,
+            "reset forgets",
+            "fail",
+            "belongs to the previous episode: a queue of actions",
+        ),
+        (
+            InvertsGripper,
+            "gripper",
+            "warn",
+            "got -1 or less and 1 or more; change the sign",
+        ),
+        (
+            GripperFromZero,
+            "gripper",
+            "warn",
+            "Expected -1 whenever the expert holds a cube, got 0 to 0",
+        ),
+    ],
 )
-def test_a_planted_mistake_is_found_by_name(kind, check, words, verdict):
+def test_a_planted_mistake_is_found_by_its_check_and_by_no_other(kind, check, verdict, words):
     results = results_of(kind)
-    found = [finding for finding in results if finding.check == check]
 
-    assert [finding.verdict for finding in found] == [verdict]
-    assert words in found[0].message
-    # And taken for no other.
-    assert {finding.check for finding in results if finding.verdict in ("fail", "warn")} <= {check}
+    complaints = [result for result in results if result.verdict in ("fail", "warn")]
+
+    assert [(result.check, result.verdict) for result in complaints] == [(check, verdict)]
+    assert words in complaints[0].message
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("kind", HONEST, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("kind", HONEST)
 def test_nothing_is_found_in_honest_policies(kind, seed):
-    assert {finding.verdict for finding in results_of(kind, seed=seed)} <= {"pass", "note"}
+    assert {result.verdict for result in results_of(kind, seed=seed)} <= {"pass", "note"}
 
 
-def test_the_expert_s_error_is_told():
-    (told,) = [finding for finding in results_of(Honest) if finding.check == "expert"]
-    assert told.verdict == "pass"
-    assert told.message == (
+def test_the_distance_from_the_expert_passes_if_it_is_below_half_of_holding_still():
+    (result,) = [result for result in results_of(Honest) if result.check == "expert"]
+
+    assert result.verdict == "pass"
+    assert result.message == (
         "Distance from what an expert did at 20 moments: expected at most 0.0249 rad, half of that "
         "of holding still, got 0.000207."
     )
 
-    (told,) = [
-        finding for finding in results_of(expert_world.Untrained) if finding.check == "expert"
-    ]
-    assert told.verdict == "note"
+
+def test_the_distance_of_an_untrained_policy_from_the_expert_is_noted():
+    (result,) = [result for result in results_of(Untrained) if result.check == "expert"]
+    assert result.verdict == "note"

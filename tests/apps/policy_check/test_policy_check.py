@@ -107,37 +107,46 @@ class Reckless(Sound):
         return np.eye(8)[5] - np.eye(8)[3] + 9.0 * np.tri(4, 8, -1)
 
 
-def found(policy, verdict):
-    return {f.check: f.message for f in check_policy(policy) if f.verdict == verdict}
+def messages(policy, verdict):
+    """Check a policy; return the messages of the checks with a verdict, by the checks' names."""
+    results = check_policy(policy)
+    return {result.check: result.message for result in results if result.verdict == verdict}
 
 
 def test_depth_and_matrices_are_named_if_a_policy_wants_them():
-    requirements = found(f"{__name__}:Calibrated", "pass")["requirements"]
+    requirements = messages(f"{__name__}:Calibrated", "pass")["requirements"]
     assert requirements.endswith("observations every 1, depth, calibration.")
 
 
-def test_what_is_not_compared_with_the_expert_is_named():
-    told = check_policy(f"{__name__}:Waypoints", record_expert=print)[-1]
-    assert told == ("expert", "note", "Not checked: a waypoint takes many control steps.")
+def test_a_policy_of_waypoints_is_not_compared_with_the_expert():
+    *_, result = check_policy(f"{__name__}:Waypoints", record_expert=print)
+    assert result == ("expert", "note", "Not checked: a waypoint takes many control steps.")
 
 
 def test_a_sound_policy_passes_everything():
     results = check_policy(f"{__name__}:Sound", seed=3)
-    assert {result.verdict for result in results} == {"pass"}
-    assert [result.check for result in results] == [
-        "loads",
-        "requirements",
-        "version",
-        "acts without a video",
-        "acts with a video",
-        "reports",
-        "deterministic",
-        "reset forgets",
+
+    assert [(result.check, result.verdict) for result in results] == [
+        ("loads", "pass"),
+        ("requirements", "pass"),
+        ("version", "pass"),
+        ("acts without a video", "pass"),
+        ("acts with a video", "pass"),
+        ("reports", "pass"),
+        ("deterministic", "pass"),
+        ("reset forgets", "pass"),
     ]
-    assert all(result.message.endswith(".") for result in results)
-    assert "made with seed 3" in results[0].message
-    assert "5, 5, 5 actions of 8 numbers, float64" in results[3].message
-    assert found(Sound(), "fail") == {}
+
+
+def test_the_check_says_with_which_seed_a_policy_was_made_and_how_it_acts():
+    loads, _, _, acts, *_ = check_policy(f"{__name__}:Sound", seed=3)
+
+    assert "made with seed 3" in loads.message
+    assert "5, 5, 5 actions of 8 numbers, float64" in acts.message
+
+
+def test_an_object_is_checked_like_a_policy_that_is_named():
+    assert messages(Sound(), "fail") == {}
 
 
 @pytest.mark.parametrize(
@@ -153,21 +162,34 @@ def test_a_sound_policy_passes_everything():
         (Priceless, "reports", "usage() has None as 'calls'; it must be a number."),
     ],
 )
-def test_what_is_wrong_is_found(kind, check, words):
-    failed = found(f"{__name__}:{kind.__name__}", "fail")
+def test_the_check_that_finds_a_mistake_says_what_was_expected(kind, check, words):
+    """Each class has one mistake, which its name says."""
+    failed = messages(f"{__name__}:{kind.__name__}", "fail")
     assert words in failed[check]
 
 
-def test_what_is_allowed_is_noted():
-    notes = found(HonestDice(), "note")
-    assert "as the policy declares" in notes["deterministic"]
-    assert "set the attribute version" in notes["version"]
-    assert found(f"{__name__}:HonestDice", "fail") == {}
-    assert found(f"{__name__}:Reckless", "note")["range without a video"] == (
+def test_noise_that_a_policy_declares_is_noted_and_no_failure():
+    policy = f"{__name__}:HonestDice"
+
+    assert "as the policy declares" in messages(policy, "note")["deterministic"]
+    assert messages(policy, "fail") == {}
+
+
+@pytest.mark.parametrize("policy", [HonestDice(), Sound()], ids=["unknown", "none"])
+def test_a_policy_without_a_version_is_advised_to_set_one(policy):
+    assert "set the attribute version" in messages(policy, "note")["version"]
+
+
+def test_actions_out_of_the_usual_range_are_noted():
+    notes = messages(f"{__name__}:Reckless", "note")
+    assert notes["range without a video"] == (
         "9 of 12 actions have a number outside the usual range of joint_angle; farthest is value 1 "
         "of action 2: expected -1.76 to 1.76, got 9. The robot executes them as well as it can."
     )
-    assert "It is privileged" in found("oracle", "note")["loads"]
+
+
+def test_a_privileged_policy_is_noted():
+    assert "It is privileged" in messages("oracle", "note")["loads"]
 
 
 @pytest.mark.parametrize(
@@ -178,39 +200,58 @@ def test_what_is_allowed_is_noted():
         ("openpi://127.0.0.1:9?conect=0.1", "Did you mean 'connect'?"),
         (object(), "Expected reset() and act(), got no reset()."),
     ],
+    ids=["unknown", "no server", "unknown option", "no policy"],
 )
-def test_what_cannot_be_tried_is_told(spec, words):
-    assert any(words in sentence for sentence in found(spec, "fail").values())
+def test_a_policy_that_cannot_be_tried_fails_with_the_reason(spec, words):
+    (message,) = messages(spec, "fail").values()
+    assert words in message
 
 
-@pytest.mark.parametrize(("name", "code"), [("Sound", 0), ("NotFinite", 2)])
-def test_the_command_prints_a_table_and_an_exit_code(name, code, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("value", "code", "summary"),
+    [("0.0", 0, "9 checks, none failed."), ("np.nan", 2, "1 of 4 checks failed.")],
+)
+def test_the_command_prints_a_table_and_has_an_exit_code(
+    value, code, summary, tmp_path, monkeypatch
+):
     (tmp_path / "my_policy.py").write_text(
-        "import numpy as np\nclass Sound:\n    value = 0.0\n    def reset(self, i, d): pass\n"
-        "    def act(self, o): return np.full((2, 8), self.value)\n"
-        "class NotFinite(Sound):\n    value = np.nan\n"
+        "import numpy as np\nclass Mine:\n    def reset(self, i, d): pass\n"
+        f"    def act(self, o): return np.full((2, 8), {value})\n"
     )
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.delitem(sys.modules, "my_policy", raising=False)
     monkeypatch.setenv("COLUMNS", "200")
     app = typer.Typer()
     app.command()(command)
 
-    result = CliRunner().invoke(app, [f"my_policy:{name}", "--no-expert"])
+    result = CliRunner().invoke(app, ["my_policy:Mine", "--no-expert"])
 
     assert result.exit_code == code, result.output
-    assert ("9 checks, none failed." if code == 0 else "1 of 4 checks failed.") in result.output
+    assert summary in result.output
     assert "Actions joint_angle" in result.output
 
 
-def test_warnings_and_failures_are_counted(capsys, snapshot):
-    kinds = ("pass", "warn", "note", "fail", "warn")
-    results = [CheckResult(f"check {kind}", kind, "[x].") for kind in kinds]
+@pytest.mark.parametrize(
+    ("verdicts", "summary"),
+    [
+        (["pass"], "1 check, none failed."),
+        (["pass", "warn", "note"], "3 checks, none failed, 1 warning."),
+        (["pass", "warn", "note", "fail", "warn"], "1 of 5 checks failed, 2 warnings."),
+    ],
+)
+def test_results_are_printed_as_a_table_and_warnings_and_failures_are_counted(
+    capsys, verdicts, summary
+):
+    """``[x]`` is no markup."""
+    results = [CheckResult(f"check {verdict}", verdict, "[x].") for verdict in verdicts]
 
-    for end in (5, 3, 1):
-        print_check_results(results[:end], Console(width=80))
+    print_check_results(results, Console(width=80))
 
-    assert capsys.readouterr().out == snapshot
+    head, first, *_, last = capsys.readouterr().out.splitlines()
+    assert head.split() == ["check", "result"]
+    assert first.split() == ["check", "pass", "pass", "[x]."]
+    assert last == summary
 
 
 class Versioned(Sound):
@@ -219,6 +260,8 @@ class Versioned(Sound):
 
 
 def test_the_version_that_records_will_have_is_printed():
-    assert "step 3000" in found(f"{__name__}:Versioned", "pass")["version"]
-    assert "Not checked" in found(Versioned(), "note")["reset forgets"]
-    assert "set the attribute version" in found(Sound(), "note")["version"]
+    assert "step 3000" in messages(f"{__name__}:Versioned", "pass")["version"]
+
+
+def test_what_reset_forgets_is_not_checked_of_a_policy_with_noise():
+    assert "Not checked" in messages(Versioned(), "note")["reset forgets"]

@@ -21,6 +21,7 @@ CLI = "import sys; from roboirg.apps.real.commands import real_app; real_app(sys
 
 @pytest.fixture
 def served(small):
+    """A running server of the page on which the operator *ann* scores four trials."""
     plan, folder = small
     server = ScoreServer(plan, folder, "ann")
     threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -29,23 +30,32 @@ def served(small):
     server.server_close()
 
 
+class StaysWhereItIs(urllib.request.HTTPRedirectHandler):
+    """Does not follow where a response leads."""
+
+    def redirect_request(self, *args):
+        return None
+
+
 def ask(server, path, form=None, *, key=None, host=None, origin=None):
-    """Return the status, headers and text of a response."""
-    port = server.port
-    data = None if form is None else urllib.parse.urlencode(form).encode()
-    request = urllib.request.Request(f"http://127.0.0.1:{port}{path}", data)
-    request.add_header("Cookie", f"{server.cookie}={server.key if key is None else key}")
+    """Return the status, headers and text of a response; a form is sent by POST.
+
+    The request has the server's key as a cookie, unless another one is given.
+    """
+    data = None
+    if form is not None:
+        data = urllib.parse.urlencode(form).encode()
+    if key is None:
+        key = server.key
+    request = urllib.request.Request(f"http://127.0.0.1:{server.port}{path}", data)
+    request.add_header("Cookie", f"{server.cookie}={key}")
     if host:
         request.add_header("Host", host)
     if origin:
         request.add_header("Origin", origin)
 
-    class Stay(urllib.request.HTTPRedirectHandler):
-        def redirect_request(self, *args):
-            return None
-
     try:
-        answer = urllib.request.build_opener(Stay).open(request, timeout=600)
+        answer = urllib.request.build_opener(StaysWhereItIs).open(request, timeout=600)
     except urllib.error.HTTPError as error:
         answer = error
     with answer:
@@ -53,52 +63,79 @@ def ask(server, path, form=None, *, key=None, host=None, origin=None):
 
 
 def form_of(server, trial, choice, **more):
+    """Return the form with which the page scores a trial."""
     revision = server.read_trial_log().revision(trial.name)
     return {"trial": trial.name, "revision": revision, "choice": choice, **more}
 
 
-def test_only_pages_of_this_server_are_answered(served):
-    trial = served.plan.trials[0]
-    port = served.port
+def test_the_server_listens_on_this_machine_alone(served):
     assert served.socket.getsockname()[0] == "127.0.0.1"
 
-    form = form_of(served, trial, "success")
-    here = f"http://127.0.0.1:{port}"
-    elsewhere = "http://evil.example"
-    refused = [
-        ask(served, "/?key=wrong", key=""),
-        ask(served, f"/?key={served.key}", host="evil.example"),
-        ask(served, "/score", form, key="wrong"),
-        ask(served, "/score", form, key=""),
-        ask(served, "/score", form, host=f"evil.example:{port}"),
-        ask(served, "/score", form, origin=elsewhere),
-    ]
 
-    assert {status for status, _, _ in refused} == {403}
-    assert not any(served.key in f"{headers}{text}" for _, headers, text in refused)
+@pytest.mark.parametrize(
+    "fault",
+    [{"key": "wrong"}, {"key": ""}, {"host": "evil.example"}, {"origin": "http://evil.example"}],
+    ids=["wrong key", "no key", "another host", "another page"],
+)
+def test_a_score_from_elsewhere_is_refused_and_does_not_show_the_key(served, fault):
+    form = form_of(served, served.plan.trials[0], "success")
+
+    status, headers, text = ask(served, "/score", form, **fault)
+
+    assert status == 403
+    assert served.key not in f"{headers}{text}"
     assert not (served.folder / "records.jsonl").exists()
-    assert ask(served, "/score", form, origin=here)[0] == 303
+
+
+def test_a_score_from_the_page_itself_is_stored(served):
+    form = form_of(served, served.plan.trials[0], "success")
+
+    status, _, _ = ask(served, "/score", form, origin=f"http://127.0.0.1:{served.port}")
+
+    assert status == 303
     assert len(read_records(served.folder)) == 1
 
+
+@pytest.mark.parametrize("key_in_address", ["wrong", ""])
+def test_the_page_is_refused_with_a_wrong_key(served, key_in_address):
+    status, _, _ = ask(served, f"/?key={key_in_address}", key="")
+    assert status == 403
+
+
+def test_the_page_runs_no_foreign_scripts_and_tells_others_no_address(served):
     status, headers, _ = ask(served, "/")
+
     assert status == 200
     assert headers["Referrer-Policy"] == "same-origin"
     assert "default-src 'none'" in headers["Content-Security-Policy"]
 
 
-def test_malformed_forms_are_refused(served):
-    assert ask(served, "/elsewhere", {})[0] == 404
-    assert ask(served, "/elsewhere")[0] == 404
-    assert ask(served, "/?trial=missing")[0] == 400
-    assert ask(served, "/score", {"note": "x" * 70_000})[0] == 413
-    for form in ({"trial": "missing"}, form_of(served, served.plan.trials[0], "magic"), {}):
-        status, headers, _ = ask(served, "/score", form)
-        assert status == 303
-        assert "message=" in headers["Location"]
+@pytest.mark.parametrize(
+    ("path", "form", "status"),
+    [
+        ("/elsewhere", {}, 404),
+        ("/elsewhere", None, 404),
+        ("/?trial=missing", None, 400),
+        ("/score", {"note": "x" * 70_000}, 413),
+    ],
+)
+def test_requests_for_what_is_not_there_or_too_large_are_refused(served, path, form, status):
+    assert ask(served, path, form)[0] == status
+
+
+@pytest.mark.parametrize("changes", [{"trial": "missing"}, {"choice": "magic"}, {"revision": ""}])
+def test_a_malformed_score_leads_back_to_the_page_with_a_message(served, changes):
+    form = form_of(served, served.plan.trials[0], "success") | changes
+
+    status, headers, _ = ask(served, "/score", form)
+
+    assert status == 303
+    assert "message=" in headers["Location"]
     assert not (served.folder / "records.jsonl").exists()
 
 
 def test_a_page_that_is_out_of_date_scores_nothing(served):
+    """Another page has scored the trial in the meantime."""
     trial = served.plan.trials[0]
     form = form_of(served, trial, "success")
     ask(served, "/score", form)
@@ -109,35 +146,53 @@ def test_a_page_that_is_out_of_date_scores_nothing(served):
     assert served.read_trial_log().newest(trial.name).outcome == "success"
 
 
-def test_what_an_operator_types_is_text(served):
+def test_what_an_operator_types_is_text_and_no_part_of_the_page(served):
     trial = served.plan.trials[0]
     note = "<script>alert(1)</script> \"quoted\" & 'so'"
-    form = form_of(served, trial, "success", note=note.replace(" ", " \n"), video="../secret.mp4")
-    assert "+has+no+file+" in ask(served, "/score", form)[1]["Location"]
-
-    record = served.read_trial_log().newest(trial.name)
-    assert trial_metadata(record)["note"] == note
-    assert record.video is None
+    ask(served, "/score", form_of(served, trial, "success", note=note))
 
     _, _, page = ask(served, f"/?trial={trial.name}&message=<b>x</b>")
+
+    assert trial_metadata(served.read_trial_log().newest(trial.name))["note"] == note
     assert "<script>alert" not in page
     assert "<b>x</b>" not in page
 
-    # The record has the path of a video inside the folder.
+
+def test_line_ends_in_a_note_become_spaces(served):
+    trial = served.plan.trials[0]
+    ask(served, "/score", form_of(served, trial, "success", note="it fell \ndown"))
+
+    assert trial_metadata(served.read_trial_log().newest(trial.name))["note"] == "it fell down"
+
+
+def test_a_video_outside_the_folder_is_not_noted(served):
+    trial = served.plan.trials[0]
+
+    _, headers, _ = ask(served, "/score", form_of(served, trial, "success", video="../secret.mp4"))
+
+    assert "+has+no+file+" in headers["Location"]
+    assert served.read_trial_log().newest(trial.name).video is None
+
+
+def test_a_record_has_the_path_of_a_video_inside_the_folder(served):
+    trial = served.plan.trials[0]
     (served.folder / "films").mkdir()
     (served.folder / "films" / "a.mp4").write_bytes(b"film")
+
     ask(served, "/score", form_of(served, trial, "success", video="films/a.mp4"))
+
     assert served.read_trial_log().newest(trial.name).video == "films/a.mp4"
 
 
 def test_a_kill_between_two_clicks_costs_nothing(small):
+    """Each of two trials is scored by a server that is killed at once; the next goes on."""
     plan, folder = small
     command = [sys.executable, "-u", "-c", CLI, "score", str(folder), "--operator", "ann"]
 
     for number, trial in enumerate(plan.trials[:2]):
-        process = subprocess.Popen(command, text=True, stdout=subprocess.PIPE)
+        server = subprocess.Popen(command, text=True, stdout=subprocess.PIPE)
         try:
-            url = re.search(r"http\S+", process.stdout.readline())[0]
+            url = re.search(r"http\S+", server.stdout.readline())[0]
             browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
             page = browser.open(url, timeout=600).read().decode()
             assert f"{number} of 4 scored" in page
@@ -146,10 +201,10 @@ def test_a_kill_between_two_clicks_costs_nothing(small):
             address = url.partition("/?")[0] + "/score"
             browser.open(address, urllib.parse.urlencode(form).encode(), timeout=600)
         finally:
-            process.kill()
-            process.wait(timeout=600)
+            server.kill()
+            server.wait(timeout=600)
 
-    assert [record.outcome for record in read_records(folder)] == ["success"] * 2
+    assert [record.outcome for record in read_records(folder)] == ["success", "success"]
 
 
 # In a browser.
@@ -161,56 +216,68 @@ def press(page, key):
         page.keyboard.press(key)
 
 
-@pytest.mark.browser
-def test_notes_and_corrections_by_keyboard(browser, served, wait_s):
-    first = served.plan.trials[0]
+@pytest.fixture
+def page(browser, served, wait_s):
+    """The operator's page in a browser, on a narrow screen."""
     page = browser.new_page(viewport=NARROW)
     page.set_default_timeout(1000 * wait_s)
     page.goto(served.url)
-    page.keyboard.press("n")
-    page.keyboard.type("1 s u v: keys in a field are letters")
-    page.keyboard.press("Enter")
-
-    assert not (served.folder / "records.jsonl").exists()
-
-    press(page, "s")
-    record = served.read_trial_log().newest(first.name)
-    assert trial_metadata(record)["note"] == "1 s u v: keys in a field are letters"
-
-    # Back, and another verdict: the correction counts.
-    press(page, "ArrowLeft")
-    assert first.name in page.inner_text("h1")
-    assert page.locator("button[aria-pressed=true]").count() == 1
-
-    press(page, "1")
-    assert served.read_trial_log().newest(first.name).attribution.failure == "wrong_place"
-
+    yield page
     page.close()
 
 
 @pytest.mark.browser
-def test_the_page_fits_narrow_screens_and_says_what_it_shows(browser, served, wait_s):
-    page = browser.new_page(viewport=NARROW)
-    page.set_default_timeout(1000 * wait_s)
-    page.goto(served.url)
+def test_keys_in_the_field_of_a_note_are_letters(page, served):
+    """Elsewhere 1, s, u and v score a trial, and n leads to the note."""
+    page.keyboard.press("n")
+    page.keyboard.type("1 s u v: keys in a field are letters")
+    page.keyboard.press("Enter")
+    assert not (served.folder / "records.jsonl").exists()
+
+    press(page, "s")
+
+    record = served.read_trial_log().newest(served.plan.trials[0].name)
+    assert trial_metadata(record)["note"] == "1 s u v: keys in a field are letters"
+
+
+@pytest.mark.browser
+def test_a_trial_can_be_scored_again_by_going_back(page, served):
+    first = served.plan.trials[0]
+    press(page, "s")
+
+    press(page, "ArrowLeft")
+    assert first.name in page.inner_text("h1")
+    assert page.locator("button[aria-pressed=true]").count() == 1
+    press(page, "1")
+
+    assert served.read_trial_log().newest(first.name).attribution.failure == "wrong_place"
+
+
+@pytest.mark.browser
+def test_the_page_fits_narrow_screens(page):
     assert page.evaluate("document.documentElement.scrollWidth") <= NARROW["width"]
+    for button in page.locator("main button").all():
+        assert button.bounding_box()["height"] >= 40
+
+
+@pytest.mark.browser
+def test_everything_on_the_page_has_a_name_and_can_be_reached_by_keys(page):
     assert page.locator("svg[role=img] title").count() == 1
     assert page.locator("fieldset legend").count() == 5
     for button in page.locator("main button").all():
         assert button.get_attribute("aria-keyshortcuts")
-        assert button.bounding_box()["height"] >= 40
     for field in page.locator("input[type=text]").all():
         assert field.evaluate("field => field.labels.length") == 1
 
-    # By tabs alone too.
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.tagName") == "BUTTON"
 
-    page.close()
-
 
 def test_the_page_says_what_is_meant_and_what_was_scored(small, snapshot):
-    """Before and after a failure, a success, and a void trial with a note; the last is open."""
+    """Before and after a failure, a success, and a void trial with a note; the last is open.
+
+    Without its style, its script and its drawing.
+    """
     plan, folder = small
     trial_log = TrialLog.read(plan, folder)
     pages = [render_trial(trial_log, plan.trials[0], nonce="n")]
@@ -221,4 +288,10 @@ def test_the_page_says_what_is_meant_and_what_was_scored(small, snapshot):
     hidden = re.compile(r"(?s)<(style|script|svg)\b.*?</\1>")
 
     assert [hidden.sub("", page) for page in pages] == snapshot
-    assert not re.search("listener|forgetful", "".join(pages))
+
+
+def test_the_page_does_not_name_the_policy(small):
+    """The operator must not know which policy acts."""
+    plan, folder = small
+    page = render_trial(TrialLog.read(plan, folder), plan.trials[0], nonce="n")
+    assert not re.search("listener|forgetful", page)

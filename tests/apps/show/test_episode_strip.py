@@ -1,5 +1,7 @@
 """Strips of pictures, the choice of moments, and an episode in words."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -31,123 +33,181 @@ SAID = [
 
 
 def moments(count, caption="done"):
-    return [
-        StripMoment(
-            10 * number, caption, np.full((256, 256, 3), 10 + number, np.uint8), number == 0
-        )
-        for number in range(count)
-    ]
+    """Return so many moments, 10 steps apart, of which the first is in the video.
+
+    The picture of number n has the value 10 + n everywhere.
+    """
+    found = []
+    for number in range(count):
+        picture = np.full((256, 256, 3), 10 + number, np.uint8)
+        found.append(StripMoment(10 * number, caption, picture, is_demonstration=number == 0))
+    return found
 
 
 def drawn(count, caption="done", style=STYLE):
+    """Draw a strip of so many moments with two instructions, and return the figure."""
     with mpl.rc_context(style):
         figure = draw_strip("A title", SAID, moments(count, caption))
         FigureCanvasAgg(figure).draw()
     return figure
 
 
-def test_every_picture_is_there_once_and_in_order_of_time_in_rows_of_four():
-    figure = drawn(8)
-    values = [axes.images[0].get_array()[0, 0, 0] for axes in figure.axes]
-    assert values == list(range(10, 18))
+def test_every_picture_is_there_once_and_in_order_of_time():
+    pictures = [axes.images[0].get_array() for axes in drawn(8).axes]
+    assert [picture[0, 0, 0] for picture in pictures] == [10, 11, 12, 13, 14, 15, 16, 17]
 
-    places = [axes.get_position() for axes in figure.axes]
-    assert places == sorted(places, key=lambda place: (-round(place.y0, 6), place.x0))
-    assert [round(place.y0, 6) for place in places].count(round(places[0].y0, 6)) == 4
+
+def test_pictures_are_in_rows_of_four_from_top_to_bottom_and_left_to_right():
+    places = [axes.get_position() for axes in drawn(8).axes]
+
+    heights = [round(place.y0, 6) for place in places]
+    lefts = [place.x0 for place in places]
+    assert heights[:4] == [heights[0]] * 4
+    assert heights[4:] == [heights[4]] * 4
+    assert heights[0] > heights[4]
+    assert lefts[:4] == sorted(lefts[:4]) == lefts[4:]
 
 
 @pytest.mark.parametrize("caption", ["done: pick", "done: pick up the container " * 30])
-def test_no_word_leaves_the_strip_and_none_is_drawn_over_another(caption):
+def test_no_word_leaves_the_strip(caption):
     figure = drawn(12, caption)
-    boxes = [text.get_window_extent() for text in figure.texts]
-    for number, box in enumerate(boxes):
-        assert box.x0 >= 0
-        assert box.x1 <= figure.bbox.x1
-        assert box.y0 >= 0
-        assert not [other for other in boxes[:number] if other.padded(-2).overlaps(box.padded(-2))]
+
+    for text in figure.texts:
+        box = text.get_window_extent()
+        assert 0 <= box.x0 < box.x1 <= figure.bbox.x1, text
+        assert box.y0 >= 0, text
 
 
-def test_what_is_said_is_above_the_pictures_in_its_setting_s_color():
-    found = {text.get_text(): text for text in drawn(3).texts}
-    assert {"A title", "explicit", "Lift it.", "direct", "0.0 s, video", "0.5 s"} <= set(found)
+@pytest.mark.parametrize("caption", ["done: pick", "done: pick up the container " * 30])
+def test_no_word_is_drawn_over_another(caption):
+    """Boxes may touch by two pixels."""
+    boxes = [text.get_window_extent().padded(-2) for text in drawn(12, caption).texts]
 
-    colors = [found[text].get_color() for text in ("direct", "0.0 s, video", "0.5 s")]
-    assert colors == ["#0072B2", "#E69F00", "#8a8a8a"]
-
-    sides = [text.get_text() for text in drawn(3).axes[0].texts]
-    assert sides == ["robot's right", "robot's left"]  # the front camera faces the robot
-
-    on_dark = {text.get_text(): text for text in drawn(3, style=DARK_STYLE).texts}
-    assert on_dark["explicit"].get_color() == DARK_STYLE["text.color"]  # black would not be seen
+    for first, second in itertools.combinations(boxes, 2):
+        assert not first.overlaps(second)
 
 
-def test_the_remarkable_is_chosen_first_and_fillers_only_fill_up():
-    assert choose_moments([0, 4, 4, 4, 0]) == (0, 1, 2, 3, 4)
+@pytest.mark.parametrize(
+    ("text", "color"),
+    [("direct", "#0072B2"), ("0.0 s, video", "#E69F00"), ("0.5 s", "#8a8a8a")],
+    ids=["setting", "time in the video", "time of the policy"],
+)
+def test_a_strip_names_settings_and_times_in_their_colors(text, color):
+    texts = {found.get_text(): found for found in drawn(3).texts}
+    assert texts[text].get_color() == color
 
-    filled = choose_moments([0, *[4] * 20, 1, 0])
-    assert len(filled) == MIN_MOMENTS
-    assert {0, 21, 22} <= set(filled)
-    assert choose_moments([0, 1, 4, 1, 4, 1, 1, 0]) == (0, 1, 3, 5, 6, 7)
+
+def test_a_strip_has_a_title_and_the_instructions():
+    texts = {found.get_text() for found in drawn(3).texts}
+    assert {"A title", "explicit", "Lift it."} <= texts
+
+
+def test_the_first_picture_says_where_the_robots_left_is():
+    """The front camera faces the robot."""
+    first, *_ = drawn(3).axes
+    assert [text.get_text() for text in first.texts] == ["robot's right", "robot's left"]
+
+
+def test_black_text_is_drawn_in_another_color_on_dark():
+    """The setting *explicit* is black, which would not be seen."""
+    texts = {found.get_text(): found for found in drawn(3, style=DARK_STYLE).texts}
+    assert texts["explicit"].get_color() == DARK_STYLE["text.color"]
+
+
+@pytest.mark.parametrize(
+    ("remarkable", "chosen"),
+    [
+        pytest.param([0, 4, 4, 4, 0], (0, 1, 2, 3, 4), id="all of a few"),
+        pytest.param([0, 1, 4, 1, 4, 1, 1, 0], (0, 1, 3, 5, 6, 7), id="the remarkable first"),
+    ],
+)
+def test_the_remarkable_is_chosen_first(remarkable, chosen):
+    """Smaller numbers are more remarkable: 0 is the start or the end, 4 a filler."""
+    assert choose_moments(remarkable) == chosen
+
+
+def test_fillers_only_fill_up_to_the_smallest_number_of_moments():
+    chosen = choose_moments([0, *[4] * 20, 1, 0])
+
+    assert len(chosen) == MIN_MOMENTS
+    assert {0, 21, 22} <= set(chosen)
+
+
+def test_of_very_many_remarkable_moments_some_are_left_out():
     assert len(choose_moments([1] * 40)) == MAX_MOMENTS
 
 
-def test_motions_are_described_and_like_ones_merged():
-    over = Fact("over", "cube", "target")
-    motions = (
-        Away("a", 0, 32),
-        Away("b", 0, 32),
-        Away("c", 64, 164, under="a"),
-        Swap("a", "b", 0, 50, 0.07, stage=3),
-        Shuttle("s", Point(0, -0.3, 0), Point(0, 0.3, 0), 60, 5, Fact("pressed", "button")),
-        Glow("m", over, 20),
-        Vanish("cube", Fact("binned", "cube", "bin")),
-    )
-
-    assert describe_motions(Scene((), motions)) == [
-        "a, b: away until step 32",
-        "c: away from step 64 until step 164, then under a",
-        "a and b: change places, step 0 to 50 of the video's stage 4",
+@pytest.mark.parametrize(
+    ("motions", "sentence"),
+    [
+        ((Away("a", 0, 32), Away("b", 0, 32)), "a, b: away until step 32"),
         (
-            "s: runs from (0.00, -0.30) to (0.00, 0.30) and back, "
-            "5 passes of 60 steps, until button pressed"
+            (Away("c", 64, 164, under="a"),),
+            "c: away from step 64 until step 164, then under a",
         ),
-        "m: seen while cube over target, and 20 steps longer",
-        "cube: gone for good once in bin",
-    ]
+        (
+            (Swap("a", "b", 0, 50, 0.07, stage=3),),
+            "a and b: change places, step 0 to 50 of the video's stage 4",
+        ),
+        (
+            (Shuttle("s", Point(0, -0.3, 0), Point(0, 0.3, 0), 60, 5, Fact("pressed", "button")),),
+            (
+                "s: runs from (0.00, -0.30) to (0.00, 0.30) and back, "
+                "5 passes of 60 steps, until button pressed"
+            ),
+        ),
+        (
+            (Glow("m", Fact("over", "cube", "target"), 20),),
+            "m: seen while cube over target, and 20 steps longer",
+        ),
+        ((Vanish("cube", Fact("binned", "cube", "bin")),), "cube: gone for good once in bin"),
+    ],
+    ids=["like ones", "away", "swap", "shuttle", "glow", "vanish"],
+)
+def test_motions_are_described_in_words(motions, sentence):
+    assert describe_motions(Scene((), motions)) == [sentence]
+
+
+def test_a_fact_without_a_place_is_described_in_two_words():
     assert fact_words(Fact("still", "robot")) == "robot still"
 
 
 def test_the_video_is_described_by_its_stages_and_facts():
+    """Going home is not in the video."""
     lines = describe_video(get_episode("VideoPlaceButton", "test", 0))
+
     assert lines[:2] == ["1. pick up the cube", "2. drop the cube onto target"]
-    assert "go home" not in " ".join(lines)  # it is not in the video
+    assert "go home" not in " ".join(lines)
     assert lines[-1].startswith("that is: cube_")
     assert lines[-1].count("button pressed") == 1
+
+
+def test_an_episode_without_a_video_has_no_description_of_one():
     assert describe_video(get_episode("PickXtimes", "test", 0)) == []
 
 
 @pytest.mark.sim
 def test_a_playthrough_shows_the_start_each_stage_and_the_end(snapshot):
     played = play_through(get_episode("VideoUnmask", "test", 3))
+
     assert (played.verdict, played.moments[-1].step) == ("success", played.steps)
     assert [
         (moment.step, moment.caption, moment.is_demonstration) for moment in played.moments
     ] == snapshot
-    for moment in played.moments:
-        assert moment.picture.shape == (PICTURE_SIZE, PICTURE_SIZE, 3)
+    assert {moment.picture.shape for moment in played.moments} == {(PICTURE_SIZE, PICTURE_SIZE, 3)}
     assert len({moment.picture.tobytes() for moment in played.moments}) > 2
 
 
-def test_what_moves_by_itself_is_remarkable_while_it_does():
+def test_containers_that_change_places_are_remarkable_as_soon_as_they_do():
+    """Twice in this episode, from steps 90 and 140 on."""
     episode = get_episode("ButtonUnmaskSwap", "test", 3)
     key_events = KeyEvents(episode.scene.motions)
 
     captions = [str(key_events.at(step, 0)) for step in range(300)]
 
-    assert captions[33].endswith("container 3 appear")
     swaps = [step for step, caption in enumerate(captions) if "change places" in caption]
-    count = sum(isinstance(motion, Swap) for motion in episode.scene.motions)
-    assert swaps == [90, 140, 190][:count]
+    assert swaps == [90, 140]
+    assert captions[33].endswith("container 3 appear")
 
 
 def test_motions_of_a_stage_are_remarkable_from_then_on():
