@@ -147,7 +147,8 @@ class BodyNet(nn.Module):
         """Return the logits for every decision of a batch.
 
         At a decision there is one token for the robot with its goal, and one for each track; what
-        the memory remembers is added to them, and a transformer mixes them.
+        the memory remembers is added to them, and a transformer mixes them. Whatever the memory,
+        the object of any confirmed track can be chosen, in sight or not.
 
         Args:
             batch: B episodes with D decisions.
@@ -156,7 +157,7 @@ class BodyNet(nn.Module):
         goal = self.goal(batch.goals)[:, None]
         looks = self._looks(batch, goal)._replace(cache=cache)
         memory_output = self.memory(looks, batch.decisions)
-        can_choose = memory_output.can_choose.flatten(0, 1)
+        can_choose = values_at_looks(batch.confirmed, batch.decisions).flatten(0, 1)
         tokens = self._tokens(batch, goal, looks, memory_output)
         tokens = self._attend(tokens, can_choose, memory_output.hooks)
 

@@ -263,7 +263,7 @@ def _labeled_tracks(tracks: Tensor, batch: EpisodeBatch) -> LabeledScores:
     right_moves = batch.moves[is_at_object][:, None, None].expand(-1, 1, tracks.shape[-1])
     scores = tracks[is_at_object].gather(1, right_moves)[:, 0]
     right = batch.tracks[is_at_object]
-    # Without memory an object out of sight is blocked, and nothing could be learned.
+    # A track that is not confirmed yet is blocked, and nothing could be learned.
     is_possible = scores.gather(1, right[:, None])[:, 0] > BLOCKED_SCORE / 2
     return LabeledScores(scores[is_possible], right[is_possible])
 

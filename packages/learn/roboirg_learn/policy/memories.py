@@ -21,7 +21,7 @@ from torch.nn import functional
 from roboirg_learn.policy.body_layers import WIDTH, LayerHook
 
 BLOCKED_SCORE = -1e4
-"""Logit of an object that cannot be chosen."""
+"""Logit of what cannot be chosen."""
 TIME_FREQUENCIES = 8
 """Frequencies of the sines and cosines that encode a look's number."""
 LOOKS_PER_RADIAN = 100.0
@@ -84,13 +84,11 @@ class MemoryOutput(NamedTuple):
     Attributes:
         tracks: (B, D, K, WIDTH) added to the tokens of the tracks.
         robot: (B, D, WIDTH) added to the robot's token.
-        can_choose: (B, D, K) whether the object of the track may be chosen.
         hooks: one for each transformer layer, of B * D sequences; empty if no layer is changed.
     """
 
     tracks: Tensor
     robot: Tensor
-    can_choose: Tensor
     hooks: Sequence[LayerHook] = ()
 
 
@@ -180,10 +178,10 @@ class FrameTokens(nn.Module):
         return times[:, None]
 
 
-def choose_only_visible(
+def add_nothing(
     looks: EmbeddedLooks, decisions: Tensor, hooks: Sequence[LayerHook] = ()
 ) -> MemoryOutput:
-    """Return an output that adds zeros and lets only confirmed objects in sight be chosen.
+    """Return an output that adds zeros to the tokens, for memories that only have hooks.
 
     Args:
         looks: of B episodes.
@@ -192,16 +190,15 @@ def choose_only_visible(
     """
     tracks = torch.zeros_like(values_at_looks(looks.tracks, decisions))
     robot = torch.zeros_like(values_at_looks(looks.robot, decisions))
-    can_choose = values_at_looks(looks.visible & looks.confirmed, decisions)
-    return MemoryOutput(tracks, robot, can_choose, hooks)
+    return MemoryOutput(tracks, robot, hooks)
 
 
 class NoMemory(LookMemory):
-    """Remembers nothing but the last known positions, which are part of the looks."""
+    """Remembers nothing; the last known positions of objects are part of the present look."""
 
     def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
-        """Return zeros; only objects in sight may be chosen."""
-        return choose_only_visible(looks, decisions)
+        """Return zeros."""
+        return add_nothing(looks, decisions)
 
 
 class RecurrentState(NamedTuple):
@@ -248,7 +245,7 @@ class RecurrentMemory(LookMemory):
         """Return the states after the looks of decisions (B, D), stepping over new looks only.
 
         The state after the looks of earlier calls is in ``looks.cache``, which is brought up to
-        date. Any object that was seen often enough may be chosen, also out of sight.
+        date.
         """
         cache = looks.cache or MemoryCache()
         first_new = cache.looks
@@ -264,7 +261,6 @@ class RecurrentMemory(LookMemory):
         return MemoryOutput(
             tracks=values_at_looks(tracks, numbers),
             robot=values_at_looks(scenes, numbers),
-            can_choose=values_at_looks(looks.confirmed, decisions),
         )
 
     def _first_state(self, looks: EmbeddedLooks, cache: MemoryCache) -> RecurrentState:
