@@ -1,6 +1,7 @@
 """The policy that learns to act: what it is recorded from, its file, its command, and its play."""
 
 import json
+import math
 import shlex
 from pathlib import Path
 
@@ -25,11 +26,12 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import locked
 from roboirg_learn.commands import print_policy
 from roboirg_learn.listener.reader_plan import ReaderPlan
-from roboirg_learn.policy.moves import common_moves, decisions_of
+from roboirg_learn.policy.moves import NO_LABEL, common_moves, decisions_of
 from roboirg_learn.policy.policy_files import PolicyFiles
 from roboirg_learn.policy.policy_plan import BodyPlan, Recorded
 from roboirg_learn.policy.recording_files import load_recording, save_recording
 from roboirg_learn.policy.sight import encode_yaws, object_classes_of
+from roboirg_learn.policy.timing import passes_so_far, steps_to_act, timed_move
 
 RESULTS = Path(__file__).parents[3] / "results"
 SHIPPED = PolicyFiles(
@@ -124,6 +126,49 @@ def test_a_repeated_waypoint_is_labeled_with_the_gripper_command_that_follows():
 
     assert [decision.look for decision in found] == [0, 1, 2, 4]
     assert [decision.move.gripper for decision in found] == [0, -1, -1, 0]
+
+
+def test_passes_of_a_moving_cube_over_its_target_are_counted_at_each_look():
+    """It moves along x, back and forth, with the target at 0.1."""
+    times = np.arange(7)
+    plain = recording_with_actions([np.zeros(7)], [6])
+    assert (passes_so_far(plain) == NO_LABEL).all()
+    things = np.zeros((7, 2, 4), np.float32)
+    things[:, 0, 0] = 0.1
+    things[:, 1, 0] = [-0.3, 0.0, 0.2, 0.5, 0.2, 0.0, 0.2]
+    moving = plain._replace(classes=("target", "shuttle"), things=things, steps=times)
+
+    assert passes_so_far(moving).tolist() == [0, 0, 1, 1, 1, 2, 3]
+
+
+def test_the_time_of_a_wait_is_counted_down_to_the_next_move():
+    """The expert goes above the button, closes the hand, waits twice, presses, and stays."""
+    above = [0, 0, 0.15, 0, 0, 0, 0]
+    close = [0, 0, 0.15, 0, 0, 0, -1]
+    down = [0, 0, 0.01, 0, 0, 0, 0]
+    actions = [above, close, close, close, down, close, close]
+    looks = [0, 1, 2, 4, 5, 7, 8]
+    recorded = recording_with_actions(actions, looks)._replace(steps=10 * np.arange(9))
+
+    # Close after down is the gripper's value of that move; the last wait never ends.
+    assert steps_to_act(recorded).tolist() == [-1, -1, 30, 20, 10, 0, -1, -1, -1]
+
+
+@given(st.floats(0.0, 5.0), st.booleans(), st.permutations([0.1, 0.2, 0.3]))
+def test_a_policy_moves_when_less_than_half_a_wait_is_left_and_else_waits(
+    time, was_waiting, scores
+):
+    """Whatever it would do otherwise; only move 1 is a wait."""
+    scores = np.array(scores)
+    is_wait = np.array([False, True, False])
+
+    chosen = timed_move(scores, is_wait, time, was_waiting=was_waiting)
+
+    best_move = 0 if scores[0] > scores[2] else 2
+    if scores.argmax() != 1 and not was_waiting:
+        assert chosen == best_move
+    else:
+        assert chosen == (best_move if math.expm1(time) < 0.5 else 1)
 
 
 @pytest.mark.sim

@@ -18,6 +18,7 @@ from roboirg_learn.policy.fast_weights import (  # noqa: E402
 )
 from roboirg_learn.policy.frame_memory import even_frames  # noqa: E402
 from roboirg_learn.policy.memories import MemoryCache  # noqa: E402
+from roboirg_learn.policy.policy_data import LABELS  # noqa: E402
 from roboirg_learn.policy.policy_plan import (  # noqa: E402
     HANDS,
     PLANNERS,
@@ -49,9 +50,7 @@ def batch_of(seed, decisions=(3, 7)):
         torch.ones((1, LOOKS), dtype=torch.bool),
         torch.ones((1, PARTS)),
         torch.tensor([list(decisions)]),
-        torch.zeros((1, len(decisions)), dtype=torch.long),
-        torch.zeros((1, len(decisions)), dtype=torch.long),
-        torch.zeros((1, len(decisions)), dtype=torch.long),
+        **dict.fromkeys(LABELS, torch.zeros((1, len(decisions)), dtype=torch.long)),
     )
 
 
@@ -70,7 +69,7 @@ def with_changed_looks(batch, looks):
 
 
 def gives_same_answers(first, other):
-    return all(torch.allclose(a, b, atol=1e-5) for a, b in zip(first[:3], other[:3], strict=True))
+    return all(torch.allclose(a, b, atol=1e-5) for a, b in zip(first[:5], other[:5], strict=True))
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
@@ -243,12 +242,12 @@ def test_modulation_with_zero_weights_equals_a_body_without_memory():
 
     different = modulated(batch), plain(batch)
     assert not all(
-        torch.equal(a, b) for a, b in zip(different[0][:3], different[1][:3], strict=True)
+        torch.equal(a, b) for a, b in zip(different[0][:5], different[1][:5], strict=True)
     )
 
     for layer in modulated.memory.layers:
         torch.nn.init.zeros_(layer.scale_shift.weight)
-    for ours, other in zip(modulated(batch)[:3], plain(batch)[:3], strict=True):
+    for ours, other in zip(modulated(batch)[:5], plain(batch)[:5], strict=True):
         assert torch.equal(ours, other)
 
 

@@ -24,7 +24,6 @@ from roboirg_learn.policy.memories import (
     LookMemory,
     MaskedTokens,
     MemoryOutput,
-    add_nothing,
     tokens_at_looks,
 )
 
@@ -64,7 +63,7 @@ class EvenFrameMemory(LookMemory):
         tokens = self.frames(looks)
         chosen = self.chosen(looks, decisions)
         hooks = [layer(tokens, chosen) for layer in self.layers]
-        return add_nothing(looks, decisions, hooks)
+        return MemoryOutput(hooks=hooks)
 
     def chosen(self, looks: EmbeddedLooks, decisions: Tensor) -> Tensor:  # noqa: ARG002
         """Return the numbers of looks (B, D, frames) that are attended to; -1 for none."""
