@@ -10,11 +10,11 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg_learn.policy.planner_history import (
     MAX_CHOSEN,
     MAX_SWITCHES,
+    PLANNER_HISTORIES,
     RECENT,
     VIDEO_FRAMES,
     KeyframeHistory,
     PlannerHistory,
-    context_size,
     ideal_planner_inputs,
     recent_looks,
 )
@@ -111,11 +111,23 @@ def test_planner_history_keeps_the_looks_at_which_the_subgoal_changed():
     assert done.tolist() == [1, 1, 0]
     assert under_way.tolist() == [1, 0, 0]
     assert rest.tolist() == [0.25, 0, 0, 0]
-    assert len(history.context(19)) == context_size(3)
 
     kept = history.kept(video=2, look=19)
     assert [look for look in kept if look >= 0] == [0, 1, 2, 7, 9, 19]
     assert len(kept) == VIDEO_FRAMES + MAX_SWITCHES + 1
+
+
+def test_a_planner_with_key_frames_is_not_told_what_it_named_before():
+    """Else it could count by its own words, and key frames could not matter."""
+    histories = KeyframeHistory(3), KeyframeHistory(3)
+    for history, names in zip(histories, ((0, 1, 0), (2, 2, 2)), strict=True):
+        for template, look in zip(names, (2, 7, 9), strict=True):
+            history.name(template, look)
+        history.choose([7])
+    first, other = histories
+
+    assert first.context(19).tolist() == other.context(19).tolist() == []
+    assert first.kept(2, 19).tolist() == other.kept(2, 19).tolist()
 
 
 def test_neighboring_key_frames_are_merged_into_their_middle_one():
@@ -270,15 +282,15 @@ def test_a_learned_planner_may_point_at_an_object_that_is_out_of_sight(saved_pol
         *(rng.normal(0, 0.1, (looks, things, 2)).astype(np.float32) for _ in range(2)),
         seen, np.ones_like(seen), rng.normal(0, 1, (looks, TOOL_NUMBERS)).astype(np.float32),
     )  # fmt: skip
-    subgoal_inputs = ideal_planner_inputs(
-        KeyframeHistory(size), np.array([0, 1]), np.array([2, 5]), 0
-    )
+    history = PLANNER_HISTORIES[model.plan["memory"]](size)
+    subgoal_inputs = ideal_planner_inputs(history, np.array([0, 1]), np.array([2, 5]), 0)
     goal = np.zeros(model.goals.size, np.float32)
     nothing = np.array([-1, -1])
-    numbers = EpisodeArrays(shown, goal, np.array([2, 5]), *[nothing] * 3, subgoal_inputs)
+    numbers = EpisodeArrays(shown, goal, np.array([2, 5]), *[nothing] * 5, subgoal_inputs)
     answer = model.planner(to_batch([numbers]))
     assert (answer.tracks[0, 1, :, 1] > -1e3).all()
-    assert (answer.keep_scores is None) == (model.plan["memory"] == "subgoal")
+    has_history = model.plan["memory"] == "subgoal"
+    assert (answer.keep_scores is None) == has_history
     context = subgoal_inputs._replace(context=subgoal_inputs.context + 1)
     other = model.planner(to_batch([numbers._replace(subgoal_inputs=context)]))
-    assert not torch.equal(answer.moves, other.moves)
+    assert torch.equal(answer.moves, other.moves) != has_history
