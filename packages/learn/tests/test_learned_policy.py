@@ -129,46 +129,37 @@ def test_a_repeated_waypoint_is_labeled_with_the_gripper_command_that_follows():
 
 
 def test_passes_of_a_moving_cube_over_its_target_are_counted_at_each_look():
-    """It moves along x, back and forth, with the target at 0.1."""
-    times = np.arange(7)
-    plain = recording_with_actions([np.zeros(7)], [6])
-    assert (passes_so_far(plain) == NO_LABEL).all()
-    things = np.zeros((7, 2, 4), np.float32)
-    things[:, 0, 0] = 0.1
-    things[:, 1, 0] = [-0.3, 0.0, 0.2, 0.5, 0.2, 0.0, 0.2]
-    moving = plain._replace(classes=("target", "shuttle"), things=things, steps=times)
+    """It moves along x, back and forth, with the target at 0."""
+    recorded = recording_with_actions([np.zeros(7)], [4])
+    assert (passes_so_far(recorded) == NO_LABEL).all()
+    things = np.zeros((5, 2, 4))
+    things[:, 0, 0] = [-3, -1, 2, 1, -1]
+    moving = recorded._replace(classes=("shuttle", "target"), things=things)
 
-    assert passes_so_far(moving).tolist() == [0, 0, 1, 1, 1, 2, 3]
+    assert passes_so_far(moving).tolist() == [0, 0, 1, 1, 2]
 
 
 def test_the_time_of_a_wait_is_counted_down_to_the_next_move():
     """The expert goes above the button, closes the hand, waits twice, presses, and stays."""
-    above = [0, 0, 0.15, 0, 0, 0, 0]
-    close = [0, 0, 0.15, 0, 0, 0, -1]
-    down = [0, 0, 0.01, 0, 0, 0, 0]
+    above, close, down = np.eye(7)[[2, 6, 1]]
     actions = [above, close, close, close, down, close, close]
-    looks = [0, 1, 2, 4, 5, 7, 8]
-    recorded = recording_with_actions(actions, looks)._replace(steps=10 * np.arange(9))
+    recorded = recording_with_actions(actions, [0, 1, 2, 4, 5, 7, 8])
 
     # Close after down is the gripper's value of that move; the last wait never ends.
-    assert steps_to_act(recorded).tolist() == [-1, -1, 30, 20, 10, 0, -1, -1, -1]
+    assert steps_to_act(recorded).tolist() == [-1, -1, 3, 2, 1, 0, -1, -1, -1]
 
 
 @given(st.floats(0.0, 5.0), st.booleans(), st.permutations([0.1, 0.2, 0.3]))
-def test_a_policy_moves_when_less_than_half_a_wait_is_left_and_else_waits(
-    time, was_waiting, scores
-):
-    """Whatever it would do otherwise; only move 1 is a wait."""
-    scores = np.array(scores)
-    is_wait = np.array([False, True, False])
+def test_a_waiting_policy_moves_when_less_than_half_a_wait_is_left(time, was_waiting, scores):
+    """Whatever it would do otherwise; only the last move is a wait."""
+    chosen = timed_move(
+        np.array(scores), np.array([False, False, True]), time, was_waiting=was_waiting
+    )
 
-    chosen = timed_move(scores, is_wait, time, was_waiting=was_waiting)
-
-    best_move = 0 if scores[0] > scores[2] else 2
-    if scores.argmax() != 1 and not was_waiting:
-        assert chosen == best_move
-    else:
-        assert chosen == (best_move if math.expm1(time) < 0.5 else 1)
+    is_about_to_wait = was_waiting or max(scores) == scores[2]
+    is_wait = is_about_to_wait and math.expm1(time) >= 0.5
+    best_move = int(scores[1] > scores[0])
+    assert chosen == (2 if is_wait else best_move)
 
 
 @pytest.mark.sim

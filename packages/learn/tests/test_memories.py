@@ -18,7 +18,7 @@ from roboirg_learn.policy.fast_weights import (  # noqa: E402
 )
 from roboirg_learn.policy.frame_memory import even_frames  # noqa: E402
 from roboirg_learn.policy.memories import MemoryCache  # noqa: E402
-from roboirg_learn.policy.policy_data import LABELS  # noqa: E402
+from roboirg_learn.policy.policy_data import LABELS, LookArrays  # noqa: E402
 from roboirg_learn.policy.policy_plan import (  # noqa: E402
     HANDS,
     PLANNERS,
@@ -123,20 +123,8 @@ def test_padding_changes_nothing(memory):
     """An episode answers the same next to a longer one with more things."""
     body = body_of(memory)
     batch = batch_of(1)
-    short = batch._replace(
-        **{
-            name: getattr(batch, name)[:, :9]
-            for name in (
-                "classes",
-                "positions",
-                "yaw_codes",
-                "visible",
-                "confirmed",
-                "tool",
-                "has_look",
-            )
-        }
-    )
+    first_looks = {name: getattr(batch, name)[:, :9] for name in (*LookArrays._fields, "has_look")}
+    short = batch._replace(**first_looks)
     has_look = batch.has_look.clone()
 
     has_look[:, 9:] = False
