@@ -16,6 +16,8 @@ from roboirg_learn.policy.moves import NO_LABEL, STAY, decisions_of
 
 WAIT_STEPS = 7
 """Control steps of one wait."""
+MOST_STEPS_LEFT = 8 * WAIT_STEPS
+"""Most control steps until the end of a wait that are learned; more count as this many."""
 HALF_WAIT = math.log1p(0.5)
 """Half a wait as a network says it, which learns log(1 + control steps / `WAIT_STEPS`)."""
 MOVING_CUBE = "shuttle"
@@ -44,8 +46,8 @@ def passes_so_far(recorded: ExpertRecording) -> NDArray[np.int64]:
 def steps_to_act(recorded: ExpertRecording) -> NDArray[np.int64]:
     """Return at each of T looks the control steps until the expert ends its wait: (T,).
 
-    They count from the first of several waits to the decision that ends them, where they are 0;
-    `NO_LABEL` where the expert does not wait, or never moves again.
+    They count from the first of several waits to the decision that ends them, where they are 0, and
+    are at most `MOST_STEPS_LEFT`; `NO_LABEL` where the expert does not wait, or never moves again.
     """
     steps_left = np.full(len(recorded.steps), NO_LABEL)
     next_move = None  # the look of the next decision that is no wait
@@ -55,7 +57,7 @@ def steps_to_act(recorded: ExpertRecording) -> NDArray[np.int64]:
         elif next_move is not None:
             wait = slice(decision.look, next_move + 1)
             steps_left[wait] = recorded.steps[next_move] - recorded.steps[wait]
-    return steps_left
+    return np.minimum(steps_left, MOST_STEPS_LEFT)
 
 
 def timed_move(
