@@ -47,8 +47,7 @@ passes of a moving cube). In validation episodes the share of right ones is meas
 RATE = 2e-3
 BATCH = 16
 LARGE_ERROR = 0.1
-"""Of a time left; the loss grows with the square of smaller errors, else evenly. Times are
-logarithms, so errors of a moment count where little time is left, and hardly where much is."""
+"""Of a time left; the loss grows with the square of smaller errors, else evenly."""
 NEW_NOISE_EVERY = 2
 """Passes after which the noise of the detector is drawn anew."""
 VALIDATION_EVERY = 10
@@ -212,12 +211,22 @@ def body_loss(body: BodyNet, batch: EpisodeBatch) -> Tensor:
             loss = loss + LOSS_WEIGHTS[measure] * entropy
     is_waiting = batch.steps_left >= 0
     if is_waiting.any():
-        times = (batch.steps_left[is_waiting] / WAIT_STEPS).log1p()
-        found_times = answer.time_left[is_waiting]
-        loss = loss + functional.smooth_l1_loss(found_times, times, beta=LARGE_ERROR)
+        loss = loss + _time_loss(answer.time_left[is_waiting], batch.steps_left[is_waiting])
     if answer.keep_scores is not None and batch.subgoal_inputs is not None:
         loss = loss + _keep_loss(answer.keep_scores, batch.subgoal_inputs.to_keep)
     return loss
+
+
+def _time_loss(found: Tensor, steps: Tensor) -> Tensor:
+    """Return the loss of n times left; the less time is left, the more its error weighs.
+
+    Args:
+        found: (n,) what a network says, as of `BodyAnswer`.
+        steps: (n,) the control steps that are left.
+    """
+    waits = 1.0 + steps / WAIT_STEPS
+    errors = functional.smooth_l1_loss(found, waits.log(), reduction="none", beta=LARGE_ERROR)
+    return (errors / waits).sum() / (1.0 / waits).sum()
 
 
 def _keep_loss(scores: Tensor, labels: Tensor) -> Tensor:

@@ -297,8 +297,7 @@ class RecurrentMemory(LookMemory):
         """
         distances = torch.cdist(looks.positions, looks.positions)  # m
         scores = -(distances * NEARNESS_PER_METER * self.nearness.exp())
-        was_confirmed = torch.zeros_like(looks.confirmed)
-        was_confirmed[:, 1:] = looks.confirmed[:, :-1]
+        was_confirmed = functional.pad(looks.confirmed[:, :-1], (0, 0, 1, 0))
         is_itself = torch.eye(scores.shape[-1], dtype=torch.bool)
         is_excluded = ~was_confirmed[:, :, None, :] | is_itself
         scores = scores.masked_fill(is_excluded, -math.inf)

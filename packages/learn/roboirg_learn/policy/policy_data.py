@@ -28,6 +28,8 @@ from roboirg_learn.policy.subgoal_net import SubgoalInputBatch
 from roboirg_learn.policy.timing import passes_so_far, steps_to_act
 from roboirg_learn.policy.tracks import Detections, Tracker
 
+TRACKED = ("classes", "positions", "yaw_codes", "visible", "confirmed")
+"""Fields of `LookArrays` that a `Tracker` has."""
 LABELS = ("moves", "tracks", "stages_done", "passes", "steps_left")
 """Fields of `EpisodeArrays` and `EpisodeBatch` that a network learns from, and does not read."""
 COUNTED_LOOKS = 10
@@ -92,15 +94,7 @@ class LookHistory:
         """
         tracks_of_look = self.tracks.update(look)
         # Copies, because the tracker changes its arrays in place.
-        self._rows.append(
-            {
-                "classes": self.tracks.classes.copy(),
-                "positions": self.tracks.positions.copy(),
-                "yaw_codes": self.tracks.yaw_codes.copy(),
-                "visible": self.tracks.visible.copy(),
-                "confirmed": self.tracks.confirmed,
-            }
-        )
+        self._rows.append({name: getattr(self.tracks, name).copy() for name in TRACKED})
         self._tools.append(_tool_numbers(tool, is_video=is_video))
         return tracks_of_look
 
@@ -111,7 +105,7 @@ class LookHistory:
         """
         count = max(1, self.tracks.count)
         parts = {}
-        for name in self._rows[0]:
+        for name in TRACKED:
             parts[name] = np.stack([row[name] for row in self._rows])[:, :count]
         return LookArrays(**parts, tool=np.stack(self._tools))
 

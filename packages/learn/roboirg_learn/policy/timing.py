@@ -31,9 +31,8 @@ def passes_so_far(recorded: ExpertRecording) -> NDArray[np.int64]:
     `NO_LABEL` everywhere if nothing moves by itself. The cube begins at an end of its way, and has
     passed the target when it is on the other side of it: 0, 0, 1, 1, 2, …
     """
-    looks = len(recorded.steps)
     if MOVING_CUBE not in recorded.classes:
-        return np.full(looks, NO_LABEL)
+        return np.full(len(recorded.steps), NO_LABEL)
     places = recorded.things[:, :, :2]
     cube = places[:, recorded.classes.index(MOVING_CUBE)]
     target = places[:, recorded.classes.index(TARGET)]
