@@ -56,7 +56,7 @@ def steps_to_act(recorded: ExpertRecording) -> NDArray[np.int64]:
         elif next_move is not None:
             wait = slice(decision.look, next_move + 1)
             steps_left[wait] = recorded.steps[next_move] - recorded.steps[wait]
-    return np.minimum(steps_left, MOST_STEPS_LEFT)
+    return steps_left.clip(max=MOST_STEPS_LEFT)
 
 
 def timed_move(
