@@ -1,7 +1,6 @@
 """The policy that learns to act: what it is recorded from, its file, its command, and its play."""
 
 import json
-import math
 import shlex
 from pathlib import Path
 
@@ -31,7 +30,7 @@ from roboirg_learn.policy.policy_files import PolicyFiles
 from roboirg_learn.policy.policy_plan import BodyPlan, Recorded
 from roboirg_learn.policy.recording_files import load_recording, save_recording
 from roboirg_learn.policy.sight import encode_yaws, object_classes_of
-from roboirg_learn.policy.timing import passes_so_far, steps_to_act, timed_move
+from roboirg_learn.policy.timing import DUE_TIME, passes_so_far, steps_to_act, timed_move
 
 RESULTS = Path(__file__).parents[3] / "results"
 SHIPPED = PolicyFiles(
@@ -150,14 +149,14 @@ def test_the_time_of_a_wait_is_counted_down_to_the_next_move():
 
 
 @given(st.floats(0.0, 5.0), st.booleans(), st.permutations([0.1, 0.2, 0.3]))
-def test_a_waiting_policy_moves_when_less_than_half_a_wait_is_left(time, was_waiting, scores):
+def test_a_waiting_policy_moves_when_less_than_a_wait_is_left(time, was_waiting, scores):
     """Whatever it would do otherwise; only the last move is a wait."""
     chosen = timed_move(
         np.array(scores), np.array([False, False, True]), time, was_waiting=was_waiting
     )
 
     is_about_to_wait = was_waiting or max(scores) == scores[2]
-    is_wait = is_about_to_wait and math.expm1(time) >= 0.5
+    is_wait = is_about_to_wait and time >= DUE_TIME
     best_move = int(scores[1] > scores[0])
     assert chosen == (2 if is_wait else best_move)
 

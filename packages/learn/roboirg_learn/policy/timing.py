@@ -18,8 +18,10 @@ WAIT_STEPS = 7
 """Control steps of one wait."""
 MOST_STEPS_LEFT = 8 * WAIT_STEPS
 """Most control steps until the end of a wait that are learned; more count as this many."""
-HALF_WAIT = math.log1p(0.5)
-"""Half a wait as a network says it, which learns log(1 + control steps / `WAIT_STEPS`)."""
+DUE_TIME = math.log1p(0.75)
+"""A time left below which it is time to move: three quarters of a wait, as networks say times,
+log(1 + control steps / `WAIT_STEPS`). Half a wait would be the nearest decision, but the times that
+networks say are rather too long."""
 MOVING_CUBE = "shuttle"
 """Class of a cube that goes back and forth over a target by itself."""
 TARGET = "target"
@@ -68,7 +70,7 @@ def timed_move(
 ) -> int:
     """Return the number of the next of M moves: the best one, unless it would come at a wrong time.
 
-    A policy that waits, or is about to, moves when less than half a wait is left, not earlier, and
+    A policy that waits, or is about to, moves when less than `DUE_TIME` is left, not earlier, and
     not later. With the scores 1, 2 and 3, of which the last is a wait, it is move 1 when it is time
     and else move 2, the wait.
 
@@ -80,6 +82,6 @@ def timed_move(
     """
     best = scores.argmax()
     if is_wait[best] or was_waiting:
-        is_time = time_left < HALF_WAIT
+        is_time = time_left < DUE_TIME
         best = np.where(is_wait != is_time, scores, -np.inf).argmax()
     return int(best)
