@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from plan_files import plan_file
 from typer.testing import CliRunner
 
@@ -23,11 +25,12 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import locked
 from roboirg_learn.commands import print_policy
 from roboirg_learn.listener.reader_plan import ReaderPlan
-from roboirg_learn.policy.moves import common_moves, decisions_of
+from roboirg_learn.policy.moves import NO_LABEL, common_moves, decisions_of
 from roboirg_learn.policy.policy_files import PolicyFiles
 from roboirg_learn.policy.policy_plan import BodyPlan, Recorded
 from roboirg_learn.policy.recording_files import load_recording, save_recording
 from roboirg_learn.policy.sight import encode_yaws, object_classes_of
+from roboirg_learn.policy.timing import DUE_TIME, passes_so_far, steps_to_act, timed_move
 
 RESULTS = Path(__file__).parents[3] / "results"
 SHIPPED = PolicyFiles(
@@ -130,6 +133,40 @@ def test_a_repeated_waypoint_is_labeled_with_the_gripper_command_that_follows():
 
     assert [decision.look for decision in found] == [0, 1, 2, 4]
     assert [decision.move.gripper for decision in found] == [0, -1, -1, 0]
+
+
+def test_passes_of_a_moving_cube_over_its_target_are_counted_at_each_look():
+    """It moves along x, back and forth, with the target at 0."""
+    recorded = recording_with_actions([np.zeros(7)], [4])
+    assert (passes_so_far(recorded) == NO_LABEL).all()
+    things = np.zeros((5, 2, 4))
+    things[:, 0, 0] = [-3, -1, 2, 1, -1]
+    moving = recorded._replace(classes=("shuttle", "target"), things=things)
+
+    assert passes_so_far(moving).tolist() == [0, 0, 1, 1, 2]
+
+
+def test_the_time_of_a_wait_is_counted_down_to_the_next_move():
+    """The expert goes above the button, closes the hand, waits twice, presses, and stays."""
+    above, close, down = np.eye(7)[[2, 6, 1]]
+    actions = [above, close, close, close, down, close, close]
+    recorded = recording_with_actions(actions, [0, 1, 2, 4, 5, 7, 8])
+
+    # Close after down is the gripper's value of that move; the last wait never ends.
+    assert steps_to_act(recorded).tolist() == [-1, -1, 3, 2, 1, 0, -1, -1, -1]
+
+
+@given(st.floats(0.0, 5.0), st.booleans(), st.permutations([0.1, 0.2, 0.3]))
+def test_a_waiting_policy_moves_when_less_than_a_wait_is_left(time, was_waiting, scores):
+    """Whatever it would do otherwise; only the last move is a wait."""
+    chosen = timed_move(
+        np.array(scores), np.array([False, False, True]), time, was_waiting=was_waiting
+    )
+
+    is_about_to_wait = was_waiting or max(scores) == scores[2]
+    is_wait = is_about_to_wait and time >= DUE_TIME
+    best_move = int(scores[1] > scores[0])
+    assert chosen == (2 if is_wait else best_move)
 
 
 @pytest.mark.sim

@@ -48,15 +48,15 @@ SPOT_NUMBERS = (4 * FREQUENCIES + 2) + 2 + 4
 """An object's position as Fourier features, its yaw code, and where it is from the tool."""
 APART_SCALE = 5.0
 """Per meter from the tool, so that these numbers are about as great as the others."""
-MOST_DONE = 24
-"""Greatest count of completed stages that is predicted; more count as this many."""
+MOST_COUNTED = 24
+"""Greatest count that is predicted, of completed stages and of passes; more count as this many."""
 
 
 class EpisodeBatch(NamedTuple):
     """A batch of B episodes with T looks, K tracks and D decisions, padded.
 
     A look is a moment at which the front picture is looked at, a track an object that is followed
-    from look to look. `moves`, `tracks` and `stages_done` are labels, -1 where nothing is learned.
+    from look to look. From `moves` to `steps_left` are labels, -1 where nothing is learned.
 
     Attributes:
         classes: (B, T, K) class number of each track.
@@ -71,6 +71,8 @@ class EpisodeBatch(NamedTuple):
         moves: (B, D) the right move by number; for planners the right subgoal template.
         tracks: (B, D) the right track: of the object that the move or subgoal is at.
         stages_done: (B, D) how many stages of the goal are completed.
+        passes: (B, D) how often a moving cube has passed a target.
+        steps_left: (B, D) control steps until a wait ends.
         subgoal_inputs: for hands the subgoals that they follow, for planners what they named and
             keep; None for other networks.
     """
@@ -87,6 +89,8 @@ class EpisodeBatch(NamedTuple):
     moves: Tensor
     tracks: Tensor
     stages_done: Tensor
+    passes: Tensor
+    steps_left: Tensor
     subgoal_inputs: SubgoalInputBatch | None = None
 
 
@@ -96,7 +100,9 @@ class BodyAnswer(NamedTuple):
     Attributes:
         moves: (B, D, M) of each move; for planners, of each subgoal template.
         tracks: (B, D, M, K) of each track, given the move.
-        stages_done: (B, D, MOST_DONE + 1) of how many stages are completed; used in training only.
+        stages_done: (B, D, MOST_COUNTED + 1) of how many stages are completed; for training only.
+        passes: (B, D, MOST_COUNTED + 1) the same of passes of a moving cube.
+        time_left: (B, D) no logits, but log(1 + control steps until a wait ends / `WAIT_STEPS`).
         keep_scores: (B, D, RECENT) of keeping each recent look; of the planner `KEYFRAME_PLANNER`,
             else None.
     """
@@ -104,6 +110,8 @@ class BodyAnswer(NamedTuple):
     moves: Tensor
     tracks: Tensor
     stages_done: Tensor
+    passes: Tensor
+    time_left: Tensor
     keep_scores: Tensor | None = None
 
 
@@ -133,9 +141,11 @@ class BodyNet(nn.Module):
         # What is remembered is added, and the tokens are mixed.
         self.memory = MEMORIES[memory]()
         self.encoder = transformer(WIDTH, HEADS, LAYERS)
-        # From the mixed tokens: move, completed stages, and the track for each move.
+        # From the mixed tokens: move, counts, time, and the track for each move.
         self.move = nn.Linear(WIDTH, len(at_objects))
-        self.done = nn.Linear(WIDTH, MOST_DONE + 1)
+        self.done = nn.Linear(WIDTH, MOST_COUNTED + 1)
+        self.passes = nn.Linear(WIDTH, MOST_COUNTED + 1)
+        self.time_left = nn.Linear(WIDTH, 1)
         self.query = nn.Embedding(len(at_objects), WIDTH)
         self.key = nn.Linear(WIDTH, WIDTH)
         self.mixed = nn.Linear(WIDTH, WIDTH)
@@ -147,7 +157,8 @@ class BodyNet(nn.Module):
         """Return the logits for every decision of a batch.
 
         At a decision there is one token for the robot with its goal, and one for each track; what
-        the memory remembers is added to them, and a transformer mixes them.
+        the memory remembers is added to them, and a transformer mixes them. Whatever the memory,
+        the object of any confirmed track can be chosen, in sight or not.
 
         Args:
             batch: B episodes with D decisions.
@@ -156,20 +167,25 @@ class BodyNet(nn.Module):
         goal = self.goal(batch.goals)[:, None]
         looks = self._looks(batch, goal)._replace(cache=cache)
         memory_output = self.memory(looks, batch.decisions)
-        can_choose = memory_output.can_choose.flatten(0, 1)
+        can_choose = values_at_looks(batch.confirmed, batch.decisions).flatten(0, 1)
         tokens = self._tokens(batch, goal, looks, memory_output)
         tokens = self._attend(tokens, can_choose, memory_output.hooks)
 
         # B and D were one axis for attention; they become two again.
-        robot = tokens[:, 0]
         shape = batch.decisions.shape
-        tracks = self._track_scores(robot, tokens[:, 1:], can_choose).unflatten(0, shape)
-        moves = self.move(robot).unflatten(0, shape)
-        stages_done = self.done(robot).unflatten(0, shape)
+        track_scores = self._track_scores(tokens[:, 0], tokens[:, 1:], can_choose)
+        robot = tokens[:, 0].unflatten(0, shape)
         keep_scores = None
         if self.keeps is not None:
-            keep_scores = self.keeps(looks, batch.decisions, robot.unflatten(0, shape))
-        return BodyAnswer(moves, tracks, stages_done, keep_scores)
+            keep_scores = self.keeps(looks, batch.decisions, robot)
+        return BodyAnswer(
+            moves=self.move(robot),
+            tracks=track_scores.unflatten(0, shape),
+            stages_done=self.done(robot),
+            passes=self.passes(robot),
+            time_left=self.time_left(robot)[..., 0],
+            keep_scores=keep_scores,
+        )
 
     def _tokens(
         self, batch: EpisodeBatch, goal: Tensor, looks: EmbeddedLooks, memory_output: MemoryOutput
@@ -201,12 +217,11 @@ class BodyNet(nn.Module):
         Args:
             tokens: (n, 1 + K, WIDTH), the robot's first.
             can_choose: (n, K) whether the object of each track can be chosen.
-            hooks: what the memory does in each layer; may be empty.
+            hooks: what the memory does in each layer.
         """
         is_robot = torch.ones_like(can_choose[:, :1])
         is_attended_to = torch.cat([is_robot, can_choose], 1)
-        for number, layer in enumerate(self.encoder.layers):
-            hook = hooks[number] if hooks else LayerHook()
+        for layer, hook in zip(self.encoder.layers, hooks, strict=True):
             tokens = run_layer(layer, tokens, is_attended_to, hook)
         return tokens
 

@@ -22,7 +22,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from roboirg.extension.commands import write_atomically
-from roboirg_learn.policy.body_net import MOST_DONE, BodyAnswer, BodyNet, EpisodeBatch
+from roboirg_learn.policy.body_net import BodyAnswer, BodyNet, EpisodeBatch
 from roboirg_learn.policy.memories import BLOCKED_SCORE
 from roboirg_learn.policy.moves import LookDecision
 from roboirg_learn.policy.policy_data import (
@@ -33,18 +33,21 @@ from roboirg_learn.policy.policy_data import (
 from roboirg_learn.policy.policy_plan import BodyPlan, Recorded
 from roboirg_learn.policy.sight import ObjectClasses
 from roboirg_learn.policy.subgoal_training import with_planner_inputs
+from roboirg_learn.policy.timing import WAIT_STEPS
 from roboirg_learn.policy.trained_body import Choice, GoalLayout, make_body
 from roboirg_learn.trainer import Checkpoint, Course, Progress, Training, even_batches
 
 MOVES = "moves"
 THINGS = "things"
 DONE = "done"
-MEASURES = (MOVES, THINGS, DONE)
-"""Shares that are right in validation episodes: moves, objects, numbers of completed stages."""
+PASSES = "passes"
+LOSS_WEIGHTS = {MOVES: 1.0, THINGS: 1.0, DONE: 0.5, PASSES: 0.5}
+"""Weights in the loss of what is chosen (moves, objects) and of what is counted (completed stages,
+passes of a moving cube). In validation episodes the share of right ones is measured."""
 RATE = 2e-3
 BATCH = 16
-COUNT_WEIGHT = 0.5
-"""Of the numbers of completed stages in the loss."""
+LARGE_ERROR = 0.1
+"""Of a time left; the loss grows with the square of smaller errors, else evenly."""
 NEW_NOISE_EVERY = 2
 """Passes after which the noise of the detector is drawn anew."""
 VALIDATION_EVERY = 10
@@ -138,14 +141,14 @@ class BodyCourse(Course[EpisodeArrays]):
         if not self._learned or epoch % NEW_NOISE_EVERY == 0:
             self._draw_noise(epoch // NEW_NOISE_EVERY)
         rng = random.Random(f"{self._plan.seed}/{epoch}")
-        return even_batches(self._learned, rng, _length, BATCH)
+        return even_batches(self._learned, rng, lambda episode: len(episode.looks.tool), BATCH)
 
     def loss(self, batch: Sequence[EpisodeArrays]) -> Tensor:
         """Return `body_loss` of a batch."""
         return body_loss(self.net, to_batch(batch))
 
     def score(self) -> dict[str, float]:
-        """Return the shares of right decisions in the validation episodes, by `MEASURES`."""
+        """Return the shares of right decisions in the validation episodes, by measure."""
         shares: dict[str, float] = score(self.net, self._validation)
         return shares
 
@@ -193,27 +196,37 @@ def validation_flags(tasks: Sequence[str]) -> list[bool]:
     return is_validation
 
 
-def _length(episode: EpisodeArrays) -> int:
-    """Return the number of looks, so that batches are even."""
-    return len(episode.looks.tool)
-
-
 def body_loss(body: BodyNet, batch: EpisodeBatch) -> Tensor:
-    """Return the loss of a batch: the cross-entropies of moves, tracks and completed stages.
+    """Return the loss of a batch: `LOSS_WEIGHTS` times cross-entropies, and the error of times.
 
-    Tracks are scored for the right move. The number of completed stages is never acted on; it
-    teaches the memory at each decision what to keep, as the moves do only where a count ends. A
-    planner that chooses looks to keep learns these, too.
+    Tracks are scored for the right move. Counts are never acted on; they teach the memory at each
+    decision what to keep, as the moves do only where a count ends. A planner that chooses looks to
+    keep learns these, too.
     """
     answer: BodyAnswer = body(batch)
-    labeled = _labeled_scores(answer, batch)
-    loss = functional.cross_entropy(*labeled[MOVES])
-    loss = loss + COUNT_WEIGHT * functional.cross_entropy(*labeled[DONE])
-    if len(labeled[THINGS].right):
-        loss = loss + functional.cross_entropy(*labeled[THINGS])
+    loss = answer.moves.new_zeros(())
+    for measure, labeled in _labeled_scores(answer, batch).items():
+        if len(labeled.right):
+            entropy = functional.cross_entropy(labeled.scores, labeled.right)
+            loss = loss + LOSS_WEIGHTS[measure] * entropy
+    is_waiting = batch.steps_left >= 0
+    if is_waiting.any():
+        loss = loss + _time_loss(answer.time_left[is_waiting], batch.steps_left[is_waiting])
     if answer.keep_scores is not None and batch.subgoal_inputs is not None:
         loss = loss + _keep_loss(answer.keep_scores, batch.subgoal_inputs.to_keep)
     return loss
+
+
+def _time_loss(found: Tensor, steps: Tensor) -> Tensor:
+    """Return the loss of n times left; the less time is left, the more its error weighs.
+
+    Args:
+        found: (n,) what a network says, as of `BodyAnswer`.
+        steps: (n,) the control steps that are left.
+    """
+    waits = 1.0 + steps / WAIT_STEPS
+    errors = functional.smooth_l1_loss(found, waits.log(), reduction="none", beta=LARGE_ERROR)
+    return (errors / waits).sum() / (1.0 / waits).sum()
 
 
 def _keep_loss(scores: Tensor, labels: Tensor) -> Tensor:
@@ -241,15 +254,23 @@ class LabeledScores(NamedTuple):
 
 
 def _labeled_scores(answer: BodyAnswer, batch: EpisodeBatch) -> dict[str, LabeledScores]:
-    """Return what a network says at the decisions that have labels, by `MEASURES`."""
-    has_move = batch.moves >= 0
-    has_count = batch.stages_done >= 0
-    counts = batch.stages_done[has_count].clamp(max=MOST_DONE)
+    """Return what a network says at the decisions that have labels, by measure."""
     return {
-        MOVES: LabeledScores(answer.moves[has_move], batch.moves[has_move]),
+        MOVES: _where_labeled(answer.moves, batch.moves),
         THINGS: _labeled_tracks(answer.tracks, batch),
-        DONE: LabeledScores(answer.stages_done[has_count], counts),
+        DONE: _where_labeled(answer.stages_done, batch.stages_done),
+        PASSES: _where_labeled(answer.passes, batch.passes),
     }
+
+
+def _where_labeled(scores: Tensor, labels: Tensor) -> LabeledScores:
+    """Return the scores (B, D, choices) where labels (B, D) are not -1.
+
+    Counts beyond the greatest that is predicted are labeled as that.
+    """
+    has_label = labels >= 0
+    most = scores.shape[-1] - 1
+    return LabeledScores(scores[has_label], labels[has_label].clamp(max=most))
 
 
 def _labeled_tracks(tracks: Tensor, batch: EpisodeBatch) -> LabeledScores:
@@ -260,17 +281,16 @@ def _labeled_tracks(tracks: Tensor, batch: EpisodeBatch) -> LabeledScores:
         batch: with the right moves and tracks.
     """
     is_at_object = (batch.moves >= 0) & (batch.tracks >= 0)
-    right_moves = batch.moves[is_at_object][:, None, None].expand(-1, 1, tracks.shape[-1])
-    scores = tracks[is_at_object].gather(1, right_moves)[:, 0]
+    scores = tracks[is_at_object, batch.moves[is_at_object]]
     right = batch.tracks[is_at_object]
-    # Without memory an object out of sight is blocked, and nothing could be learned.
+    # A track that is not confirmed yet is blocked, and nothing could be learned.
     is_possible = scores.gather(1, right[:, None])[:, 0] > BLOCKED_SCORE / 2
     return LabeledScores(scores[is_possible], right[is_possible])
 
 
 @torch.no_grad()
 def score(body: BodyNet, episodes: Sequence[EpisodeArrays]) -> dict[str, float]:
-    """Return how often a network is right, from 0 to 1, by `MEASURES`; 0 where nothing is labeled.
+    """Return how often a network is right, from 0 to 1, by measure; 0 where nothing is labeled.
 
     The track is judged for the right move, whichever the network chooses.
 
@@ -287,4 +307,4 @@ def score(body: BodyNet, episodes: Sequence[EpisodeArrays]) -> dict[str, float]:
             is_right = labeled.scores.argmax(-1) == labeled.right
             right[measure] += int(is_right.sum())
             total[measure] += len(labeled.right)
-    return {measure: right[measure] / max(1, total[measure]) for measure in MEASURES}
+    return {measure: right[measure] / max(1, total[measure]) for measure in LOSS_WEIGHTS}

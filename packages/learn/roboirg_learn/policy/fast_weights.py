@@ -30,7 +30,6 @@ from roboirg_learn.policy.memories import (
     MaskedTokens,
     MemoryCache,
     MemoryOutput,
-    choose_only_visible,
     tokens_at_looks,
 )
 
@@ -183,7 +182,7 @@ class FastWeightMemory(LookMemory):
             values, hook = layer(narrow)
             narrow = narrow._replace(values=values)
             hooks.append(hook)
-        return choose_only_visible(looks, decisions, hooks)
+        return MemoryOutput(hooks=hooks)
 
     def _read_in_turn(self, tokens: MaskedTokens, cache: MemoryCache) -> Tensor:
         """Update the fast weights look by look; return what is read at each (B, T, m, WIDTH).

@@ -24,9 +24,7 @@ from roboirg_learn.policy.memories import (
     LookMemory,
     MaskedTokens,
     MemoryOutput,
-    choose_only_visible,
     tokens_at_looks,
-    values_at_looks,
 )
 
 FRAME_COUNT = 32
@@ -65,7 +63,7 @@ class EvenFrameMemory(LookMemory):
         tokens = self.frames(looks)
         chosen = self.chosen(looks, decisions)
         hooks = [layer(tokens, chosen) for layer in self.layers]
-        return choose_only_visible(looks, decisions, hooks)
+        return MemoryOutput(hooks=hooks)
 
     def chosen(self, looks: EmbeddedLooks, decisions: Tensor) -> Tensor:  # noqa: ARG002
         """Return the numbers of looks (B, D, frames) that are attended to; -1 for none."""
@@ -73,12 +71,7 @@ class EvenFrameMemory(LookMemory):
 
 
 class KeptFrameMemory(EvenFrameMemory):
-    """The same with looks that a planner keeps; it may choose objects that are out of sight."""
-
-    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
-        """Return the same; any object that was seen often enough may be chosen."""
-        output = super().forward(looks, decisions)
-        return output._replace(can_choose=values_at_looks(looks.confirmed, decisions))
+    """The same with looks that a planner keeps."""
 
     def chosen(self, looks: EmbeddedLooks, decisions: Tensor) -> Tensor:  # noqa: ARG002
         """Return the numbers of the looks that are kept (B, D, S); -1 for none."""

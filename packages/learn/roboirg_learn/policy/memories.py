@@ -18,10 +18,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from roboirg_learn.policy.body_layers import WIDTH, LayerHook
+from roboirg_learn.policy.body_layers import LAYERS, WIDTH, LayerHook
 
 BLOCKED_SCORE = -1e4
-"""Logit of an object that cannot be chosen."""
+"""Logit of what cannot be chosen."""
 TIME_FREQUENCIES = 8
 """Frequencies of the sines and cosines that encode a look's number."""
 LOOKS_PER_RADIAN = 100.0
@@ -82,16 +82,14 @@ class MemoryOutput(NamedTuple):
     """What a memory adds to the network at decisions; B episodes, D decisions, K tracks.
 
     Attributes:
-        tracks: (B, D, K, WIDTH) added to the tokens of the tracks.
-        robot: (B, D, WIDTH) added to the robot's token.
-        can_choose: (B, D, K) whether the object of the track may be chosen.
-        hooks: one for each transformer layer, of B * D sequences; empty if no layer is changed.
+        tracks: (B, D, K, WIDTH) added to the tokens of the tracks; 0 for nothing.
+        robot: (B, D, WIDTH) added to the robot's token; 0 for nothing.
+        hooks: one for each transformer layer, of B * D sequences.
     """
 
-    tracks: Tensor
-    robot: Tensor
-    can_choose: Tensor
-    hooks: Sequence[LayerHook] = ()
+    tracks: Tensor | float = 0.0
+    robot: Tensor | float = 0.0
+    hooks: Sequence[LayerHook] = (LayerHook(),) * LAYERS
 
 
 class LookMemory(nn.Module, ABC):
@@ -180,28 +178,12 @@ class FrameTokens(nn.Module):
         return times[:, None]
 
 
-def choose_only_visible(
-    looks: EmbeddedLooks, decisions: Tensor, hooks: Sequence[LayerHook] = ()
-) -> MemoryOutput:
-    """Return an output that adds zeros and lets only confirmed objects in sight be chosen.
-
-    Args:
-        looks: of B episodes.
-        decisions: (B, D) numbers of looks.
-        hooks: what a memory does in each layer instead.
-    """
-    tracks = torch.zeros_like(values_at_looks(looks.tracks, decisions))
-    robot = torch.zeros_like(values_at_looks(looks.robot, decisions))
-    can_choose = values_at_looks(looks.visible & looks.confirmed, decisions)
-    return MemoryOutput(tracks, robot, can_choose, hooks)
-
-
 class NoMemory(LookMemory):
-    """Remembers nothing but the last known positions, which are part of the looks."""
+    """Remembers nothing; the last known positions of objects are part of the present look."""
 
-    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
-        """Return zeros; only objects in sight may be chosen."""
-        return choose_only_visible(looks, decisions)
+    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:  # noqa: ARG002
+        """Return an output that changes nothing."""
+        return MemoryOutput()
 
 
 class RecurrentState(NamedTuple):
@@ -215,8 +197,8 @@ class _LookInput(NamedTuple):
     """What changes the recurrent state at one look; B episodes, K tracks.
 
     Attributes:
-        tracks: (B, K, 3 * WIDTH) each object's embedding, projected for the gates of its cell.
-        robot: (B, 3 * WIDTH) the same of the robot and the goal, for the scene's cell.
+        tracks: (B, K, WIDTH) each object's embedding.
+        robot: (B, WIDTH) the embedding of robot and goal.
         near: (B, K, K) weights with which an object averages over others nearby.
         is_updated: (B, K, 1) whether the look shows the object.
         confirmed: (B, K, 1) whether it was seen often enough.
@@ -239,8 +221,8 @@ class RecurrentMemory(LookMemory):
 
     def __init__(self) -> None:
         super().__init__()
-        self.thing = _ThreeInputCell()
-        self.whole = _ThreeInputCell()
+        self.thing = nn.GRUCell(3 * WIDTH, WIDTH)
+        self.whole = nn.GRUCell(3 * WIDTH, WIDTH)
         self.nearness = nn.Parameter(torch.tensor(1.0))
         self.pool = nn.Linear(WIDTH, 1)
 
@@ -248,7 +230,7 @@ class RecurrentMemory(LookMemory):
         """Return the states after the looks of decisions (B, D), stepping over new looks only.
 
         The state after the looks of earlier calls is in ``looks.cache``, which is brought up to
-        date. Any object that was seen often enough may be chosen, also out of sight.
+        date.
         """
         cache = looks.cache or MemoryCache()
         first_new = cache.looks
@@ -264,7 +246,6 @@ class RecurrentMemory(LookMemory):
         return MemoryOutput(
             tracks=values_at_looks(tracks, numbers),
             robot=values_at_looks(scenes, numbers),
-            can_choose=values_at_looks(looks.confirmed, decisions),
         )
 
     def _first_state(self, looks: EmbeddedLooks, cache: MemoryCache) -> RecurrentState:
@@ -283,8 +264,8 @@ class RecurrentMemory(LookMemory):
         What does not depend on the state is computed for all looks at once, which is faster.
         """
         parts = [  # each (B, T, …), in the order of the fields of `_LookInput`
-            self.thing.first(looks.tracks[:, first_new:]),
-            self.whole.first(looks.robot[:, first_new:]),
+            looks.tracks[:, first_new:],
+            looks.robot[:, first_new:],
             self._nearness(looks)[:, first_new:],
             (looks.visible & looks.has_look[..., None])[:, first_new:, :, None],
             looks.confirmed[:, first_new:, :, None],
@@ -300,10 +281,12 @@ class RecurrentMemory(LookMemory):
         """
         tracks, scene = state
         neighbors = look.near @ tracks
-        updated_tracks = self.thing(look.tracks, neighbors, scene[:, None], tracks)
-        tracks = torch.where(look.is_updated, updated_tracks, tracks)
+        scene_for_each = scene[:, None].expand_as(tracks)
+        track_inputs = torch.cat([look.tracks, neighbors, scene_for_each], -1)
+        updated_tracks = self.thing(track_inputs.flatten(0, 1), tracks.flatten(0, 1))
+        tracks = torch.where(look.is_updated, updated_tracks.view_as(tracks), tracks)
         mean, maximum = self._summary(tracks, look.confirmed)
-        updated_scene = self.whole(look.robot, mean, maximum, scene)
+        updated_scene = self.whole(torch.cat([look.robot, mean, maximum], -1), scene)
         return RecurrentState(tracks, torch.where(look.has_look, updated_scene, scene))
 
     def _nearness(self, looks: EmbeddedLooks) -> Tensor:
@@ -314,8 +297,7 @@ class RecurrentMemory(LookMemory):
         """
         distances = torch.cdist(looks.positions, looks.positions)  # m
         scores = -(distances * NEARNESS_PER_METER * self.nearness.exp())
-        was_confirmed = torch.zeros_like(looks.confirmed)
-        was_confirmed[:, 1:] = looks.confirmed[:, :-1]
+        was_confirmed = functional.pad(looks.confirmed[:, :-1], (0, 0, 1, 0))
         is_itself = torch.eye(scores.shape[-1], dtype=torch.bool)
         is_excluded = ~was_confirmed[:, :, None, :] | is_itself
         scores = scores.masked_fill(is_excluded, -math.inf)
@@ -337,34 +319,3 @@ class RecurrentMemory(LookMemory):
         mean = weights.transpose(1, 2) @ tracks
         maximum = tracks.masked_fill(~confirmed, UNCONFIRMED_STATE).amax(1)
         return mean[:, 0], maximum
-
-
-class _ThreeInputCell(nn.Module):
-    """A gated recurrent unit (GRU) with three inputs instead of one.
-
-    The first does not depend on the state, so callers apply the layer `first` to all looks at once.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.first = nn.Linear(WIDTH, 3 * WIDTH)
-        self.second = nn.Linear(WIDTH, 3 * WIDTH, bias=False)
-        self.third = nn.Linear(WIDTH, 3 * WIDTH, bias=False)
-        self.own = nn.Linear(WIDTH, 3 * WIDTH)
-
-    def forward(self, of_first: Tensor, second: Tensor, third: Tensor, state: Tensor) -> Tensor:
-        """Return the next state (…, WIDTH), by the equations of PyTorch's ``nn.GRUCell``.
-
-        Args:
-            of_first: (…, 3 * WIDTH) the first input after the layer `first`.
-            second: (…, WIDTH) second input.
-            third: (…, WIDTH) third input.
-            state: (…, WIDTH) the state before.
-        """
-        # Of each 3 * WIDTH numbers: reset gate, keep gate, candidate.
-        from_inputs = of_first + self.second(second) + self.third(third)
-        from_state = self.own(state)
-        gates = 2 * WIDTH
-        reset, keep = (from_inputs[..., :gates] + from_state[..., :gates]).sigmoid().chunk(2, -1)
-        candidate = (from_inputs[..., gates:] + reset * from_state[..., gates:]).tanh()
-        return torch.lerp(candidate, state, keep)

@@ -31,6 +31,8 @@ GRIPPER_UNCHANGED = 0.0
 """Gripper value of a waypoint that neither opens nor closes it."""
 XY_GRID = 0.1
 """Meters to which an offset in the plane from the tool is rounded."""
+NO_LABEL = -1
+"""In the place of a move, track, count or time that a network does not learn at a look."""
 LEAST_SHARE = 0.0005
 """Share of all waypoints; moves that are rarer are not learned."""
 

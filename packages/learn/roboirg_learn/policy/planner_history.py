@@ -36,7 +36,8 @@ class SubgoalInputs(NamedTuple):
 
     Attributes:
         context: (D, C) for hands the subgoal as `encode_request` returns it; for a planner what it
-            named before, as `PlannerHistory.context` returns it. `POINT_NUMBERS` are at the end.
+            named before, as `PlannerHistory.context` returns it. `POINT_NUMBERS` are at the end,
+            if there is any.
         kept_looks: (D, S) numbers of looks that a planner keeps; `NO_LOOK` fills them up.
         to_keep: (D, RECENT) label of each recent look: 1 to keep it, 0 not to, -1 for nothing to
             learn.
@@ -87,7 +88,7 @@ class PlannerHistory:
         """Keep looks that the planner chose; this one chooses none."""
 
     def context(self, look: int) -> NDArray[np.float32]:
-        """Return what was named so far, as input of a planner: (`context_size`,).
+        """Return what was named so far, as input of a planner: (2 T + 1 + POINT_NUMBERS,).
 
         With T templates of subgoals, in this order: T numbers, how often each was finished; T
         numbers, 1 for the template under way and 0 for all others; one number, for how long it has
@@ -131,7 +132,7 @@ class PlannerHistory:
 
 
 class KeyframeHistory(PlannerHistory):
-    """What a planner has named in one episode; keeps the looks that it chose, and the latest."""
+    """The looks that a planner chose, and the latest; it does not learn what it named before."""
 
     size = VIDEO_FRAMES + MAX_CHOSEN + RECENT
 
@@ -146,6 +147,10 @@ class KeyframeHistory(PlannerHistory):
         """
         steps = [look * LOOK_EVERY for look in (*self._chosen_looks, *looks)]
         self._chosen_looks = tuple(step // LOOK_EVERY for step in merge_keyframes(steps))
+
+    def context(self, look: int) -> NDArray[np.float32]:  # noqa: ARG002
+        """Return no numbers: all that the planner knows of the past is in the looks."""
+        return np.zeros(0, np.float32)
 
     def _kept_since(self, look: int) -> list[int]:
         """Return the numbers of the last chosen looks, then of the recent ones."""
@@ -165,11 +170,6 @@ def recent_looks(look: int) -> list[int]:
     A number below 0 stands for no look: 2 → -5, -4, …, 1, 2.
     """
     return list(range(look - RECENT + 1, look + 1))
-
-
-def context_size(templates: int) -> int:
-    """Return how many numbers `PlannerHistory.context` has, given the number of templates."""
-    return 2 * templates + 1 + POINT_NUMBERS
 
 
 def ideal_planner_inputs(

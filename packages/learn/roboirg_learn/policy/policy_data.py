@@ -17,21 +17,23 @@ from numpy.typing import NDArray
 
 from roboirg.extension.sight import LOOK_EVERY, ExpertRecording
 from roboirg_learn.policy.body_net import EpisodeBatch
-from roboirg_learn.policy.moves import LookDecision
+from roboirg_learn.policy.moves import NO_LABEL, LookDecision
 from roboirg_learn.policy.planner_history import SubgoalInputs
 from roboirg_learn.policy.sight import (
     FALSE_POSITIVE,
-    LabeledDetections,
     ObjectClasses,
     labeled_looks,
 )
 from roboirg_learn.policy.subgoal_net import SubgoalInputBatch
+from roboirg_learn.policy.timing import passes_so_far, steps_to_act
 from roboirg_learn.policy.tracks import Detections, Tracker
 
+TRACKED = ("classes", "positions", "yaw_codes", "visible", "confirmed")
+"""Fields of `LookArrays` that a `Tracker` has."""
+LABELS = ("moves", "tracks", "stages_done", "passes", "steps_left")
+"""Fields of `EpisodeArrays` and `EpisodeBatch` that a network learns from, and does not read."""
 COUNTED_LOOKS = 10
-"""Looks without a decision at which a body learns how many stages are completed."""
-NO_LABEL = -1
-"""In the place of a move, track or count that a network does not learn at a look."""
+"""Looks without a decision at which a body learns to count, and how long it is to wait."""
 HEIGHT_SCALE = 5.0
 FINGER_SCALE = 25.0
 """Per meter, so that these numbers of a tool are about as great as the others."""
@@ -60,6 +62,8 @@ class EpisodeArrays(NamedTuple):
     moves: NDArray[np.int64]
     tracks: NDArray[np.int64]
     stages_done: NDArray[np.int64]
+    passes: NDArray[np.int64]
+    steps_left: NDArray[np.int64]
     subgoal_inputs: SubgoalInputs | None = None
 
 
@@ -90,15 +94,7 @@ class LookHistory:
         """
         tracks_of_look = self.tracks.update(look)
         # Copies, because the tracker changes its arrays in place.
-        self._rows.append(
-            {
-                "classes": self.tracks.classes.copy(),
-                "positions": self.tracks.positions.copy(),
-                "yaw_codes": self.tracks.yaw_codes.copy(),
-                "visible": self.tracks.visible.copy(),
-                "confirmed": self.tracks.confirmed,
-            }
-        )
+        self._rows.append({name: getattr(self.tracks, name).copy() for name in TRACKED})
         self._tools.append(_tool_numbers(tool, is_video=is_video))
         return tracks_of_look
 
@@ -109,7 +105,7 @@ class LookHistory:
         """
         count = max(1, self.tracks.count)
         parts = {}
-        for name in self._rows[0]:
+        for name in TRACKED:
             parts[name] = np.stack([row[name] for row in self._rows])[:, :count]
         return LookArrays(**parts, tool=np.stack(self._tools))
 
@@ -131,37 +127,6 @@ def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray
     return np.array([x, y, height, *yaw_code, opening, is_video], np.float32)
 
 
-class LookLabels:
-    """Labels of some looks of an episode: what a network learns to say there.
-
-    Looks without labels are input only.
-    """
-
-    def __init__(self) -> None:
-        self._rows: list[tuple[int, int, int, int]] = []  # look, move, track, stages done
-
-    def add(self, look: int, stages_done: int, move: int = NO_LABEL, track: int = NO_LABEL) -> None:
-        """Add the labels of a look.
-
-        Args:
-            look: its number.
-            stages_done: how many stages of the goal are completed.
-            move: at a decision the right move, or subgoal template, by number.
-            track: at a decision the track of the object that the move is at.
-        """
-        self._rows.append((look, move, track, stages_done))
-
-    def to_arrays(self, looks: LookArrays, goal: NDArray[np.float32]) -> EpisodeArrays:
-        """Return an episode with these looks and this goal as input, and the labels so far.
-
-        Args:
-            looks: all looks of the episode.
-            goal: (size,) as `GoalLayout.encode` returns it.
-        """
-        decisions, moves, tracks, stages_done = np.array(self._rows, np.int64).T
-        return EpisodeArrays(looks, goal, decisions, moves, tracks, stages_done)
-
-
 def to_arrays(
     recorded: ExpertRecording,
     decisions: Sequence[LookDecision],
@@ -176,62 +141,37 @@ def to_arrays(
 
     Args:
         recorded: the episode.
-        decisions: of the episode; at some looks between them only the completed stages are labeled.
+        decisions: of the episode; at some looks between them only counts and waits are labeled.
         goal: (size,) as `GoalLayout.encode` returns it.
         object_classes: classes of objects and their heights.
         moves: the number of each move, or of each subgoal template; one that is missing gets
             `NO_LABEL`.
         rng: draws the counted looks, then the noise of the detector.
     """
-    history = _LabeledHistory()
-    labels = LookLabels()
-    decision_at = {decision.look: decision for decision in decisions}
-    skipped = _merged_looks(recorded) - decision_at.keys()
-    counted = _counted_looks(recorded, rng)
+    history = LookHistory()
+    track_of: dict[int, int] = {}  # the last track of each object that was found, by its number
+    learned = {decision.look: decision for decision in decisions}
+    skipped = _merged_looks(recorded) - learned.keys()
+    for look in _counted_looks(recorded, rng):
+        learned.setdefault(look, LookDecision(look, None, FALSE_POSITIVE))
+    passes = passes_so_far(recorded)
+    steps_left = steps_to_act(recorded)
+    rows = []  # of labels, in the order of the fields of `EpisodeArrays`
     for look, labeled in enumerate(labeled_looks(recorded, object_classes, rng)):
         if look in skipped:
             continue
         is_video = bool(recorded.is_video[look])
-        now = history.add(labeled, recorded.tool[look], is_video=is_video)
-        stages_done = int(recorded.done[look])
-        if look in decision_at:
-            decision = decision_at[look]
+        tracks = history.add(labeled.detections, recorded.tool[look], is_video=is_video)
+        track_of.update(zip(labeled.objects.tolist(), tracks.tolist(), strict=True))
+        # A decision without an object has the number of a false positive.
+        track_of[FALSE_POSITIVE] = NO_LABEL
+        if look in learned:
+            decision = learned[look]
             move = moves.get(decision.move, NO_LABEL)
-            labels.add(now, stages_done, move, history.track(decision.object_number))
-        elif look in counted:
-            labels.add(now, stages_done)
-    return labels.to_arrays(history.looks.to_arrays(), goal)
-
-
-class _LabeledHistory:
-    """The looks of a recorded episode so far, and the track of each object that was found.
-
-    Objects have the recording's numbers; tracks those of the tracker.
-
-    Attributes:
-        looks: as a policy remembers them.
-    """
-
-    def __init__(self) -> None:
-        self.looks = LookHistory()
-        self._track_of: dict[int, int] = {}
-
-    def add(
-        self, labeled: LabeledDetections, tool: NDArray[np.floating[Any]], *, is_video: bool
-    ) -> int:
-        """Add a look; returns its number."""
-        tracks = self.looks.add(labeled.detections, tool, is_video=is_video)
-        self._track_of.update(zip(labeled.objects.tolist(), tracks.tolist(), strict=True))
-        return len(self.looks) - 1
-
-    def track(self, number: int) -> int:
-        """Return the last track of an object by its number; `NO_LABEL` if it was never found.
-
-        A decision without an object has the number -1, as false positives have.
-        """
-        if number == FALSE_POSITIVE:
-            return NO_LABEL
-        return self._track_of.get(number, NO_LABEL)
+            track = track_of.get(decision.object_number, NO_LABEL)
+            counts = recorded.done[look], passes[look], steps_left[look]
+            rows.append((len(history) - 1, move, track, *counts))
+    return EpisodeArrays(history.to_arrays(), goal, *np.array(rows, np.int64).T)
 
 
 def _merged_looks(recorded: ExpertRecording) -> set[int]:
@@ -259,15 +199,16 @@ def to_batch(episodes: Sequence[EpisodeArrays]) -> EpisodeBatch:
     looks = {}
     for name in LookArrays._fields:
         looks[name] = _pad([getattr(episode.looks, name) for episode in episodes], 0)
+    labels = {}
+    for name in LABELS:
+        labels[name] = _pad([getattr(episode, name) for episode in episodes], NO_LABEL)
     has_look = [np.ones(len(episode.looks.tool), bool) for episode in episodes]
     return EpisodeBatch(
         **looks,
         has_look=_pad(has_look, 0),
         goals=torch.from_numpy(np.stack([episode.goal for episode in episodes])),
         decisions=_pad([episode.decisions for episode in episodes], 0),
-        moves=_pad([episode.moves for episode in episodes], NO_LABEL),
-        tracks=_pad([episode.tracks for episode in episodes], NO_LABEL),
-        stages_done=_pad([episode.stages_done for episode in episodes], NO_LABEL),
+        **labels,
         subgoal_inputs=_pad_subgoal_inputs(
             [episode.subgoal_inputs for episode in episodes if episode.subgoal_inputs is not None]
         ),

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from roboirg.extension.commands import InvalidValueError, short_hash
 from roboirg.extension.sight import LOOK_EVERY, points_of
 from roboirg_learn.labeled_views import LATER_STEP
-from roboirg_learn.listener.vocabulary import Vocabulary
 from roboirg_learn.policy.body_net import BodyAnswer, BodyNet
 from roboirg_learn.policy.memories import MemoryCache
-from roboirg_learn.policy.moves import waypoint
+from roboirg_learn.policy.moves import NO_LABEL, STAY, waypoint
 from roboirg_learn.policy.planner_history import SubgoalInputs
-from roboirg_learn.policy.policy_data import NO_LABEL, EpisodeArrays, LookHistory, to_batch
+from roboirg_learn.policy.policy_data import LABELS, EpisodeArrays, LookHistory, to_batch
 from roboirg_learn.policy.policy_files import PolicyFiles
+from roboirg_learn.policy.timing import timed_move
 from roboirg_learn.policy.tracks import Detections
 from roboirg_learn.policy.trained_body import Pictures, TrainedBody, load_body
 from roboirg_learn.policy.trained_reader import TrainedReader, load_reader
@@ -55,9 +55,8 @@ def load_policy(files: PolicyFiles) -> PolicyModel:
     """
     body = load_body(files.body)
     reader = load_reader(files.reader)
-    words = reader.vocabulary.words
-    fitting = Vocabulary(words, body.object_classes.names, body.goals.tasks, body.goals.parts)
-    if reader.vocabulary != fitting:
+    known = body.object_classes.names, body.goals.tasks, body.goals.parts
+    if reader.vocabulary[1:] != known:
         raise InvalidValueError(
             f"The reader {str(files.reader)!r} does not fit the body {str(files.body)!r}, which "
             "knows other things or goals; train one for it with: roboirg learn reader "
@@ -70,7 +69,7 @@ class NetworkChoice(NamedTuple):
     """What a network chooses.
 
     Attributes:
-        kind: number of the move, or of the subgoal template.
+        number: of the move, or of the subgoal template.
         track: of the object that it is at; None if nothing has been seen yet.
         to_keep: indices, among the `RECENT` latest looks, of those that a planner is to keep.
     """
@@ -78,13 +77,6 @@ class NetworkChoice(NamedTuple):
     number: int
     track: int | None
     to_keep: tuple[int, ...]
-
-
-class _GoalCache(NamedTuple):
-    """The memory's cache of a network, and the goal with which it was filled."""
-
-    goal: NDArray[np.float32]
-    cache: MemoryCache
 
 
 class SeenEpisode:
@@ -101,7 +93,8 @@ class SeenEpisode:
         self._model = model
         self._history = LookHistory()
         self._first_looks: list[Detections] = []
-        self._caches: dict[BodyNet, _GoalCache] = {}
+        self._caches: dict[tuple[BodyNet, bytes], MemoryCache] = {}
+        self._is_waiting = False
         self.video_looks = 0
 
     def look(
@@ -142,7 +135,11 @@ class SeenEpisode:
 
     @torch.no_grad()
     def choose(
-        self, net: BodyNet, goal: NDArray[np.float32], subgoal_inputs: SubgoalInputs | None
+        self,
+        net: BodyNet,
+        goal: NDArray[np.float32],
+        subgoal_inputs: SubgoalInputs | None,
+        is_wait: NDArray[np.bool_] | None = None,
     ) -> NetworkChoice:
         """Return what a network chooses after the last look.
 
@@ -150,20 +147,23 @@ class SeenEpisode:
             net: a body's, which chooses a move, or a planner, which chooses a subgoal template.
             goal: as `understand` returns it.
             subgoal_inputs: for hands the subgoal, for a planner what it named and keeps; else None.
+            is_wait: (M,) which moves are waits, to be ended in time; None for a planner.
         """
-        no_label = np.array([NO_LABEL])
-        arrays = EpisodeArrays(
+        unlabeled = EpisodeArrays(
             looks=self._history.to_arrays(),
             goal=goal,
             decisions=np.array([self.looks - 1]),
-            moves=no_label,
-            tracks=no_label,
-            stages_done=no_label,
+            **dict.fromkeys(LABELS, np.array([NO_LABEL])),
             subgoal_inputs=subgoal_inputs,
         )
         # A batch of one episode with one decision.
-        answer: BodyAnswer = net(to_batch([arrays]), self._cache_for(net, goal))
-        number = int(answer.moves[0, 0].argmax())
+        answer: BodyAnswer = net(to_batch([unlabeled]), self._cache_for(net, goal))
+        scores = answer.moves[0, 0].numpy()
+        number = int(scores.argmax())
+        if is_wait is not None:
+            time_left = float(answer.time_left)
+            number = timed_move(scores, is_wait, time_left, was_waiting=self._is_waiting)
+            self._is_waiting = bool(is_wait[number])
         track = int(answer.tracks[0, 0, number].argmax())
         is_there = track < self._history.tracks.count
         to_keep: tuple[int, ...] = ()
@@ -174,14 +174,9 @@ class SeenEpisode:
     def _cache_for(self, net: BodyNet, goal: NDArray[np.float32]) -> MemoryCache:
         """Return the cache of a network's memory, which its next call goes on from and updates.
 
-        What is remembered depends on the goal, so with another goal (another utterance was heard)
-        it begins anew.
+        What is remembered depends on the goal, so each goal that was heard has its own.
         """
-        found = self._caches.get(net)
-        if found is None or not np.array_equal(found.goal, goal):
-            found = _GoalCache(goal, MemoryCache())
-            self._caches[net] = found
-        return found.cache
+        return self._caches.setdefault((net, goal.tobytes()), MemoryCache())
 
     def point(self, track: int) -> NDArray[np.float64]:
         """Return the pixel, column and row (2,), where the object of a track was last seen."""
@@ -203,7 +198,8 @@ class SeenEpisode:
             subgoal_inputs: the subgoal to follow, for hands.
         """
         body = self._model.body
-        chosen = self.choose(body.net, goal, subgoal_inputs)
+        is_wait = np.array([move.turn == STAY for move in body.moves])
+        chosen = self.choose(body.net, goal, subgoal_inputs, is_wait)
         move = body.moves[chosen.number]
         if not move.at_object or chosen.track is None:
             here = np.asarray(tool[:2], np.float64)

@@ -25,7 +25,7 @@ from roboirg_learn.learn_support import make_missing_files
 from roboirg_learn.listener.reader_plan import ReaderPlan
 from roboirg_learn.listener.vocabulary import parts_of_tasks
 from roboirg_learn.policy.body_training import BodyExample, BodyLayout, train_body
-from roboirg_learn.policy.moves import LookDecision, common_moves, decisions_of
+from roboirg_learn.policy.moves import common_moves, decisions_of
 from roboirg_learn.policy.object_detector import (
     LabeledPicture,
     ObjectDetector,
@@ -146,7 +146,11 @@ def _trained_body(plan: BodyPlan, folder: Path, workers: int, progress: Progress
     if plan.memory not in PLANNERS:
         return body
     templates = templates_of(played.episode for played in recorded)
-    examples = [BodyExample(played, _subgoals_of(played)) for played in recorded]
+    examples = []
+    for played in recorded:
+        looks = [decision.look for decision in decisions_of(played.recording)]
+        due = subgoals_due(played.recording, played.episode, looks)
+        examples.append(BodyExample(played, due))
     layout = BodyLayout(body.object_classes, body.goals, templates)
     planner = train_body(plan, examples, layout, folder, progress)
     return replace(body, templates=templates, planner=planner)
@@ -177,12 +181,6 @@ def _body_without_planner(
 
     about = {**plan.about, "episodes": len(recorded)}
     return TrainedBody(object_classes, detector, goals, moves, net, about)
-
-
-def _subgoals_of(played: Recorded) -> list[LookDecision]:
-    """Return the subgoal that is due at each of the expert's decisions in a recorded episode."""
-    looks = [decision.look for decision in decisions_of(played.recording)]
-    return subgoals_due(played.recording, played.episode, looks)
 
 
 def _check_folder(plan: BodyPlan, folder: Path) -> None:

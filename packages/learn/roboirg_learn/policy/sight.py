@@ -109,23 +109,6 @@ class LabeledDetections(NamedTuple):
     detections: Detections
     objects: NDArray[np.intp]
 
-    def with_false_positive(
-        self, class_number: int, position: NDArray[np.float32], yaw_code: NDArray[np.float32]
-    ) -> LabeledDetections:
-        """Return the same with a detection at the end where no object is.
-
-        Args:
-            class_number: of the detection.
-            position: (2,) x and y, m.
-            yaw_code: (2,) as `encode_yaws` returns it.
-        """
-        detections = Detections(
-            np.append(self.detections.classes, class_number),
-            np.vstack([self.detections.positions, position]),
-            np.vstack([self.detections.yaw_codes, yaw_code]),
-        )
-        return LabeledDetections(detections, np.append(self.objects, FALSE_POSITIVE))
-
 
 def labeled_looks(
     recorded: ExpertRecording, object_classes: ObjectClasses, rng: np.random.Generator
@@ -138,40 +121,23 @@ def labeled_looks(
     """
     # All numbers are drawn here, in this order; the same generator gives the same mistakes.
     noisy = _draw_noisy_detections(recorded, object_classes, rng)
-    looks, objects = noisy.is_found.shape
-    false_positives = _draw_false_positives(looks, objects, len(object_classes.names), rng)
-    for look in range(looks):
-        labeled = noisy.at_look(look)
-        block = look // HIDDEN_LOOKS
-        host = false_positives.hosts[block]
-        if false_positives.is_there[block] and noisy.is_found[look, host]:
-            labeled = labeled.with_false_positive(
-                false_positives.classes[block],
-                noisy.positions[look, host],
-                noisy.yaw_codes[look, host],
-            )
-        yield labeled
-
-
-class _FalsePositives(NamedTuple):
-    """Detections where no object is: at most one in each of n blocks of looks.
-
-    Attributes:
-        is_there: (n,) whether the block has one.
-        classes: (n,) its class number.
-        hosts: (n,) number of the object at whose position it is.
-    """
-
-    is_there: NDArray[np.bool_]
-    classes: NDArray[np.int64]
-    hosts: NDArray[np.int64]
+    noisy = _with_false_positives(noisy, len(object_classes.names), rng)
+    last = noisy.classes.shape[1] - 1
+    for look, is_found in enumerate(noisy.is_found):
+        objects = np.flatnonzero(is_found)
+        detections = Detections(
+            noisy.classes[look, objects],
+            noisy.positions[look, objects],
+            noisy.yaw_codes[look, objects],
+        )
+        yield LabeledDetections(detections, np.where(objects == last, FALSE_POSITIVE, objects))
 
 
 class _NoisyDetections(NamedTuple):
     """What a detector would find at T looks of K objects.
 
     Attributes:
-        classes: (K,) class numbers; meaningless where an object is never found.
+        classes: (T, K) class numbers; meaningless where an object is not found.
         is_found: (T, K) whether it finds an object.
         positions: (T, K, 2) x and y where it finds it, m.
         yaw_codes: (T, K, 2) as `encode_yaws` returns them.
@@ -181,13 +147,6 @@ class _NoisyDetections(NamedTuple):
     is_found: NDArray[np.bool_]
     positions: NDArray[np.float32]
     yaw_codes: NDArray[np.float32]
-
-    def at_look(self, look: int) -> LabeledDetections:
-        """Return what is found at a look, in the order of the objects' numbers."""
-        objects = np.flatnonzero(self.is_found[look])
-        positions = self.positions[look, objects]
-        detections = Detections(self.classes[objects], positions, self.yaw_codes[look, objects])
-        return LabeledDetections(detections, objects)
 
 
 def _draw_noisy_detections(
@@ -207,7 +166,8 @@ def _draw_noisy_detections(
     noisy_positions = _table_positions(noisy_points, classes, object_classes)
     angles = recorded.things[..., 3]
     yaw_codes = encode_yaws(angles + rng.normal(0.0, YAW_NOISE, angles.shape))
-    return _NoisyDetections(classes, is_found, noisy_positions, yaw_codes)
+    classes_at_looks = np.broadcast_to(classes, is_found.shape)
+    return _NoisyDetections(classes_at_looks, is_found, noisy_positions, yaw_codes)
 
 
 def _draw_is_not_missed(
@@ -259,22 +219,34 @@ def _table_positions(
     return flat_positions.reshape(points.shape)
 
 
-def _draw_false_positives(
-    looks: int, objects: int, classes: int, rng: np.random.Generator
-) -> _FalsePositives:
-    """Draw whether each block of looks has a false positive, of which class, and where.
+def _with_false_positives(
+    noisy: _NoisyDetections, class_count: int, rng: np.random.Generator
+) -> _NoisyDetections:
+    """Return detections of T looks with one more object at the end, which is not there: K + 1.
+
+    In some blocks of looks it is found at the position of a real object wherever that is found; of
+    which object, and as which class, is drawn for each block.
 
     Args:
-        looks: how many looks the blocks divide.
-        objects: number of objects; a false positive is at the position of one of them.
-        classes: number of classes.
+        noisy: detections of K objects.
+        class_count: number of classes.
         rng: draws.
     """
+    looks, objects = noisy.is_found.shape
     blocks = _block_count(looks)
-    return _FalsePositives(
-        is_there=rng.random(blocks) < FALSE_POSITIVE_RATE,
-        classes=rng.integers(0, classes, blocks),
-        hosts=rng.integers(0, objects, blocks),
+    is_there = rng.random(blocks) < FALSE_POSITIVE_RATE
+    classes = rng.integers(0, class_count, blocks)
+    hosts = rng.integers(0, objects, blocks)
+
+    numbers = np.arange(looks)
+    block = numbers // HIDDEN_LOOKS
+    host = hosts[block]
+    is_found = is_there[block] & noisy.is_found[numbers, host]
+    return _NoisyDetections(
+        np.column_stack([noisy.classes, classes[block]]),
+        np.column_stack([noisy.is_found, is_found]),
+        np.append(noisy.positions, noisy.positions[numbers, host][:, None], 1),
+        np.append(noisy.yaw_codes, noisy.yaw_codes[numbers, host][:, None], 1),
     )
 
 

@@ -67,7 +67,7 @@ class SubgoalNamer:
         return self._subgoal
 
     def _subgoal_inputs(self, look: int) -> SubgoalInputs:
-        """Return the planner's input at one look: what it named, and the looks that it keeps.
+        """Return the planner's input at one look, of its history.
 
         `to_keep` is a label of training, so nothing stands in it here.
         """
@@ -134,7 +134,7 @@ class LearnedHands(LearnedPolicy):
 
 
 class LearnedPlanner:
-    """Names subgoals from words, pictures and what it named before, for hands of any kind.
+    """Names subgoals from words, pictures and its history, for hands of any kind.
 
     Args:
         model: whose planner names them.

@@ -21,7 +21,7 @@ from roboirg_learn.listener.vocabulary import parts_of
 from roboirg_learn.policy.body_net import BodyNet
 from roboirg_learn.policy.moves import Move
 from roboirg_learn.policy.object_detector import ObjectDetector
-from roboirg_learn.policy.planner_history import context_size
+from roboirg_learn.policy.planner_history import PLANNER_HISTORIES
 from roboirg_learn.policy.policy_plan import HANDS, PLANNERS
 from roboirg_learn.policy.sight import ObjectClasses
 from roboirg_learn.policy.subgoals import REQUEST_SIZE, SubgoalTemplate
@@ -128,7 +128,7 @@ def make_body(
     if memory == HANDS:
         context = REQUEST_SIZE
     elif memory in PLANNERS:
-        context = context_size(len(choices))
+        context = len(PLANNER_HISTORIES[memory](len(choices)).context(0))
     at_objects = [choice.at_object for choice in choices]
     return BodyNet(len(object_classes.names), goals.size, at_objects, memory, context)
 
