@@ -42,7 +42,7 @@ _MOST_DRAWS = 60
 """How often the words of an episode are drawn again for one more paraphrase."""
 _WORD = re.compile(r"[^\W_]+(?:['’-][^\W_]+)*")
 _KEPT_NOTES = ("pattern", "patterns", "relation", "rival")
-"""Notes in which a paraphrase equals the told text: it takes the same reasoning."""
+"""Notes in which a paraphrase equals the scene's own text: it takes the same reasoning."""
 
 
 class ArmWords(NamedTuple):

@@ -195,7 +195,7 @@ def _draw_people(request: InstructionRequest, scenario: Scenario) -> FillersBySl
     """Draw two different people of a scenario, and return their names and pronouns by slot.
 
     For Leo and Mia: ``person`` *Leo*, ``he`` *he*, ``him`` *him* …, ``person.2`` *Mia*, ``he.2``
-    *she* … Empty if the scenario names nobody.
+    *she* … Empty if the scenario names no people.
     """
     if not scenario.people:
         return {}
