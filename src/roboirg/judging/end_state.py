@@ -124,7 +124,7 @@ def explain_missing(replay: EpisodeReplay, skipped: range) -> FailureAttribution
     `skipped` has the indices of the stages whose acts are missing.
     """
     meant = _objects_meant_by_any(replay, skipped)
-    unnoticed: list[Slip] = []
+    unnoticed = []
     for slip in find_slips(replay):
         if slip.subjects <= meant and not is_noticed(replay, slip):
             unnoticed.append(slip)

@@ -213,7 +213,7 @@ def _scramble(episode: Episode, instruction: Instruction) -> Instruction:
     while new_order == words:
         new_order = shuffled(rng, words)
     next_words = iter(new_order)
-    texts: list[str] = []
+    texts = []
     for utterance_words in words_by_utterance:
         texts.append(" ".join(itertools.islice(next_words, len(utterance_words))))
     return _with_texts(instruction, texts)

@@ -101,7 +101,7 @@ class EpisodeSession:
         """
         stages = self.episode.demonstration
         steps = self._plan_demonstration() if recording is None else recording.steps()
-        executed: list[RecordedStep] = []
+        executed = []
         for step in steps:
             stage = stages[step.stage]
             self.step(step.action)

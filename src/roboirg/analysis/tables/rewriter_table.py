@@ -101,20 +101,24 @@ def _shared_options(
 def _words(tasks: Sequence[TaskRates]) -> list[str]:
     """Return the cells of a row: episodes, the three rates, the share and its interval.
 
+    For example ``["50", "40", "60", "80", "50", "35 to 70"]``.
+
     Args:
         tasks: of each task the rates rewritten, as said, and in explicit words.
     """
     if not tasks:
         return ["0", *[NOT_APPLICABLE] * 5]
-    episodes = str(sum(len(task.weights) for task in tasks))
+    cells = [str(sum(len(task.weights) for task in tasks))]
     rewritten, said, explicit = mean_rates(tasks)
-    shown_rates = list(map(whole_percent, (said, rewritten, explicit)))
+    for rate in (said, rewritten, explicit):
+        cells.append(whole_percent(rate))
     interval = share_interval(tasks)
     if interval is None:
-        return [episodes, *shown_rates, NO_SHARE, NOT_APPLICABLE]
+        return [*cells, NO_SHARE, NOT_APPLICABLE]
     share = (rewritten - said) / (explicit - said)
-    low, high = map(whole_percent, interval)
-    return [episodes, *shown_rates, whole_percent(share), f"{low} to {high}"]
+    cells.append(whole_percent(share))
+    cells.append(f"{whole_percent(interval.low)} to {whole_percent(interval.high)}")
+    return cells
 
 
 def _rates_of_tasks(groups: Sequence[ByTask]) -> list[TaskRates]:

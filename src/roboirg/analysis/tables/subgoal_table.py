@@ -78,18 +78,22 @@ def make_subgoal_table(data: RunData) -> Table:
     for key, counts in counts_by_cell.items():
         group = data.frame.group_label(key.policy_run, key.options)
         rows.append(Row(group, key.task, list(_words(counts, failures, costs))))
-    notes = [_NOTE]
-    if failures:
-        meanings = "; ".join(f"{failure}: {PLANNER_FAILURES[failure]}" for failure in failures)
-        notes.append(f"Failed episodes, by what the planner did: {meanings}.")
     return Table(
         key="subgoals",
         title="Subgoals of planners, and what models cost",
         heads=("policy and setting", "task"),
         columns=_columns(failures, costs),
         rows=rows,
-        notes=notes,
+        notes=_notes(failures),
     )
+
+
+def _notes(failures: Sequence[str]) -> list[str]:
+    """Return the sentences below the table; they explain the failures that have columns."""
+    if not failures:
+        return [_NOTE]
+    meanings = "; ".join(f"{failure}: {PLANNER_FAILURES[failure]}" for failure in failures)
+    return [_NOTE, f"Failed episodes, by what the planner did: {meanings}."]
 
 
 def _columns(failures: Iterable[str], costs: Iterable[str]) -> list[Column]:

@@ -154,7 +154,7 @@ def explain_misfit(request: InstructionRequest, setting: str, scenarios: Sequenc
     It is called where `choose` has found none. If one would fit without its introduction, the
     introduction names a place or a clue, *the cube in the middle*, that the episode lacks.
     """
-    without_introductions: list[Scenario] = []
+    without_introductions = []
     for scenario in scenarios:
         texts = {**scenario.texts, "introduction": ((),)}
         without_introductions.append(replace(scenario, texts=texts))

@@ -127,7 +127,7 @@ def _draw_places(request: InstructionRequest, form: str | None) -> dict[int, Spo
     place is drawn first, or most places would be of the most frequent class. `form` is how places
     are said: ``spot``, or None for after a noun.
     """
-    found: dict[int, SpokenPlace] = {}
+    found = {}
     for index, color in enumerate(request.color_values):
         places = _sayable_places(request, color, form)
         if places:

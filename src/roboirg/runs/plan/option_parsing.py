@@ -108,7 +108,7 @@ def parse_policies(given: Iterable[str]) -> Names:
     Raises:
         InvalidValueError: there is none, or ``NAME=SPEC`` has a name that is not allowed.
     """
-    found: list[str] = []
+    found = []
     for text in given:
         # Addresses and their options may contain commas.
         if "://" in text or "?" in text:

@@ -95,7 +95,7 @@ def check_scenarios(
         name: of the frame (the situation) whose scenarios are checked; None for all.
         scenes: episodes of the task; at least one.
     """
-    reports: list[ScenarioReport] = []
+    reports = []
     for scenario in words.scenarios:
         if name in (None, scenario.fields.frame):
             reports.append(check_scenario(scenario, words, scenes))
@@ -410,7 +410,7 @@ def _unclear_references(instruction: Instruction, scenario: Scenario) -> Iterato
     # "Red or blue? Red is gone." names one of two again, and so says which one is meant.
     is_named_again = "taken" in slots_in(scenario.text("introduction"))
     has_chosen = is_named_again  # whether one of the list has been chosen so far
-    antecedents: list[Mention] = []  # that came so far
+    antecedents = []  # that came so far
     for mention in instruction.mentions:
         if mention.role == "antecedent":
             if instruction.utterances[mention.utterance].stage != "distractor":
