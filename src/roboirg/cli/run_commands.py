@@ -302,7 +302,7 @@ def _print_sizes(plan: Plan, jobs: tuple[Job, ...], console: Console) -> tuple[s
 
     sizes = cell_sizes(jobs)
     settings = tuple(dict.fromkeys(itertools.chain.from_iterable(sizes.values())))
-    rows: list[tuple[str, ...]] = []
+    rows = []
     for (policy, task), counts_by_setting in sizes.items():
         cells = [policy, task]
         for setting in settings:

@@ -342,6 +342,24 @@ def _add_learned(
             text_scores[floor] = score_guess(guess, instructed)
 
 
+def _empty_table(title: str, by: Grouping | None, shortcuts: Iterable[str]) -> Table:
+    """Return a table for the terminal with its columns, and without rows.
+
+    Args:
+        title: above it.
+        by: heading of the second column; None for none.
+        shortcuts: names, one for each further column.
+    """
+    table = Table(title=title, title_justify="left", title_style="bold", caption_justify="left")
+    table.add_column("setting")
+    if by is not None:
+        table.add_column(by)
+    table.add_column("texts", justify="right")
+    for shortcut in shortcuts:
+        table.add_column(shortcut, justify="right")
+    return table
+
+
 def shortcut_table(rows: Sequence[ShortcutRow], title: str, by: Grouping | None = None) -> Table:
     """Return a table for the terminal, with a column for each shortcut.
 
@@ -352,14 +370,9 @@ def shortcut_table(rows: Sequence[ShortcutRow], title: str, by: Grouping | None 
         title: above it.
         by: what the second column groups by; None for none.
     """
-    table = Table(title=title, title_justify="left", title_style="bold", caption_justify="left")
+    shortcuts = rows[0].shares if rows else {}
+    table = _empty_table(title, by, shortcuts)
     table.caption = "Percent of hidden slots right / of whole goals right."
-    table.add_column("setting")
-    if by is not None:
-        table.add_column(by)
-    table.add_column("texts", justify="right")
-    for shortcut in rows[0].shares if rows else ():
-        table.add_column(shortcut, justify="right")
     with_excess = [row for row in rows if row.excess is not None]
     # The number of intervals that are shown, for which they are adjusted.
     compared = sum(row.count >= FEWEST_TEXTS for row in with_excess)
