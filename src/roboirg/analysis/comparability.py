@@ -7,7 +7,7 @@ RoboMME's, which a wording file brings. The paper's implicit instructions are no
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from roboirg.analysis.published import PUBLISHED_MAX_STEPS, TRIALS, published_tasks
 from roboirg.analysis.results.frame import RunNames
@@ -111,6 +111,22 @@ def _different_notes(found: AllDifferences, names: RunNames) -> Iterator[str]:
     the published rate (pi0, max steps 900): 900 steps instead of 1300.`` They are named only if
     there are others.
     """
+    runs_by_text = _runs_by_text(found)
+    for text, policy_runs in runs_by_text.items():
+        if not text:
+            continue  # nothing differs
+        who = ""
+        if len(runs_by_text) > 1:
+            who = f" ({'; '.join(names[policy_run] for policy_run in policy_runs)})"
+        yield f"{DIFFERENT_SIGN} not comparable with the published rate{who}: {text}."
+
+
+def _runs_by_text(found: AllDifferences) -> Mapping[str, Sequence[PolicyRun]]:
+    """Return the policy runs by what differs from the published rates; an empty text for nothing.
+
+    For example ``{"900 steps instead of 1300": [pi0, oracle], "": [smolvla]}``. Policy runs without
+    a rate that could be compared are left out.
+    """
     runs: dict[PolicyRun, dict[str, Differences]] = {}
     for key, differences in found.items():
         if differences is not None and comparison_sign(differences):
@@ -118,14 +134,7 @@ def _different_notes(found: AllDifferences, names: RunNames) -> Iterator[str]:
     runs_by_text = defaultdict(list)
     for policy_run, tasks in runs.items():
         runs_by_text[_text(tasks)].append(policy_run)
-
-    for text, policy_runs in runs_by_text.items():
-        if not text:
-            continue  # nothing differs
-        who = ""
-        if len(policy_runs) < len(runs):
-            who = f" ({'; '.join(names[policy_run] for policy_run in policy_runs)})"
-        yield f"{DIFFERENT_SIGN} not comparable with the published rate{who}: {text}."
+    return runs_by_text
 
 
 def _text(tasks: Mapping[str, Differences]) -> str:

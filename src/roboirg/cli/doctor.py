@@ -111,7 +111,7 @@ def run_checks(render_s: int = 0) -> list[Check]:
 def report(checks: Sequence[Check]) -> str:
     """Return a line for each check, with a remedy below every failure, and last how many failed."""
     width = max((len(check.name) for check in checks), default=0)
-    lines: list[str] = []
+    lines = []
     failures = 0
     for check in checks:
         verdict = "ok  " if check.ok else "FAIL"
@@ -146,7 +146,7 @@ def _check_packages() -> Iterator[Check]:
         return
     yield Check(DISTRIBUTION, True, metadata.version(DISTRIBUTION))
 
-    needed: dict[str, SpecifierSet] = {}  # several extras may list the same package
+    needed = {}  # several extras may list the same package
     for text in requirements:
         requirement = Requirement(text)
         if requirement.name != DISTRIBUTION and _is_needed(requirement):

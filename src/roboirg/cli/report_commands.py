@@ -356,7 +356,7 @@ class _TableChoice(NamedTuple):
                 )
             return [table]
 
-        made: list[Table] = []
+        made = []
         for name in WHICH:
             is_of_paper = name in RATE_TABLES or name == _COVERAGE
             if (self.published and is_of_paper) or is_informative(name, data):
@@ -376,7 +376,7 @@ def _breakdown_tables(data: RunData, by: str) -> list[Table]:
     """
     from roboirg.analysis.tables.diagnostic_tables import make_breakdown_table
 
-    made: list[Table] = []
+    made = []
     for breakdown in _breakdowns(by):
         table = make_breakdown_table(breakdown, data.frame)
         if table.rows:

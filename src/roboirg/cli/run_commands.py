@@ -302,13 +302,13 @@ def _print_sizes(plan: Plan, jobs: tuple[Job, ...], console: Console) -> tuple[s
 
     sizes = cell_sizes(jobs)
     settings = tuple(dict.fromkeys(itertools.chain.from_iterable(sizes.values())))
-    rows: list[tuple[str, ...]] = []
+    rows = []
     for (policy, task), counts_by_setting in sizes.items():
-        cells: list[str] = []
+        cells = [policy, task]
         for setting in settings:
             counts = counts_by_setting.get(setting, {}).values()  # by form
             cells.append(" + ".join(map(str, counts)) or "–")
-        rows.append((policy, task, *cells))
+        rows.append(cells)
 
     caption = "episodes"
     # The explicit setting always has the same one form, so it is not listed.
@@ -384,10 +384,10 @@ def _print_prompt_shares(
 
     built_in = {policy.name for policy in plan.policies if policy.kind == BUILT_IN}
     rows: list[tuple[str, ...]] = []
-    undeclared: list[str] = []
+    undeclared = []
     for shares in prompt_shares(jobs):
         if shares.limit is not None:
-            cells: list[str] = []
+            cells = []
             for setting in settings:
                 verdicts = shares.settings.get(setting)
                 cells.append("–" if verdicts is None else share_text(verdicts))

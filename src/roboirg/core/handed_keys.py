@@ -80,7 +80,7 @@ def _base64_patterns(secret: bytes) -> list[str]:
     are left out. ``b"key"`` -> ``a2V5`` at the first place, ``tle`` at the second, ``rZX`` at the
     third.
     """
-    patterns: list[str] = []
+    patterns = []
     for start in range(_BYTES_OF_GROUP):
         bytes_before = bytes(start)  # zeros: their letters are left out below
         encoded = base64.b64encode(bytes_before + secret).decode()

@@ -107,7 +107,7 @@ def _parameters(policy: object) -> Iterator[Any]:
     network_class = getattr(getattr(torch, "nn", None), "Module", None)
     if network_class is None:
         return
-    seen_ids: set[int] = set()
+    seen_ids = set()
     level: list[object] = [policy]
     for _ in range(_DEPTH):
         next_level: list[object] = []

@@ -177,7 +177,7 @@ class PolicyNeeds:
     def __post_init__(self) -> None:
         """Replace each value by its final form, as its rule `check` returns it.
 
-        A need that nobody has declared, None by default, is not checked.
+        A need that is not declared, None by default, is not checked.
         """
         for need in fields(self):
             value = getattr(self, need.name)

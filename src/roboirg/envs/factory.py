@@ -29,8 +29,8 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
         split: train, val, test or random.
         episode: index of the episode in the split, from 0; None if the seed of each reset
             chooses it.
-        arm: told, or a control arm: other words, or another goal, for the same scene
-            (docs/controls.md).
+        arm: ``told`` for the scene's own words, or a control arm: other words, or another goal,
+            for the same scene (docs/controls.md).
         cameras: cameras whose pictures observations hold; () renders nothing.
         depth: add depth for the same cameras.
         calibration: add extrinsic and intrinsic matrices for the same cameras.

@@ -124,7 +124,7 @@ def explain_missing(replay: EpisodeReplay, skipped: range) -> FailureAttribution
     `skipped` has the indices of the stages whose acts are missing.
     """
     meant = _objects_meant_by_any(replay, skipped)
-    unnoticed: list[Slip] = []
+    unnoticed = []
     for slip in find_slips(replay):
         if slip.subjects <= meant and not is_noticed(replay, slip):
             unnoticed.append(slip)
@@ -205,12 +205,12 @@ def judge_tries(replay: EpisodeReplay) -> FailureAttribution | None:
     at_right = [slip for slip in tries if slip.subjects <= right_objects]
     at_wrong = [slip for slip in tries if slip.subjects.isdisjoint(right_objects)]
 
-    if at_right and len(at_right) >= len(at_wrong):
+    if not at_right and not at_wrong:
+        return describe_slip(replay, tries[-1], "ambiguous_act")
+    if len(at_right) >= len(at_wrong):
         losses = [slip for slip in at_right if slip.failure not in MISSES]
         decisive = losses or at_right
         return describe_slip(replay, decisive[-1])
-    if not at_wrong:
-        return describe_slip(replay, tries[-1], "ambiguous_act")
 
     last_try = at_wrong[-1]
     due_later = _objects_meant_by_any(replay, replay.stages_left)

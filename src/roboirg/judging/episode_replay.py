@@ -291,8 +291,8 @@ def _spans(events: Sequence[Event], elapsed_steps: int) -> list[_Span]:
     """
     events_by_step = _events_by_step(events)
     starts = sorted(step for step in events_by_step if 0 <= step <= elapsed_steps)
-    facts_now: set[Fact] = set()
-    spans: list[_Span] = []
+    facts_now = set()
+    spans = []
     for start, end in pairwise((*starts, elapsed_steps + 1)):
         for event in events_by_step[start]:
             if event.holds:
@@ -317,8 +317,8 @@ def _intervals(events: Sequence[Event]) -> tuple[FactInterval, ...]:
     An event is a fact that begins or ceases to hold at a step. A fact that begins at step 3 and
     ceases at 7 -> 3 to 7; one that never ceases ends with None.
     """
-    start_by_fact: dict[Fact, int] = {}
-    intervals: list[FactInterval] = []
+    start_by_fact = {}
+    intervals = []
     for event in events:
         if event.holds:
             start_by_fact[event.fact] = event.step

@@ -263,7 +263,7 @@ def _completes_stage(replay: EpisodeReplay, interval: FactInterval) -> bool:
 
 def _last_stages(replay: EpisodeReplay) -> dict[Rule, int]:
     """Return the rules of all stages, each with the index of the last stage that forbids it."""
-    last_stages: dict[Rule, int] = {}
+    last_stages = {}
     for index, stage in enumerate(replay.stages):
         for forbidden in stage.forbids:
             if isinstance(forbidden, Rule):

@@ -152,8 +152,8 @@ class _StageWatch:
     def completes(self, history: FactHistory) -> bool:
         """Return whether the stage is complete, and remember since when it has been met.
 
-        A stage with `lasting` is complete when what it expects has held for so many steps on end;
-        any other, at once.
+        A stage with `lasting` is complete when what it expects has held for that many steps
+        without a break; any other, at once.
         """
         is_met = history.holds(self._stage.expects)
         if self._stage.lasting == 0:

@@ -20,22 +20,25 @@ _Look = tuple[ObjectKind, Color | None]
 def meant_objects(
     stages: Sequence[Stage], index: int, scene: Scene, facts: AbstractSet[Fact] = frozenset()
 ) -> frozenset[str]:
-    """Return the names of the objects with which a stage can still rightly be completed.
+    """Return the names of the objects that the policy may handle to complete a stage.
 
-    BinFill with *two red cubes, one blue one*: at first every red and blue cube; when both red ones
-    are in the bin, every blue one. So objects are counted by their look, kind and color: as many
-    as the stages take of it, less those with a fact that lasts, such as being in the bin.
+    Most stages name one object. Others leave a choice: in BinFill, with *two red cubes, one blue
+    one*, each of the three stages expects any red or blue cube in the bin, in any order. At first
+    every red and blue cube is meant; when two red ones are in the bin, only the blue ones are.
+
+    So the objects are counted by their look (kind and color). A look is still needed as often as
+    such stages take it, less the objects of this look with a fact that lasts, such as *in the bin*.
 
     Args:
-        stages: of the policy.
-        index: of the stage. Stages with the same objects and the same movement may be done in any
-            order, and with any objects that look like those that the oracle takes.
-        scene: of the episode.
-        facts: that hold, by which what is done for good is not meant again.
+        stages: all that the policy is to complete, done ones as well.
+        index: of the stage.
+        scene: with all objects, also others that look like those that the scripted expert takes.
+        facts: that hold now. Lasting ones must be about objects that the stage expects.
     """
     stage = stages[index]
     subjects = _subjects(stage)
     if len(subjects) <= 1:
+        # What is handled need not be what something is expected of.
         return frozenset({*subjects, stage.primitive.subject})
 
     looks = {name: (scene[name].kind, scene[name].color) for name in subjects}

@@ -201,7 +201,7 @@ def _holds_let_go(replay: EpisodeReplay) -> Iterator[FactInterval]:
 def _lifts_during(replay: EpisodeReplay, hold: FactInterval) -> list[FactInterval]:
     """Return from when to when a held object was lifted, of lifts during this hold."""
     hold_end = replay.end_of(hold)
-    lifts: list[FactInterval] = []
+    lifts = []
     for lift in replay.started(FactRole.RAISE, after=0):
         is_same_object = lift.subject == hold.subject
         is_meanwhile = lift.start <= hold_end and lift.lasts_until(hold.start)

@@ -42,7 +42,7 @@ _MOST_DRAWS = 60
 """How often the words of an episode are drawn again for one more paraphrase."""
 _WORD = re.compile(r"[^\W_]+(?:['’-][^\W_]+)*")
 _KEPT_NOTES = ("pattern", "patterns", "relation", "rival")
-"""Notes in which a paraphrase equals the told text: it takes the same reasoning."""
+"""Notes in which a paraphrase equals the scene's own text: it takes the same reasoning."""
 
 
 class ArmWords(NamedTuple):
@@ -213,7 +213,7 @@ def _scramble(episode: Episode, instruction: Instruction) -> Instruction:
     while new_order == words:
         new_order = shuffled(rng, words)
     next_words = iter(new_order)
-    texts: list[str] = []
+    texts = []
     for utterance_words in words_by_utterance:
         texts.append(" ".join(itertools.islice(next_words, len(utterance_words))))
     return _with_texts(instruction, texts)

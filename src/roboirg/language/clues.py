@@ -113,7 +113,7 @@ def _clues_by_exclusion(
     """
     if len(things) != _EXCLUSION_SIZE:
         return []
-    clues: list[ThingClue] = []
+    clues = []
     simple_places = [place for place in places if place.kind in _EXCLUDING_PLACES]
     for first, second in itertools.combinations(simple_places, 2):
         remaining = [thing for thing in things if thing not in (first.thing, second.thing)]

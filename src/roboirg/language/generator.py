@@ -125,7 +125,7 @@ def find_refusals(episode: Episode, **options: Unpack[WordKeywords]) -> Mapping[
     ``{"spatial": "no landmark singles out a target"}``.
     """
     usual = replace(InstructionOptions(), **as_fields(options))
-    reasons: dict[str, str] = {}
+    reasons = {}
     for name in settings_of(get_task(episode.task)):
         reason = find_refusal(episode, replace(usual, setting=name))
         if reason is not None:
@@ -202,7 +202,7 @@ def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> In
         request: the episode, and how it is said.
         spec: the utterances as phrases, with their meaning.
     """
-    utterances: list[Utterance] = []
+    utterances = []
     mentions: list[Mention] = []
     for index, (stage, phrase) in enumerate(spec.utterances):
         text = phrase_text(phrase)

@@ -14,7 +14,7 @@ def goal_fields(goal: Goal) -> dict[str, str]:
     A color with a count is one field, ``cubes.0``, with a value such as ``"2 red"``.
     """
     slots = goal.as_mapping()
-    found: dict[str, str] = {}
+    found = {}
     if "counts" in slots:
         for position, (color, count) in enumerate(goal.amounts):
             found[f"cubes.{position}"] = f"{count} {color}"

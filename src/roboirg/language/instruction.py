@@ -64,7 +64,7 @@ class Mention:
 
 
 class Described(NamedTuple):
-    """A thing or a number that is described instead of named; the scene tells which one it is.
+    """A thing or a number that is described instead of named; the scene decides which one it is.
 
     Attributes:
         phrase: the description, as it was said.

@@ -67,7 +67,7 @@ def _utterance_rows(instruction: Instruction) -> list[ExportRow]:
     The prompt joins utterances by a space: *Red is nice.* starts at 0, and *Lift it.* after it at
     13.
     """
-    rows: list[ExportRow] = []
+    rows = []
     start = 0
     for utterance in instruction.utterances:
         rows.append({"stage": utterance.stage, "start": start, "text": utterance.text})
@@ -81,7 +81,7 @@ def _mention_rows(instruction: Instruction) -> list[ExportRow]:
     A mention has its characters within its utterance; the row has them within the whole prompt.
     """
     utterance_starts = [turn["start"] for turn in _utterance_rows(instruction)]
-    rows: list[ExportRow] = []
+    rows = []
     for mention in instruction.mentions:
         utterance_start = utterance_starts[mention.utterance]
         rows.append(

@@ -172,7 +172,7 @@ def things_of_color(scene: Scene, kind: ObjectKind, color: str) -> tuple[SceneOb
     For ``red``: the red cube, or the container over it. A hidden cube stands for itself if `kind`
     is the kind of hidden cubes.
     """
-    found: list[SceneObject] = []
+    found = []
     for item in scene.objects:
         if item.color != color:
             continue

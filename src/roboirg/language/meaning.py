@@ -133,7 +133,7 @@ def _agrees(value_by_field: Mapping[str, Value], is_singular_by_slot: Mapping[st
         is_singular_by_slot: by slot or field, whether the words are in the singular.
     """
     for slot, is_single in is_singular_by_slot.items():
-        values: list[Value] = []
+        values = []
         for field, value in value_by_field.items():
             if slot in (field, field.partition(".")[0]):  # "counts.0" is a field of "counts"
                 values.append(value)
@@ -171,7 +171,7 @@ def picked_operand(term: Term) -> Operand | None:
     Of red and blue, ``rank`` 1 picks red, ``other`` than rank 1 picks blue. None if it picks none
     or several: ``same`` picks both.
     """
-    picked: list[Operand] = []
+    picked = []
     for position, operand in enumerate(term.operands, start=1):
         if _is_picked(position, term):
             picked.append(operand)
@@ -278,7 +278,7 @@ def _values_of_event(described: Described, field: str, episode: Episode) -> Valu
 
     *The cube that the robot moved* leads to its color.
     """
-    found: set[Value] = set()
+    found = set()
     for event in event_clues(episode.scene):
         if event.clue.words == described.phrase and event.slot == field:
             found.add(event.value)
@@ -311,7 +311,7 @@ def _values_of_thing(thing: SceneObject, field: str, episode: Episode) -> Values
         episode: with the scene.
     """
     kind_of_thing = get_task(episode.task).things.pointed
-    found: set[Value] = set()
+    found = set()
     for color in _possible_values(field, episode):
         if thing in things_of_color(episode.scene, kind_of_thing, str(color)):
             found.add(color)

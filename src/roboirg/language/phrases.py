@@ -74,7 +74,7 @@ def fill(template: str, fields: Mapping[str, Phrase]) -> Phrase:
     ``"Lift the {color} cube."`` with *red* for ``color`` becomes the pieces *Lift the*, *red* and
     *cube.*; *red* keeps its tag, which says what it stands for.
     """
-    pieces: list[TaggedText] = []
+    pieces = []
     template_position = 0
     for field in _FIELD.finditer(template):
         pieces.append(TaggedText(template[template_position : field.start()]))
@@ -109,7 +109,7 @@ def listed(phrases: Sequence[Phrase], joint: str = "and") -> Phrase:
 
     `joint` is the word before the last phrase; *nor* stands before each: *a nor b nor c*.
     """
-    pieces: list[TaggedText] = []
+    pieces = []
     last = len(phrases) - 1
     for position, phrase in enumerate(phrases):
         separator = ", "

@@ -197,7 +197,7 @@ def values_of_goal(goal: Goal) -> GoalValues:
     A goal with the slot ``colors`` of red and blue gives red with the field ``colors.0`` and blue
     with ``colors.1``. Colors that have counts are of the type ``amount``.
     """
-    found: list[GoalValue] = []
+    found = []
     has_counts = "counts" in dict(goal.slots)
     for slot, _ in goal.slots:
         slot_type = SLOT_TYPE_NAMES[slot]

@@ -221,7 +221,7 @@ def _paired_entries(task: str, split: Split) -> Mapping[int, _SplitEntry]:
     meant value of the episode with which it is paired: of red and blue, each is the rival of the
     other.
     """
-    entries: dict[int, _SplitEntry] = {}
+    entries = {}
     for episode in split_episodes([task], [split]):
         entry = _unpaired_entry(episode, get_task(task))
         if entry is not None:

@@ -87,7 +87,8 @@ def split_words(text: str) -> frozenset[str]:
 def _tokens_by_word() -> Mapping[str, int]:
     """Return the number of tokens of every word and mark of the language: ``{"cube": 2, ".": 1}``.
 
-    The file has them the other way round: for each number of tokens the words that need so many.
+    The file has them the other way round: for each number of tokens the words that need
+    that many.
     """
     text = files("roboirg.language").joinpath("token_pieces.json").read_text(encoding="utf-8")
     by_count: dict[str, list[str]] = json.loads(text)

@@ -126,7 +126,7 @@ def _lacking(needs: PolicyNeeds, protocol: Protocol) -> list[str]:
     # A client is asked for its needs; nothing listens at this address, and none connects.
     of_client = PolicyNeeds.of(protocol.client(f"{protocol.name}://{LOOPBACK}:1"))
     options = protocol.client.options_type.model_fields
-    lacking: list[str] = []
+    lacking = []
     for name in ("depth", "calibration", "observe_every", "actions"):
         usual_value = getattr(usual, name)
         is_carried = name in options or getattr(of_client, name) != usual_value

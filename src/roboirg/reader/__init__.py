@@ -190,7 +190,7 @@ def _without_goals(sentences: Sequence[ParsedSentence]) -> Interpretation:
     known = [word for word in unread if is_known(word)]
     unknown = tuple(word for word in unread if not is_known(word))
 
-    complaints: list[str] = []
+    complaints = []
     if not has_verb:
         complaints.append("finds no command")
     for word in unknown:
@@ -209,7 +209,7 @@ def _complaint_of_open_slots(goals: Sequence[Goal]) -> str:
     *leaves color open: it can be red or blue* names each slot in which the goals differ, and the
     values of the first of these slots.
     """
-    slots: list[str] = []
+    slots = []
     choices: list[str] = []
     for slot, _ in goals[0].slots:
         values = dict.fromkeys(goal[slot] for goal in goals)

@@ -279,8 +279,8 @@ def _read_goal(match: PhraseMatch) -> Value:
     """Return where a phrase says to put something: *on target#1*, *into the bin*.
 
     *on target#1* gives the `Target` that the placeholder stands for, *into the bin* the noun
-    ``"bin"``. A thing must be a box, told by its color or place: *in the red box*. For any other,
-    *on the red cube*, it is None, so that the phrase stays unread.
+    ``"bin"``. A thing must be a box, described by its color or place: *in the red box*. For any
+    other, *on the red cube*, it is None, so that the phrase stays unread.
     """
     words = match["goal"]  # after "on" or "to": "target#1", "the same bin"
     if "#" not in words:

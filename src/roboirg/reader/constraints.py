@@ -79,7 +79,7 @@ def _allowed_values(
     any value. Slots that the goals do not have are left out.
     """
     slots = dict(goals[0].slots) if goals else {}
-    allowed: dict[str, AllowedValues] = {}
+    allowed = {}
     if "visit" in slots:
         allowed["visit"] = command.visits(max(goal.number("visit") for goal in goals))
     if "repeats" in slots:
@@ -243,7 +243,7 @@ class _Command:
         passed: list[int] = []
         for clause in self._clauses:
             passed += clause.values("passed")
-        numbers: set[int] = set()
+        numbers = set()
         for clause in self._clauses:
             for visit in clause.values("visit"):
                 numbers.add(self._number_of_visit(visit, passed, last))

@@ -213,7 +213,7 @@ def _on_side_of(place: Place, anchor: SceneObject, candidates: Things) -> _Order
     So any of them may be meant.
     """
     across = _sideways(place)
-    aside: list[SceneObject] = []
+    aside = []
     for thing in candidates:
         if thing is not anchor and across(thing) < across(anchor):
             aside.append(thing)

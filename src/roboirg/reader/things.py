@@ -52,7 +52,7 @@ class Description(NamedTuple):
 
     @property
     def leaves_color_open(self) -> bool:
-        """Whether nothing tells the color, as in *a cube*: no color, place or other thing."""
+        """Whether nothing says which color, as in *a cube*: no color, place or other thing."""
         clues = (self.color, self.place, self.covers, self.same_color_as)
         return all(clue is None for clue in clues)
 

@@ -121,7 +121,7 @@ def split_sentences(text: str) -> tuple[Sentence, ...]:
     for variant, usual in _SPELLINGS:
         text = text.replace(variant, usual)
     text = _MINUS.sub("minus ", text)
-    sentences: list[Sentence] = []
+    sentences = []
     for part in _SENTENCE_END.split(text):
         words = [SYNONYMS.get(word, word) for word in _WORD.findall(part) if word not in FILLERS]
         if words:

@@ -402,19 +402,26 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
 
     @property
     def words_owner(self) -> str:
-        """Which results must have the same words as this one, such as ``PickXtimes/test``.
+        """Which texts the words are from; results with the same owner must not mix versions.
 
-        Records have the identity of their words as ``NAME@DIGEST``. The name is task and pool,
-        ``PickXtimes/test@1a2b…``, or for a setting with words of its own task, pool and setting,
-        ``PickXtimes/test/grounded@3c4d…``: what stands before the ``@`` is the owner. Of a wording
-        file, whose identity has another form, the owner is ``PickXtimes/test of mine@5e6f…``.
+        ``words`` has the owner, and after the ``@`` a digest of the texts, which is their version:
+
+        ==================================  ===================================
+        ``words``                           owner
+        ==================================  ===================================
+        ``PickXtimes/test@1a2b…``           ``PickXtimes/test``: task and pool
+        ``PickXtimes/test/grounded@3c4d…``  ``PickXtimes/test/grounded``: a setting has its own
+        any, with a wording file *mine*     ``PickXtimes/test of mine@5e6f…``
+        ==================================  ===================================
         """
         usual = f"{self.task}/{self.pool}"
         owner, _, _ = self.words.partition("@")
         if not owner.startswith(f"{usual}/"):
-            owner = usual
+            owner = usual  # as the words of a wording file have an identity of another form
         wordings = outside_words(self.options.wordings)
-        return owner if wordings is None else f"{owner} of {wordings}"
+        if wordings is None:
+            return owner
+        return f"{owner} of {wordings}"
 
     @property
     def identity(self) -> Job:
@@ -443,8 +450,8 @@ class Record(Summary, kw_only=True, forbid_unknown_fields=True):  # type: ignore
         end_state: hash of the state in which the episode left the world and the judge; None if it
             did not come to an end.
         events: facts that became true or false, in order.
-        attempts: the same for facts of attempts, which no stage expects; None if nobody watched for
-            them, as with a real robot.
+        attempts: the same for facts of attempts, which no stage expects; None if they were not
+            watched for, as with a real robot.
         subgoals: what a planner named, in order.
         timings: wall-clock seconds by phase: ``policy_load``, ``policy_act``, ``env_step``, ….
         video_error: why the requested video could not be written, or None.

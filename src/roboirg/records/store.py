@@ -85,7 +85,7 @@ class RecordStore:
             StoreError: a record cannot be written, a line is not one, or a policy or its server is
                 now another version than in earlier verdicts; the file is unchanged.
         """
-        added: dict[RecordKey, Summary] = {}
+        added = {}
         verdicts = dict(self._verdicts)
 
         def checked_lines() -> Iterator[bytes]:

@@ -264,7 +264,7 @@ class _ValueLearner:
             training: to fit the models.
             validation: other instructions, on which right predictions are counted.
         """
-        numbers_right: dict[ModelSpec, int] = {}
+        numbers_right = {}
         for spec in _MODEL_SPECS:
             self._models[spec] = self._fit(spec, training)
             numbers_right[spec] = self._count_right(spec, validation)

@@ -76,7 +76,7 @@ def named_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[Name
         vocabulary: the values that the slot may hold.
     """
     sentences = _sentences(text)
-    found: list[NamedValue] = []
+    found = []
     for number, words in enumerate(sentences, start=1):
         is_command = number == len(sentences)
         for mention in _mentions(words, slot, vocabulary):
@@ -185,7 +185,7 @@ def command_ranks(text: str) -> tuple[int, ...]:
     -> none.
     """
     words = command_words(text)
-    ranks: list[int] = []
+    ranks = []
     for index, word in enumerate(words):
         ordinal = ordinal_of(word)
         if word in ("former", "latter"):

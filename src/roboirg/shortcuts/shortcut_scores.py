@@ -107,7 +107,7 @@ def score_chance(instructed: InstructedEpisode) -> ShortcutScore:
     share = right_share(goals, episode)
     if share is None:
         raise InvalidValueError(f"{episode.key}: no meaning is known of {instruction.text!r}.")
-    slots: dict[str, Fraction] = {}
+    slots = {}
     for slot, positions in counted_positions(instructed).items():
         guesses = [values_in(goal[slot]) for goal in goals]
         slots[slot] = _slot_chance(guesses, values_in(episode.goal[slot]), positions)
@@ -128,7 +128,7 @@ def _slot_chance(
         positions: indices of the values that are scored; the guesser knows all others.
     """
     known = set(range(len(meant))).difference(positions)
-    numbers_right: list[int] = []  # of scored values, for each possible guess
+    numbers_right = []  # of scored values, for each possible guess
     for guess in guesses:
         right = _right_positions(guess, meant)
         if known <= right:
@@ -138,7 +138,7 @@ def _slot_chance(
 
 def _right_positions(guess: Sequence[Value], meant: Sequence[Value]) -> set[int]:
     """Return at which indices a guess has the right value; it may be of another length."""
-    right: set[int] = set()
+    right = set()
     for index, (value, wanted) in enumerate(zip(guess, meant, strict=False)):
         if value == wanted:
             right.add(index)
@@ -151,7 +151,7 @@ def score_guess(guess: TextGuess, instructed: InstructedEpisode) -> ShortcutScor
     Red or blue, where red is right, scores 1/2 in the slot ``color``.
     """
     episode, _ = instructed
-    slots: dict[str, Fraction] = {}
+    slots = {}
     for slot, positions in counted_positions(instructed).items():
         slots[slot] = slot_share(guess, slot, episode.goal[slot], positions)
     return ShortcutScore(slots, goal_share(guess, episode))

@@ -147,7 +147,7 @@ class _Tally:
         """Return the row of a group, with the mean scores of all instructions that were added."""
         slot_count = sum(self.slot_counts)
         text_count = len(self.slot_counts)
-        shares: dict[str, ShortcutShares] = {}
+        shares = {}
         for name, right in self.slots_right.items():
             slots = _share(right, slot_count) if slot_count else None
             goals = _share(self.goals_right[name], text_count)
@@ -342,6 +342,24 @@ def _add_learned(
             text_scores[floor] = score_guess(guess, instructed)
 
 
+def _empty_table(title: str, by: Grouping | None, shortcuts: Iterable[str]) -> Table:
+    """Return a table for the terminal with its columns, and without rows.
+
+    Args:
+        title: above it.
+        by: heading of the second column; None for none.
+        shortcuts: names, one for each further column.
+    """
+    table = Table(title=title, title_justify="left", title_style="bold", caption_justify="left")
+    table.add_column("setting")
+    if by is not None:
+        table.add_column(by)
+    table.add_column("texts", justify="right")
+    for shortcut in shortcuts:
+        table.add_column(shortcut, justify="right")
+    return table
+
+
 def shortcut_table(rows: Sequence[ShortcutRow], title: str, by: Grouping | None = None) -> Table:
     """Return a table for the terminal, with a column for each shortcut.
 
@@ -352,18 +370,13 @@ def shortcut_table(rows: Sequence[ShortcutRow], title: str, by: Grouping | None 
         title: above it.
         by: what the second column groups by; None for none.
     """
-    table = Table(title=title, title_justify="left", title_style="bold", caption_justify="left")
+    shortcuts = rows[0].shares if rows else {}
+    table = _empty_table(title, by, shortcuts)
     table.caption = "Percent of hidden slots right / of whole goals right."
-    table.add_column("setting")
-    if by is not None:
-        table.add_column(by)
-    table.add_column("texts", justify="right")
-    for shortcut in rows[0].shares if rows else ():
-        table.add_column(shortcut, justify="right")
-    compares = any(row.excess is not None for row in rows)
-    # As many intervals are shown, for which they are adjusted.
-    compared = sum(row.excess is not None and row.count >= FEWEST_TEXTS for row in rows)
-    if compares:
+    with_excess = [row for row in rows if row.excess is not None]
+    # The number of intervals that are shown, for which they are adjusted.
+    compared = sum(row.count >= FEWEST_TEXTS for row in with_excess)
+    if with_excess:
         table.add_column("text-only over chance", justify="right")
         table.caption += (
             " Over chance: points of slots above the larger of chance and majority, with 95 % "
@@ -372,7 +385,7 @@ def shortcut_table(rows: Sequence[ShortcutRow], title: str, by: Grouping | None 
         )
     for row in rows:
         cells = [_cell(shares) for shares in row.shares.values()]
-        if compares:
+        if with_excess:
             has_interval = row.count >= FEWEST_TEXTS
             cells.append(excess_text(row.excess, compared if has_interval else 0))
         table.add_row(*row.group, str(row.count), *cells)

@@ -27,7 +27,7 @@ REST = frozenset({"other", "others", "left", "remaining"})
 """Words for what remains when one of two is taken."""
 PAIR = 2
 _NUMBER_REACH = 2
-"""The size of a difference is looked for in so many words before it: *two visits before*."""
+"""How many words before it are searched for the size of a difference: *two visits before*."""
 
 
 @dataclass(frozen=True)

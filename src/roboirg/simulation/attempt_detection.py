@@ -85,7 +85,7 @@ class AttemptDetector:
         peak = self._peak
         self._peak = max(peak, tool.z) if is_shut else 0.0
 
-        found: list[Fact] = []
+        found = []
         if self._lingers(tool):
             found.append(Fact("lingering", "robot"))
         if tool.z <= HAND_HIGH:

@@ -310,7 +310,7 @@ def _walls(half_side: float, half_wall: float, half_height: float) -> list[Cuboi
     """
     center = half_side - half_wall
     half_hole = half_side - 2 * half_wall
-    walls: list[Cuboid] = []
+    walls = []
     for sign in (-1.0, 1.0):
         walls.append(((0.0, sign * center, 0.0), (half_side, half_wall, half_height)))
         walls.append(((sign * center, 0.0, 0.0), (half_wall, half_hole, half_height)))

@@ -116,7 +116,7 @@ class Cameras:
             return
         poses = self._bodies.poses()
         poses_bytes = poses.tobytes()
-        changed: dict[str, _View] = {}
+        changed = {}
         for camera in cameras:
             last = self._last.get(camera)
             if last is not None and last.poses == poses_bytes:

@@ -41,7 +41,7 @@ class EpisodeSession:
         events: all events since the start: a fact, such as *picked, cube 1*, begins or ceases to
             hold.
         attempts: the same of attempts, facts about what the hand tries; nothing is judged by them,
-            but causes of failures are told from them.
+            but causes of failures are found from them.
     """
 
     demonstrated: Recording
@@ -101,7 +101,7 @@ class EpisodeSession:
         """
         stages = self.episode.demonstration
         steps = self._plan_demonstration() if recording is None else recording.steps()
-        executed: list[RecordedStep] = []
+        executed = []
         for step in steps:
             stage = stages[step.stage]
             self.step(step.action)

@@ -111,7 +111,7 @@ def _floor_piece(
     Args:
         along_x: range of squares.
         along_y: range of squares.
-        step: so many squares per side are merged into one; it divides both ranges.
+        step: number of squares per side that are merged into one; it divides both ranges.
     """
     x_ticks = _floor_ticks(along_x, step)
     y_ticks = _floor_ticks(along_y, step)

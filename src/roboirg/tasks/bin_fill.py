@@ -132,7 +132,7 @@ def _draw_cubes(
 
     Red, blue, red -> ``cube_red_0``, ``cube_blue_0``, ``cube_red_1``.
     """
-    plans: list[ItemPlan] = []
+    plans = []
     numbers: Counter[Color] = Counter()
     for color in _draw_cube_colors(rng, difficulty, wanted):
         plans.append(ItemPlan(f"cube_{color}_{numbers[color]}", color, CUBE_REGION, CUBE_GAP))
@@ -186,7 +186,7 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
     Two red cubes and a blue one -> one or two red; one blue; one or two red and one blue.
     """
     possible_counts = [range(len(_of_color(scene, color)) + 1) for color in GOAL_ORDER]
-    goals: list[Goal] = []
+    goals = []
     for counts in itertools.product(*possible_counts):
         if 1 <= sum(counts) <= MAX_GOAL_CUBES:
             wanted = dict(zip(GOAL_ORDER, counts, strict=True))

@@ -38,7 +38,7 @@ def shifted_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ..
     of the two rows moves sideways by its own shift. Three, in a triangle or on a line: each point
     moves away from the robot by its own shift. Draws come in the order of the points.
     """
-    points: list[PlanePoint] = []
+    points = []
     if count == len(FOUR):
         for row in (FOUR[:2], FOUR[2:]):
             shift = MAX_SHIFT * rng.random()

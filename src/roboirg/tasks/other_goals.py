@@ -21,7 +21,7 @@ def other_goals(episode: Episode) -> tuple[Goal, ...]:
     none.
     """
     task = get_task(episode.task)
-    others: list[Goal] = []
+    others = []
     for goal in task.goals(episode.scene):
         stages = task.stages(episode.scene, goal)
         overlaps = begins_with(stages, episode.stages) or begins_with(episode.stages, stages)

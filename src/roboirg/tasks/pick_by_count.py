@@ -51,7 +51,7 @@ def sample(rng: np.random.Generator, _difficulty: Difficulty) -> SceneAndGoal:
 
 def _draw_tapes(rng: np.random.Generator, target: SceneObject) -> list[SceneObject]:
     """Draw a tape of each color, ``tape_yellow`` and ``tape_gray``, one on either side."""
-    tapes: list[SceneObject] = []
+    tapes = []
     for color, region in draw_regions(rng, TAPES, LEFT_TAPE_REGION).items():
         plan = ItemPlan(f"tape_{color}", color, region, TAPE_GAP, "tape")
         tapes.append(draw_item(rng, plan, [disc_area(target)]))
@@ -65,7 +65,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     further pick of the right one in the last, which is complete after `WAIT_STEPS` without it.
     """
     color = goal.text("color")
-    wrong: list[Rule] = []
+    wrong = []
     for tape in scene.of_kind("tape"):
         if tape.color != color:
             cause = f"picked up the {tape.color} tape"

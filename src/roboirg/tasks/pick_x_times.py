@@ -61,7 +61,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     color = goal.text("color")
     cubes = scene.of_kind("cube")
     wrong_picks = facts_of_others("picked", cubes, f"cube_{color}")
-    plan: list[Stage] = []
+    plan = []
     for stage in placing_stages("cube", color, goal.number("repeats")):
         plan.append(stage.forbidding(*wrong_picks, PRESSED))
     press = press_stage("press the button {at} to stop")

@@ -37,7 +37,7 @@ def sample(rng: np.random.Generator, _difficulty: Difficulty) -> SceneAndGoal:
 
 def _draw_boxes(rng: np.random.Generator) -> list[SceneObject]:
     """Draw a box of each color, ``box_green`` and ``box_purple``, one on either side."""
-    boxes: list[SceneObject] = []
+    boxes = []
     for color, region in draw_regions(rng, BOXES, LEFT_BOX_REGION).items():
         boxes.append(draw_box(rng, f"box_{color}", color, region))
     return boxes
@@ -54,7 +54,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     In both, a tape in the other box fails the episode.
     """
     color = goal.text("color")
-    wrong: list[Rule] = []
+    wrong = []
     for box in scene.of_kind("box"):
         if box.color != color:
             cause = f"put the tape into the {box.color} box"

@@ -14,7 +14,7 @@ import numpy as np
 from roboirg.core.conditions import Fact, OccurrenceCount, Rule
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.footprints import Region
-from roboirg.core.motions import Glow, Motion
+from roboirg.core.motions import Glow
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     Bounds,
@@ -79,8 +79,8 @@ def make_scene(
 
     A target lights up as a marker, a disc over it, appears. `cube` is the name of the goal's.
     """
-    markers: list[SceneObject] = []
-    motions: list[Motion] = []
+    markers = []
+    motions = []
     for target in targets:
         marker = marker_over(target)
         is_over = Fact("over", cube, target.name)
@@ -103,7 +103,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     cube = f"cube_{color}"
     wrong_picks = facts_of_others("picked", scene.of_kind("cube"), cube)
     too_often = _too_often(cube, len(SIDES) * repeats)
-    plan: list[Stage] = []
+    plan = []
     for stage in _carrying(color, repeats):
         plan.append(stage.forbidding(*wrong_picks, PRESSED, too_often))
     plan.append(press_stage().forbidding(*wrong_picks, too_often))

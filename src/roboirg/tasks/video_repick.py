@@ -174,7 +174,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     target = scene.past[0].subject  # the cube that the video shows picked up
     cubes = scene.of_kind("cube")
     wrong_picks = facts_of_others("picked", cubes, target)
-    plan: list[Stage] = []
+    plan = []
     for stage in _picks(target, goal.number("repeats")):
         plan.append(stage.forbidding(*wrong_picks, _early_press(stage.timer)))
     press = press_stage("press the button {at} to finish")

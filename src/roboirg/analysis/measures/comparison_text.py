@@ -53,6 +53,20 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
             yield f"  {row.sentence}"
 
     yield ""
+    results = itertools.chain(averages, *breakdowns.values())
+    yield from _p_value_notes(results, has_several_tasks=has_several_tasks)
+    if breakdowns:
+        yield "Each breakdown is corrected separately, over all its rows."
+    yield from _left_out(comparison.averages)
+
+
+def _p_value_notes(results: Iterable[_Result], *, has_several_tasks: bool) -> Iterator[str]:
+    """Yield what p-values are corrected for, and why one may seem to contradict its interval.
+
+    Args:
+        results: the averages and the rows of breakdowns.
+        has_several_tasks: whether averages are over more than one task.
+    """
     if has_several_tasks:
         yield (
             "p-values are from the exact paired test, after Holm's correction: over the averages, "
@@ -60,14 +74,11 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
         )
     else:
         yield "p-values are from the exact paired test, after Holm's correction over the settings."
-    if any(result.is_surprising for result in itertools.chain(averages, *breakdowns.values())):
+    if any(result.is_surprising for result in results):
         yield (
             "An interval belongs to one gap alone, so it may exclude 0 although p is above 0.05; "
             "p is corrected for all gaps that are tested together, and p decides."
         )
-    if breakdowns:
-        yield "Each breakdown is corrected separately, over all its rows."
-    yield from _left_out(comparison.averages)
 
 
 def _decided_cells(cells: Sequence[_Result]) -> Iterator[str]:

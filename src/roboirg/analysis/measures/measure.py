@@ -122,7 +122,7 @@ def measure(
             ``{"setting": "explicit"}``; the gap is on the same episodes and policy seeds.
         family: columns of `by` within whose values p-values are corrected together.
         pool: columns over whose values a rate may be taken, such as ``["form"]``. In the others
-            that tell policies, words and conditions apart, all rows of a group have one value.
+            that distinguish policies, words and conditions, all rows of a group have one value.
 
     Returns:
         A row for each group, in the order in which they occur.

@@ -329,7 +329,8 @@ def _played_scene(task: str, split: str, number: int, arm: str) -> _PlayedScene:
     facts: dict[tuple[str, str, str | None], Fact] = {}
     for stage in (*episode.demonstration, *episode.stages):
         for condition in (stage.expects, *stage.forbids):
-            facts.update((fact, fact) for fact in facts_of(condition))
+            for fact in facts_of(condition):
+                facts[fact] = fact
     return _PlayedScene(episode, _object_names(episode.scene), facts)
 
 

@@ -113,12 +113,10 @@ def _episodes(runs: SourceByName, frame: Frame, *, videos: bool) -> Iterator[Pag
     logs = {name: logged_slugs(source.folder) for name, source in sources.items()}
     for policy_run, record in _played_by_scene(frame):
         folder = sources[policy_run.run].folder
-        # The last part of its slug is a hash of all that identifies the episode in its run.
-        key = record.slug.rpartition("-")[2]
-        number = names.index(policy_run.run)
-        if number > 0:
-            key += f"-{number + 1}"  # as the other run may have the same episode
-        film = _existing(folder, record.video) if videos else None
+        key = _page_key(record.slug, names.index(policy_run.run))
+        film = None
+        if videos:
+            film = _existing(folder, record.video)
         poster = None
         if film is not None:
             poster = _existing(folder, poster_name(str(record.video)))
@@ -126,6 +124,17 @@ def _episodes(runs: SourceByName, frame: Frame, *, videos: bool) -> Iterator[Pag
         if record.slug in logs[policy_run.run]:
             log = log_path(folder, record.slug)
         yield PageEpisode(key, record, policy_run, film, poster, log)
+
+
+def _page_key(slug: str, run: int) -> str:
+    """Return what identifies an episode in the page: ``4f2a``, or ``4f2a-2`` of the second run.
+
+    Args:
+        slug: of its record; the last part is a hash of all that identifies it in its run.
+        run: number of the run, from 0; both may have the same episode.
+    """
+    key = slug.rpartition("-")[2]
+    return f"{key}-{run + 1}" if run > 0 else key
 
 
 def _played_by_scene(frame: Frame) -> Iterator[tuple[PolicyRun, Summary]]:

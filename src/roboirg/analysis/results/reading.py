@@ -158,7 +158,7 @@ def with_columns(
 
 
 def _play_key(job: Job) -> tuple[object, ...]:
-    """Return what tells apart the same episode in two runs, or played again in one.
+    """Return what distinguishes the same episode in two runs, or played again in one.
 
     An episode that was not played has no time at which it began.
     """

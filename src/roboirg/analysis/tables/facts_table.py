@@ -152,8 +152,8 @@ def _run_conditions(results: Sequence[Summary]) -> Facts:
         yield name, map(operator.attrgetter(field), results)
     step_limits = [result.environment.max_steps for result in results]
     yield "step limit", [f"{steps} at {CONTROL_RATE} a second" for steps in step_limits]
-    options = sorted({result.column for result in results}, key=options_sort_key)
-    yield "settings", map(options_label, options)
+    columns = {result.column for result in results}
+    yield "settings", map(options_label, sorted(columns, key=options_sort_key))
     yield "words", [words_label(result.options.wordings) for result in results]
     yield "delivery", [result.options.delivery for result in results]
 
@@ -165,12 +165,15 @@ def _run_counts(results: Sequence[Summary], data: RunData) -> Facts:
     """
     episodes = {result.episode for result in results}
     yield "episodes", [f"{len(episodes)}, from {min(episodes)} to {max(episodes)}"]
-    yield "policy seeds", sorted({result.policy_seed for result in results})
+    policy_seeds = {result.policy_seed for result in results}
+    yield "policy seeds", sorted(policy_seeds)
     yield "trials played", [len(results)]
     errors = Counter(result.error for result in results if result.outcome == "error")
     yield "errors, in no rate", [errors or 0]
-    yield "trials planned and not played", [sum(cell.missing for cell in data.cells.values())]
-    yield "trials begun again", [sum(result.attempt > 1 for result in results)]
+    missing = sum(cell.missing for cell in data.cells.values())
+    yield "trials planned and not played", [missing]
+    begun_again = sum(result.attempt > 1 for result in results)
+    yield "trials begun again", [begun_again]
 
 
 def _of_policy(record: Record) -> Facts:

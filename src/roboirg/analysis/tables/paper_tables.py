@@ -96,15 +96,11 @@ def make_table(
     if shows_published:
         rows += _published_rows(table, columns)
     rows = list(with_best(_compared_rows(table, columns, _in_order(table, rows))))
-    return Table(
-        key=table.name,
-        title=table.title,
-        heads=table.heads,
-        columns=columns,
+    notes = notes_of(table, columns, rows, results, floors)
+    if table.heads == (POLICY, "setting"):
         # Last, because the best policy was sought among a setting's rows, which this divides.
-        rows=_by_policy(rows) if table.heads == (POLICY, "setting") else rows,
-        notes=notes_of(table, columns, rows, results, floors),
-    )
+        rows = _by_policy(rows)
+    return Table(table.name, table.title, table.heads, columns, rows, notes)
 
 
 def _in_order(table: PaperTable, rows: Sequence[Row]) -> Sequence[Row]:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.results.frame import Frame
 from roboirg.analysis.results.option_labels import (
     REFERENCE_OPTIONS,
     options_label,
@@ -46,18 +47,7 @@ def make_rewriter_table(data: RunData) -> Table:
     Raises:
         InvalidValueError: no policy was played both alone and behind a rewriter.
     """
-    frame = data.without_control_arms.frame
-    cells = gather(frame, ("run", "options"))
-    names = frame.names
-    rows = []
-    for behind, alone in _pairs(list(names)):
-        explicit = cells.get((alone, REFERENCE_OPTIONS))
-        for options in _shared_options(cells, behind, alone):
-            said = cells[alone, options]
-            rewritten = cells[behind, options]
-            if explicit is not None and options != REFERENCE_OPTIONS:
-                tasks = _rates_of_tasks([rewritten, said, explicit])
-                rows.append(Row(options_label(options), names[behind], _words(tasks)))
+    rows = list(_rows(data.without_control_arms.frame))
     if not rows:
         raise InvalidValueError(
             "No policy was played alone and behind a rewriter, in the same settings and in "
@@ -73,6 +63,24 @@ def make_rewriter_table(data: RunData) -> Table:
         rows=rows,
         notes=(_NOTE,),
     )
+
+
+def _rows(frame: Frame) -> Iterator[Row]:
+    """Yield a row for each rewriter, policy and setting that is not explicit.
+
+    The policy must have been played alone and behind the rewriter in the setting, and alone in the
+    explicit one.
+    """
+    cells = gather(frame, ("run", "options"))
+    for behind, alone in _pairs(list(frame.names)):
+        explicit = cells.get((alone, REFERENCE_OPTIONS))
+        if explicit is None:
+            continue
+        for options in _shared_options(cells, behind, alone):
+            if options != REFERENCE_OPTIONS:
+                groups = [cells[behind, options], cells[alone, options], explicit]
+                words = _words(_rates_of_tasks(groups))
+                yield Row(options_label(options), frame.names[behind], words)
 
 
 def _pairs(policy_runs: Sequence[PolicyRun]) -> Iterator[_Rewritten]:
@@ -101,20 +109,24 @@ def _shared_options(
 def _words(tasks: Sequence[TaskRates]) -> list[str]:
     """Return the cells of a row: episodes, the three rates, the share and its interval.
 
+    For example ``["50", "40", "60", "80", "50", "35 to 70"]``.
+
     Args:
         tasks: of each task the rates rewritten, as said, and in explicit words.
     """
     if not tasks:
         return ["0", *[NOT_APPLICABLE] * 5]
-    episodes = str(sum(len(task.weights) for task in tasks))
+    cells = [str(sum(len(task.weights) for task in tasks))]
     rewritten, said, explicit = mean_rates(tasks)
-    shown_rates = list(map(whole_percent, (said, rewritten, explicit)))
+    for rate in (said, rewritten, explicit):
+        cells.append(whole_percent(rate))
     interval = share_interval(tasks)
     if interval is None:
-        return [episodes, *shown_rates, NO_SHARE, NOT_APPLICABLE]
+        return [*cells, NO_SHARE, NOT_APPLICABLE]
     share = (rewritten - said) / (explicit - said)
-    low, high = map(whole_percent, interval)
-    return [episodes, *shown_rates, whole_percent(share), f"{low} to {high}"]
+    cells.append(whole_percent(share))
+    cells.append(f"{whole_percent(interval.low)} to {whole_percent(interval.high)}")
+    return cells
 
 
 def _rates_of_tasks(groups: Sequence[ByTask]) -> list[TaskRates]:

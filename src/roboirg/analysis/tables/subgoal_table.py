@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
 from roboirg.analysis.measures.planner_failures import PLANNER_FAILURES, planner_failure
 from roboirg.analysis.measures.run_data import RunData
@@ -68,28 +68,37 @@ def make_subgoal_table(data: RunData) -> Table:
     if not counts_by_cell:
         raise InvalidValueError("No policy of the runs named a subgoal or asked a model.")
     # Only failures and costs that occur have columns.
-    occurring: set[str] = set()
-    for counts in counts_by_cell.values():
-        occurring.update(name for name in counts if counts[name] > 0)
-    failures = [name for name in PLANNER_FAILURES if name in occurring]
-    costs = [name for name in _COSTS if name in occurring]
-
+    failures = _occurring(PLANNER_FAILURES, counts_by_cell.values())
+    costs = _occurring(_COSTS, counts_by_cell.values())
     rows = []
     for key, counts in counts_by_cell.items():
         group = data.frame.group_label(key.policy_run, key.options)
         rows.append(Row(group, key.task, list(_words(counts, failures, costs))))
-    notes = [_NOTE]
-    if failures:
-        meanings = "; ".join(f"{failure}: {PLANNER_FAILURES[failure]}" for failure in failures)
-        notes.append(f"Failed episodes, by what the planner did: {meanings}.")
     return Table(
         key="subgoals",
         title="Subgoals of planners, and what models cost",
         heads=("policy and setting", "task"),
         columns=_columns(failures, costs),
         rows=rows,
-        notes=notes,
+        notes=_notes(failures),
     )
+
+
+def _occurring(names: Iterable[str], cells: Collection[Counter[str]]) -> list[str]:
+    """Return those of some names that any cell has counted, in their order."""
+    found = []
+    for name in names:
+        if any(counts[name] > 0 for counts in cells):
+            found.append(name)
+    return found
+
+
+def _notes(failures: Sequence[str]) -> list[str]:
+    """Return the sentences below the table; they explain the failures that have columns."""
+    if not failures:
+        return [_NOTE]
+    meanings = "; ".join(f"{failure}: {PLANNER_FAILURES[failure]}" for failure in failures)
+    return [_NOTE, f"Failed episodes, by what the planner did: {meanings}."]
 
 
 def _columns(failures: Iterable[str], costs: Iterable[str]) -> list[Column]:

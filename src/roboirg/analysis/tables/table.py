@@ -43,7 +43,7 @@ class Entry:
         interval: 95 %, of the rate; None if it is unknown.
         differences: from the published rate's conditions; None without a published rate.
         style: color of the text in a terminal, or empty.
-        episodes: which ones the rate is of, in any form that tells others apart; None if unknown.
+        episodes: which ones the rate is of, in any form that differs for others; None if unknown.
     """
 
     percent: Decimal | None = None

@@ -211,5 +211,5 @@ class FrameColumns:
 
 
 def _feature(dtype: str, names: list[str]) -> dict[str, Any]:
-    """Return what ``info.json`` says of a column of so many numbers."""
+    """Return what ``info.json`` says of a column whose rows are vectors with a name per number."""
     return {"dtype": dtype, "shape": [len(names)], "names": names}

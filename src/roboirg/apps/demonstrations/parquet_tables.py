@@ -71,7 +71,8 @@ def write_frames(
     tables = []
     for columns in own:
         every_column = {**shared, **columns}
-        tables.append(pa.table({name: every_column[name] for name in features}))
+        in_order = {name: every_column[name] for name in features}
+        tables.append(pa.table(in_order))
     table = pa.concat_tables(tables)
     if is_described:
         types = {name: _hugging_face_type(feature) for name, feature in features.items()}

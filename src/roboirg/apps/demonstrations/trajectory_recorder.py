@@ -496,7 +496,7 @@ def _with_pixels(templates: Sequence[str], due_subgoals: Sequence[str]) -> list[
         templates: what the robot was doing in each row, with ``{at}`` where the pixel goes.
         due_subgoals: what was due in each row, with its pixel.
     """
-    with_pixel: dict[str, str] = {}  # by the text without it; later rows replace earlier ones
+    with_pixel = {}  # by the text without it; later rows replace earlier ones
     filled = []
     for template, due in zip(templates, due_subgoals, strict=True):
         with_pixel[without_pixel(due)] = due

@@ -113,19 +113,26 @@ def _summed_up(
     """
     kept: Plans = {plan.fingerprint: plan for plan in read_kept_plans(folder)}
     planned = _slugs(read_plans(folder))
-    recorded = {identity_key(entry) for entry in entries}
-    missing = {slug for key, slug in planned.items() if key not in recorded}
     failed = sorted(result for result in checks if result.findings)
+    outcomes = Counter(entry.outcome for entry in entries)
+    notes = [*_plan_notes(planned, kept, entries), *_excuses(failed, entries)]
     return Verification(
         records=len(entries),
         checks=tuple(failed),
-        missing=tuple(sorted(missing)),
+        missing=_missing(planned, entries),
         verdicts=Counter(result.replayed for result in checks),
         deviation=_largest_tolerated(checks),
         faults=tuple(_faults(kept, entries)),
-        errors=sum(entry.outcome == "error" for entry in entries),
-        notes=(*_plan_notes(planned, kept, entries), *_excuses(failed, entries)),
+        errors=outcomes["error"],
+        notes=tuple(notes),
     )
+
+
+def _missing(planned: Mapping[RecordKey, str], entries: Iterable[Summary]) -> tuple[str, ...]:
+    """Return the slugs of planned episodes without a record, sorted."""
+    recorded = {identity_key(entry) for entry in entries}
+    missing = {slug for key, slug in planned.items() if key not in recorded}
+    return tuple(sorted(missing))
 
 
 def _largest_tolerated(checks: Iterable[RecordCheck]) -> float:

@@ -49,16 +49,26 @@ def check_expert(player: PolicyPlayer, record: RecordExpert | None) -> Iterator[
     with ending_checks(_NAME, "act(): "):
         answers = player.ask(episode)
     yield from _check_gripper(answers, moments)
-    holding_still = [np.tile(moment.still, (len(moment.actions), 1)) for moment in moments]
-    still_error = _error(holding_still, moments)
-    answer_error = _error(answers, moments)
     unit = "rad" if player.space is JOINT_ANGLE else "m"
-    most = FITS * still_error
-    yield CheckResult(
+    yield _check_distance(answers, moments, unit)
+
+
+def _check_distance(answers: Chunks, moments: Sequence[ExpertMoment], unit: str) -> CheckResult:
+    """Return a pass if answers are at most half as far from the expert's actions as holding still.
+
+    Args:
+        answers: of the policy, one for each moment.
+        moments: of the expert's episode.
+        unit: of distances, for the message.
+    """
+    holding_still = [np.tile(moment.still, (len(moment.actions), 1)) for moment in moments]
+    most = FITS * _error(holding_still, moments)
+    distance = _error(answers, moments)
+    return CheckResult(
         _NAME,
-        "pass" if answer_error <= most else "note",
+        "pass" if distance <= most else "note",
         f"Distance from what an expert did at {len(moments)} moments: expected at most {most:.3g} "
-        f"{unit}, half of that of holding still, got {answer_error:.3g}.",
+        f"{unit}, half of that of holding still, got {distance:.3g}.",
     )
 
 

@@ -113,7 +113,7 @@ def _play(env: RoboIRGEnv, rows: int, keeper: _PoseKeeper | None) -> ExpertEpiso
     expert = OraclePolicy()
     expert.attach(env)
     expert.reset(instruction, demonstration)
-    moments: list[ExpertMoment] = []
+    moments = []
     for piece in _pieces(expert, rows):
         before = cast("Observation", observation)
         if keeper is not None:

@@ -129,8 +129,8 @@ class _MomentRecorder:
         """Capture the moment after a step for the first reason of these that it has, if any.
 
         In this order: a video or turn has begun, a stage is done, something moves by itself, the
-        step's number is a multiple of `FILLER_STEPS`. Must be called after every step, as stages
-        are told by comparison with the step before.
+        step's number is a multiple of `FILLER_STEPS`. Must be called after every step, as
+        stages are noticed by comparison with the step before.
         """
         judge = env.session.judge
         step = env.session.world.elapsed

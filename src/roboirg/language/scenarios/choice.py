@@ -154,7 +154,7 @@ def explain_misfit(request: InstructionRequest, setting: str, scenarios: Sequenc
     It is called where `choose` has found none. If one would fit without its introduction, the
     introduction names a place or a clue, *the cube in the middle*, that the episode lacks.
     """
-    without_introductions: list[Scenario] = []
+    without_introductions = []
     for scenario in scenarios:
         texts = {**scenario.texts, "introduction": ((),)}
         without_introductions.append(replace(scenario, texts=texts))
@@ -195,7 +195,7 @@ def _draw_people(request: InstructionRequest, scenario: Scenario) -> FillersBySl
     """Draw two different people of a scenario, and return their names and pronouns by slot.
 
     For Leo and Mia: ``person`` *Leo*, ``he`` *he*, ``him`` *him* …, ``person.2`` *Mia*, ``he.2``
-    *she* … Empty if the scenario names nobody.
+    *she* … Empty if the scenario names no people.
     """
     if not scenario.people:
         return {}

@@ -77,28 +77,30 @@ def _spatial_plans(request: InstructionRequest) -> Iterator[ContentPlan]:
 def _plan_by_place(
     request: InstructionRequest, at: int, place: SpokenPlace, form: str | None
 ) -> ContentPlan:
-    """Return the content plan that names a place: *the cube on the left* gives that cube's color.
+    """Return the content plan that names a place instead of a color of the goal.
 
-    For the goal *red*, whose cube is on the left: the pronoun field ``color``, and the words *on
-    the left* in the slots ``place`` and ``place.0``, as sentences may name either.
+    For the goal *red*, whose cube is on the left: every color of the command becomes a pronoun, and
+    a filler with the words *on the left*, which mean red, goes into the slots ``place`` and
+    ``place.0``, as sentences of scenarios have either. *It's dusty on the left. Lift the cube
+    there.*
 
     Args:
         request: the episode.
-        at: index of the color among those of the goal, 0 or 1; the number of the second slot.
+        at: index of the color among those of the goal, 0 or 1, and number of the second slot.
         place: where a thing of this color stands.
-        form: how the place is said, ``spot``, or None for after a noun.
+        form: how the place is said: ``spot``, *on the left*, or None, after a noun, *all the way on
+            the left*.
     """
-    colors = request.color_values
-    color = colors[at]
+    color = request.color_values[at]
     words = place.said(form)
-    value = (Filler(color.slot, "place", color.value, words, form),)
+    fillers = (Filler(color.slot, "place", color.value, words, form),)
     notes: dict[str, object] = {
         "landmarks": [words],
         "landmark_classes": [int(place.kind)],
         "frame": request.frame,
     }
-    pronoun_fields = [other.field for other in colors]
-    return ContentPlan(pronoun_fields, {"place": value, f"place.{at}": value}, notes)
+    pronoun_fields = [value.field for value in request.color_values]
+    return ContentPlan(pronoun_fields, {"place": fillers, f"place.{at}": fillers}, notes)
 
 
 def _with_others_stated(
@@ -125,7 +127,7 @@ def _draw_places(request: InstructionRequest, form: str | None) -> dict[int, Spo
     place is drawn first, or most places would be of the most frequent class. `form` is how places
     are said: ``spot``, or None for after a noun.
     """
-    found: dict[int, SpokenPlace] = {}
+    found = {}
     for index, color in enumerate(request.color_values):
         places = _sayable_places(request, color, form)
         if places:

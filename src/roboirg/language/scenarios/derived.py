@@ -139,7 +139,7 @@ def _references(relation: Relation, results: Sequence[str | int], most: int) -> 
 
     By *one fewer*, 2 and 1 follow from 3 and 2. A number must be from 1 to `most`.
     """
-    found: list[int] = []
+    found = []
     for result in results:
         reference = relation.reference(int(result))
         if reference is None or not 1 <= reference <= most:

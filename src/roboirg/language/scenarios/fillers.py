@@ -121,7 +121,7 @@ class Fillers:
         if form in ("or", "nor"):
             joint = form
             form = None
-        phrases: list[Phrase] = []
+        phrases = []
         for value in self.values[slot.name]:
             words = value.said(form)
             if value.slot:

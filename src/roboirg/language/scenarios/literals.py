@@ -97,7 +97,7 @@ def _goal(literal: LiteralFields, where: str) -> Goal:
         raise InvalidValueError(
             f"{where} has when = {given}; it must have a value for {' and '.join(example_slots)}."
         )
-    values: dict[str, SlotValue] = {}
+    values = {}
     for slot, content in example_slots.items():
         kind = _kind_of(content)
         values[slot] = convert(literal.when[slot], kind, f"{where}, when.{slot}")
@@ -169,7 +169,7 @@ def say_literal(request: InstructionRequest, words: TaskScenarios) -> Instructio
     """
     goal = request.episode.goal
     sentence = words.literals[unordered(goal)]
-    meant_goals: list[Goal] = []
+    meant_goals = []
     for possible_goal in dict.fromkeys((goal, *goals_of(request.episode))):
         if words.literals.get(unordered(possible_goal)) == sentence:
             meant_goals.append(possible_goal)

@@ -110,7 +110,7 @@ class Realizer:
             resolved: whether pointers are replaced by what they stand for, *it* by *the red cube*.
         """
         values = fillers or self._fillers
-        pieces: list[TaggedText] = []
+        pieces = []
         for part in text:
             if isinstance(part, TaggedText):
                 pieces.append(part)
@@ -131,7 +131,7 @@ class Realizer:
         blue one*.
         """
         if slot.name in ("amounts", "reference") and "amounts" in fillers.values:
-            phrases: list[Phrase] = []
+            phrases = []
             for at in range(len(fillers.values["colors"])):
                 text = amount_text(NUMBERS[slot.name], at, NOUNS[at])
                 phrases.append(self.realize(text, fillers))
@@ -384,7 +384,7 @@ def _named_values(words: Phrase) -> set[ReferredValue]:
 
     Of *Lift it twice*: the repeats 2, and not the color.
     """
-    found: set[ReferredValue] = set()
+    found = set()
     for piece in words:
         if piece.tag and piece.tag.role == "antecedent":
             found.add(ReferredValue(piece.tag.slot, piece.tag.value))

@@ -114,7 +114,7 @@ class Scenario(msgspec.Struct, frozen=True):
         fields: all that is no sentence, as written.
         texts: its sentences by field; ``say.color`` may have several, of which one is drawn.
         people: of whom it can speak, each a name with his or her pronouns; empty if it names
-            nobody.
+            no people.
         said: the fields of the command for which it has words that point back: ``("color",)``.
     """
 

@@ -105,7 +105,7 @@ def task_scenarios(task: str) -> TaskScenarios | None:
 
 def written_words() -> Mapping[str, TaskScenarios]:
     """Return the words of each of our tasks that has some, by task, the real robot's included."""
-    found: dict[str, TaskScenarios] = {}
+    found = {}
     for task in all_tasks(SUITES):
         words = task_scenarios(task)
         if words is not None:
@@ -209,7 +209,7 @@ def tasks_in(head: FileFields, where: str) -> Mapping[str, TaskScenarios]:
     mistakes.raise_if_any()
     literals = read_literals(head.literal, head.tasks, mistakes)
     mistakes.raise_if_any()  # without its sentences a task would seem to lack commands
-    words: dict[str, TaskScenarios] = {}
+    words = {}
     for task in head.tasks:
         words[task] = _command_words(head, task, literals[task], mistakes)
     _check_stated(head, words, mistakes)
@@ -310,7 +310,7 @@ def _stated_texts(
         own: those of the file at hand.
         mistakes: of the file at hand.
     """
-    stated: dict[str, Text] = {}
+    stated = {}
     for name, usual_text in usual.items():
         part = mistakes.at(f"stated {name}")
         text = _parse_or_report(own.get(name, usual_text), part)
@@ -491,7 +491,7 @@ def _people_of(fields: ScenarioFields, texts: Sentences) -> tuple[Texts, ...]:
             slots.update(slots_in(text))
     if PEOPLE.isdisjoint(slots):
         return ()
-    people: list[Texts] = []
+    people = []
     for pronoun, names in (fields.people or general().people).items():
         for name in names:
             people.append((name, *PRONOUNS[pronoun]))

@@ -88,7 +88,7 @@ def _check_presence(scenario: Scenario, setting: Setting, mistakes: Mistakes) ->
         needed += CONTEXTUAL
     if setting.content_plans == "direct-rival":
         needed += REMARKS
-    lacking: list[str] = []
+    lacking = []
     for name in dict.fromkeys([*needed, *scenario.texts]):
         if not any(scenario.texts.get(name, ())):
             lacking.append(name)

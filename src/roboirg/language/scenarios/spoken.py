@@ -258,7 +258,7 @@ def _command(request: InstructionRequest, realizer: Realizer, chosen: ScenarioCh
     It has the words before the command, *So,*, then a command of the task with the scenario's
     words, *it*, in its fields. The draws come in the order of the code, which has to stay.
     """
-    field_words: dict[str, Text] = {}
+    field_words = {}
     for name in chosen.scenario.said:
         texts = chosen.scenario.texts[f"say.{name}"]
         field_words[name] = request.sampler.pick(f"{name} words", texts)
@@ -267,7 +267,7 @@ def _command(request: InstructionRequest, realizer: Realizer, chosen: ScenarioCh
     realizer.begin_command()
     lead = _lead(request, chosen)
     lead_words = realizer.realize(lead.text, resolved=request.resolved)
-    fields: dict[str, Phrase] = {}
+    fields = {}
     for name, text in field_words.items():
         fields[name] = realizer.realize_field(name, text, lead.remark)
     return realizer.realize_command(fields, lead_words)

@@ -75,7 +75,7 @@ def find_wordings(identity: str) -> Wordings:
 
 
 def task_words(task: str, setting: str, wordings: str | None) -> TaskScenarios | None:
-    """Return the commands and scenarios of a task for a setting; None if nobody has written any.
+    """Return the commands and scenarios of a task for a setting; None if there are none.
 
     An open wording file comes before the file of the setting, and this one before the file of the
     task.

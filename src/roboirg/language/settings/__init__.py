@@ -68,7 +68,7 @@ def expand_settings(words: Iterable[str]) -> tuple[str, ...]:
     Each name stands there once, those from groups first. Names are not checked.
     """
     names: list[str] = []
-    others: list[str] = []
+    others = []
     for word in words:
         if word.lower() in SETTING_GROUPS:
             names += SETTING_GROUPS[word.lower()]()

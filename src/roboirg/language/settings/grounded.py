@@ -35,7 +35,7 @@ def draw_clues(request: InstructionRequest) -> Clues:
     For the goal *red* it may be *the cube in the middle*. Where a color is described, counts are
     stated, so they have none.
     """
-    clue_by_value: dict[GoalValue, Clue] = {}
+    clue_by_value = {}
     for value in request.goal_values:
         clues = _clues_to(request, value)
         if clues:

@@ -8,8 +8,8 @@
   the simulator.
 - A policy is *foreign* if its code is neither ours nor behind a protocol; it gets a process of its
   own.
-- Its *makeup* is what tells it from others of its name: its code and its options, as pairs of text
-  (`roboirg.core.versions`).
+- Its *makeup* is what distinguishes it from others of its name: its code and its options, as pairs
+  of text (`roboirg.core.versions`).
 """
 
 from __future__ import annotations
@@ -227,7 +227,7 @@ def _makeup(ref: PolicyRef, system: System | None) -> Makeup:
     if ref.kind in (BUILT_IN, CLASS):
         maker = ref.spec
     elif ref.version == UNKNOWN_VERSION and ref.place != "server":
-        # Without a version, only the content of its file tells it from others of its kind.
+        # Without a version, only the content of its file distinguishes it from others.
         maker = f"{ref.kind}:{content_of(ref.target)}"
     options = dict(ref.options)
     if ref.is_foreign:

@@ -102,7 +102,7 @@ def _names(kind: type[BaseModel]) -> list[str]:
 
     A field that is a model itself is a table of options; its options are listed instead.
     """
-    names: list[str] = []
+    names = []
     for name, field in kind.model_fields.items():
         table = field.annotation
         if isinstance(table, type) and issubclass(table, BaseModel):

@@ -268,16 +268,9 @@ class LeRobotPolicy:
         Sets `model` last, so that a checkpoint that could not be loaded is tried again. Whether
         several episodes can be asked about at once depends on where the model gets its noise from.
         """
-        from lerobot.configs.policies import PreTrainedConfig
         from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 
-        config = PreTrainedConfig.from_pretrained(self.place)
-        if self.options.execute is not None:  # checked by LeRobot
-            changes: dict[str, Any] = {"n_action_steps": self.options.execute}
-            if hasattr(config, "temporal_ensemble_coeff"):
-                changes["temporal_ensemble_coeff"] = None
-            config = replace(config, **changes)
-        config.device = self.options.device
+        config = self._read_config()
         self._config = config
 
         shapes: dict[str, object] = {}
@@ -300,6 +293,22 @@ class LeRobotPolicy:
         self._takes_batches = self._noise is not None or draws_nothing
         self.metadata = _describe(config, self._before, self._after)
         self.model = model.to(self.options.device).eval()
+
+    def _read_config(self) -> Any:  # noqa: ANN401
+        """Return LeRobot's configuration of the checkpoint, with the policy's own options.
+
+        With ``execute``, plans are not averaged (ensembled), which needs a plan at every step.
+        """
+        from lerobot.configs.policies import PreTrainedConfig
+
+        config = PreTrainedConfig.from_pretrained(self.place)
+        if self.options.execute is not None:  # checked by LeRobot
+            changes: dict[str, Any] = {"n_action_steps": self.options.execute}
+            if hasattr(config, "temporal_ensemble_coeff"):
+                changes["temporal_ensemble_coeff"] = None
+            config = replace(config, **changes)
+        config.device = self.options.device
+        return config
 
 
 def _pictures(
@@ -336,7 +345,7 @@ def _describe(config: Any, before: object, after: object) -> dict[str, Any]:  # 
         before: its preprocessor.
         after: its postprocessor.
     """
-    inputs: list[str] = []
+    inputs = []
     for name, feature in (config.input_features or {}).items():
         shape = getattr(feature, "shape", "")
         inputs.append(f"{name} {shape}".strip())

@@ -74,7 +74,7 @@ class GoalPlanner(OraclePlanner):
     def plan(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
         """Return the stage to do in words, as things are now; None after the last or for no goal.
 
-        If nobody reports how subgoals end, the simulator shows how many stages are completed.
+        Without reports of how subgoals end, the simulator shows how many stages are completed.
         """
         stages = self._decider.stages
         if stages and not self.reports:

@@ -237,7 +237,7 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
             self._recent[self._last_step] = front_picture(earlier)
         self._recent[step] = front_picture(observation)
 
-        kept_steps: set[int] = set()
+        kept_steps = set()
         for number in range(self.options.recent):
             wanted = step - number * period
             steps_until = [seen for seen in self._recent if seen <= wanted]

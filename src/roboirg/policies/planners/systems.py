@@ -57,7 +57,7 @@ class System(BaseModel):
 
 def all_systems() -> tuple[str, ...]:
     """Return the names of the systems in this package, such as ``GroundSG-QwenVL``, sorted."""
-    names: list[str] = []
+    names = []
     for file in resources.files(PACKAGE).joinpath(FOLDER).iterdir():
         if file.name.endswith(SUFFIX):
             names.append(file.name.removesuffix(SUFFIX))
@@ -85,7 +85,7 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
 
     # Each override changes the URL of the policy, or else the planner.
     policy = system.policy
-    planner_overrides: dict[str, str] = {}
+    planner_overrides = {}
     for option, value in overrides.items():
         if option == SERVER or option.startswith(POLICY):
             policy = _policy_with(policy, option, value, origin)

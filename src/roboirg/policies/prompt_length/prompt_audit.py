@@ -90,7 +90,7 @@ class InstructionAudit(NamedTuple):
         Args:
             spans: for each, the index of its utterance and the character after its end.
         """
-        lost: list[int] = []
+        lost = []
         for index, (utterance, end) in enumerate(spans):
             is_said = utterance < len(self.reached)
             if is_said and end > self.reached[utterance]:
@@ -131,7 +131,7 @@ def most_tokens(text: str) -> Tokens:
     word begins, so that the word is reached with its last token only: ``table`` in three pieces,
     which begins at character 4, has the ends 4, 4 and 9.
     """
-    ends: list[int] = []
+    ends = []
     for found in _WORD.finditer(text):
         word = found[0]
         # A letter beyond ASCII may need a token for each of its bytes.
@@ -154,7 +154,7 @@ def audit_instruction(messages: Sequence[Sequence[str]], limit: PromptLimit) -> 
     """
     least = 0
     most = 0
-    reached: list[int] = []
+    reached = []
     for utterances in messages:
         audit = _audit_message(" ".join(utterances), limit)
         least = max(least, audit.least)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -82,20 +82,29 @@ def _read_sentencepiece(path: str, content: bytes) -> Tokenize:
     encode = getattr(model, "encode_as_immutable_proto", None) or model.encode_as_proto
 
     def tokenize(text: str) -> Tokens:
-        """Return the tokens of a text, each by the character after it.
-
-        Some versions give the byte after it: for *é!*, which has three bytes, 2 and 3, not 1 and 2.
-        """
-        ends = tuple(piece.end for piece in encode(text).pieces)
-        in_bytes = text.encode()
-        # Where the text has more bytes than characters, the last end shows what the ends count.
-        counts_bytes = len(in_bytes) != len(text) and ends[-1:] == (len(in_bytes),)
-        if counts_bytes:
-            ends = tuple(len(in_bytes[:end].decode(errors="ignore")) for end in ends)
+        """Return the tokens of a text: of *lift it* ``Tokens(before=1, ends=(4, 7), after=1)``."""
+        ends = [piece.end for piece in encode(text).pieces]
         # The token before the words stands for the beginning of the text.
-        return Tokens(1, ends, LINE_BREAK_TOKENS)
+        return Tokens(1, _ends_in_characters(text, ends), LINE_BREAK_TOKENS)
 
     return tokenize
+
+
+def _ends_in_characters(text: str, ends: Sequence[int]) -> tuple[int, ...]:
+    """Return where tokens end, in characters from the beginning of their text.
+
+    For *é!*, which has two characters and three bytes, ``(1, 2)`` from ``[1, 2]`` and from
+    ``[2, 3]``.
+
+    Args:
+        text: that was split.
+        ends: ascending, all in characters or all in bytes of UTF-8; the last token ends the text.
+    """
+    in_bytes = text.encode()
+    # The last end shows what they count; if the text has as many bytes as characters, both.
+    if not ends or ends[-1] != len(in_bytes):
+        return tuple(ends)
+    return tuple(len(in_bytes[:end].decode(errors="ignore")) for end in ends)
 
 
 def _read_json(path: str, content: bytes) -> Tokenize:

@@ -151,7 +151,7 @@ def goal_schema(task: str) -> GoalSchema:
     known_task = get_task(task)
     answers = _whole_answers(known_task)
     goals = {_canonical(answer): goal for goal, answer in answers.items()}
-    fields: list[Field] = []
+    fields = []
     for name in next(iter(answers.values())):
         values = [answer[name] for answer in answers.values()]
         fields.append(_field(name, values))

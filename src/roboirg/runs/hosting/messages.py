@@ -210,7 +210,7 @@ def _message_parts(message: object) -> list[bytes | memoryview]:
     They are the size of the message, the message itself, in which an array is replaced by its type
     and shape, and the bytes of each array.
     """
-    arrays: list[memoryview] = []
+    arrays = []
 
     def set_aside(value: object) -> Ext:
         """Leave an array's type and shape in the message; its bytes are sent after that."""

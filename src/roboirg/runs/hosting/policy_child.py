@@ -46,9 +46,9 @@ PERIOD_S = 0.25
 
 
 class _LifeCheck:
-    """What a policy's process answers when it is asked, which it does only between two calls.
+    """Asks a policy's process whether it hangs; it answers only between two calls of the policy.
 
-    Several worlds may ask at the same time; one answer is for all that wait for it.
+    The other half, which answers, is `roboirg.runs.hosting.host_process`.
 
     Args:
         line: to the process, on which it also sends a byte when it has started.
@@ -61,31 +61,38 @@ class _LifeCheck:
         self._has_started = False
 
     def passes(self, limit_s: float) -> bool:
-        """Return whether the process answers a question in time, which it does between two calls.
+        """Return whether the process answers in time; False, too, if it has ended.
 
-        The question is a request, the answer any byte. Several threads may ask, one after the
-        other, as they share the line: a thread that waited takes an answer that another one got
-        meanwhile as its own, and asks nothing.
+        Several threads may call this. They share the line, so they ask one after the other; one
+        that waited for its turn takes an answer that came meanwhile as its own, and asks nothing.
 
         Args:
-            limit_s: how long a call may take; a process that has not started yet gets `GRACE_S` at
-                least.
+            limit_s: seconds that a call may take, and so the answer.
         """
-        asked_at = time.monotonic()
+        called_at = time.monotonic()
         with self._asking, contextlib.suppress(OSError):
-            if self._answered_at > asked_at:  # to another world, meanwhile
-                return True
-            # What it has sent before it is asked is no answer; it only shows that it has started.
-            if wait([self._line], 0.0) and self._line.recv(MAX_OUTPUT):
-                self._has_started = True
-            ask(self._line, HostRequest("check"))
-            patience_s = limit_s + MARGIN_S
-            if not self._has_started:
-                patience_s = max(limit_s, GRACE_S)
-            if wait([self._line], patience_s) and self._line.recv(1):
-                self._answered_at = time.monotonic()
-                return True
+            return self._answered_at > called_at or self._answers(limit_s)
         return False
+
+    def _answers(self, limit_s: float) -> bool:
+        """Ask the process, and return whether it answers in time. Only one thread may ask at once.
+
+        The question is the request ``check``, the answer any byte. A process that has not started
+        yet gets at least `GRACE_S` to answer.
+        """
+        # What it has sent before it is asked is no answer; it only shows that it has started.
+        if wait([self._line], 0.0) and self._line.recv(MAX_OUTPUT):
+            self._has_started = True
+        ask(self._line, HostRequest("check"))
+        patience_s = limit_s + MARGIN_S
+        if not self._has_started:
+            patience_s = max(limit_s, GRACE_S)
+        if not wait([self._line], patience_s):
+            return False
+        answer = self._line.recv(1)  # empty if the process has ended
+        if answer:
+            self._answered_at = time.monotonic()
+        return bool(answer)
 
 
 class PolicyChild:

@@ -100,13 +100,27 @@ class PolicyLine:
     def call(self, call: Call, answer: AnswerQuestion | None = None) -> Outcome:
         """Carry out a call in the policy's process; return its outcome, maybe the policy's error.
 
-        What goes wrong is the policy's error (EpisodeError) if the process had begun this very
-        call; before that a call of another episode may be to blame, so this episode is lost
-        (EpisodeLostError) and played again. Only not to begin in time is an error in any case.
+        The process serves several episodes, one call after the other: this call waits for its turn,
+        is begun, and then has the time limit for itself. When it fails decides whose fault it is:
+
+        =============================  =========================  ==================================
+        what happens                   before the call is begun   afterwards
+        =============================  =========================  ==================================
+        the time is over               EpisodeError               EpisodeError
+        the process ends by itself     EpisodeLostError           EpisodeError
+        it is ended for another one    EpisodeLostError           EpisodeLostError
+        it sends something else        EpisodeLostError           EpisodeError
+        the policy raises              (cannot be)                an outcome with `error`
+        =============================  =========================  ==================================
+
+        An episode that is lost (EpisodeLostError) is played again. So is one whose call was begun
+        together with those of other episodes, whatever happens but a wait in vain for its turn.
+        After any exception the line is closed, but for an outcome with `error` of several.
 
         Args:
-            call: of the policy.
-            answer: returns the world's answer to a question of the process; None if it has none.
+            call: method of the policy, with its arguments.
+            answer: returns the world's answer to a question of the process; None if the call may
+                ask nothing.
 
         Raises:
             EpisodeError: this call broke the process or took too long, or the process did not

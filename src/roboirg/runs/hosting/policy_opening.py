@@ -54,14 +54,19 @@ def open_policy(
         raise MissingDependencyError(outcome.message)
     if outcome.error is not None:
         raise InvalidValueError(outcome.message)
-    needs = outcome.needs
-    version = outcome.version
-    if ref.place == "split":
-        hands = make_follower(SCRIPTED, 0)
-        needs = PolicyNeeds.of(hands).merge(needs)
-        version = joint_version(outcome, hands)
     # Whether it is privileged is not for its own process to say.
-    return replace(ref, needs=needs, version=version, problem=outcome.message or None)
+    described = replace(
+        ref, needs=outcome.needs, version=outcome.version, problem=outcome.message or None
+    )
+    if ref.place != "split":
+        return described
+    # A planner in its process; the scripted expert follows it in this one.
+    hands = make_follower(SCRIPTED, 0)
+    return replace(
+        described,
+        needs=PolicyNeeds.of(hands).merge(outcome.needs),
+        version=joint_version(outcome, hands),
+    )
 
 
 def _describe(ref: PolicyRef, limit_s: float, settings: HostSettings) -> Outcome:

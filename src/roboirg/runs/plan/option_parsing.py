@@ -108,7 +108,7 @@ def parse_policies(given: Iterable[str]) -> Names:
     Raises:
         InvalidValueError: there is none, or ``NAME=SPEC`` has a name that is not allowed.
     """
-    found: list[str] = []
+    found = []
     for text in given:
         # Addresses and their options may contain commas.
         if "://" in text or "?" in text:
@@ -187,20 +187,27 @@ def parse_episodes(given: object, split: str, tasks: Collection[str]) -> Numbers
     levels = [word for word in words if word in DIFFICULTIES]
     positions = [word for word in words if word not in DIFFICULTIES]
 
-    ranges: list[range] = []
-    # A number alone is how many, and no position; a negative one is refused as such.
-    if re.fullmatch(rf"-?{_NUMBER}", str(given).strip()):
-        ranges = [_first_episodes(positions[0])]
-    elif positions:
-        ranges = _parse_ranges("episode", positions, _EPISODES_HINT)
+    ranges = _ranges_of(positions, given)
     if isinstance(given, str | int):
         _check_positions(ranges, split)
-
     found: list[int] = []
     if levels:
         found += _episodes_of_levels(levels, split, tasks)
     found += _union(ranges)
     return distinct(found)
+
+
+def _ranges_of(positions: Sequence[str], given: object) -> Sequence[range]:
+    """Return the episodes that positions stand for: ``7`` is ``[7, 8)``, ``0-2`` is ``[0, 3)``.
+
+    Only if a number alone is `given`, it is how many: ``4`` is ``[0, 4)``; a negative one is
+    refused as such.
+    """
+    if re.fullmatch(rf"-?{_NUMBER}", str(given).strip()):
+        return [_first_episodes(positions[0])]
+    if not positions:
+        return []
+    return _parse_ranges("episode", positions, _EPISODES_HINT)
 
 
 def _check_positions(ranges: Iterable[range], split: str) -> None:

@@ -32,7 +32,7 @@ from roboirg.language.settings import (
 )
 from roboirg.policies.by_name.key_variables import check_variables
 from roboirg.records.record import Job, Summary
-from roboirg.records.record_codec import RecordKey, identity_key
+from roboirg.records.record_codec import identity_key
 from roboirg.runs.hosting.policy_opening import open_policy
 from roboirg.runs.job_instruction import instruct_job
 from roboirg.runs.plan.option_parsing import Names
@@ -145,7 +145,7 @@ class Plan(PlanFields):
         # Jobs that differ only in the arm are one trial: as if they were of the usual arm, they
         # have equal keys.
         counts: Counter[str] = Counter()
-        trials: set[RecordKey] = set()
+        trials = set()
         for job in jobs:
             counts[job.arm] += 1
             trials.add(identity_key(msgspec.structs.replace(job, arm=TOLD)))

@@ -207,7 +207,7 @@ def _ranges(numbers: Sequence[int]) -> str:
     """Return numbers as typed: ``0-3,7`` for 0, 1, 2, 3 and 7; ``7,`` for 7 alone."""
     if len(numbers) == 1:
         return f"{numbers[0]},"  # without the comma it would mean the first episodes
-    texts: list[str] = []
+    texts = []
     first = last = None
     for number in numbers:
         if last is not None and number == last + 1:  # it continues the last range

@@ -93,7 +93,7 @@ class LocalProcesses:
         # With a process on every core, more threads in Mesa would not help.
         limit_threads = self.workers >= core_count()
         active: list[Worker] = []
-        released: list[Worker] = []
+        released = []
         with open_hosts(play) as connect:
             try:
                 while jobs or active:

@@ -458,6 +458,15 @@ class RayPool:
             shown = "; ".join(f"{name}: {fault}" for name, fault in faults.items())
             raise RoboIRGError(f"No machine of the Ray cluster can play ({shown}).")
 
+    def _watched(self) -> list[_Machine | _Worker]:
+        """Return what must give signs of life: the agents of all usable machines, busy workers."""
+        watched: list[_Machine | _Worker] = []
+        for machine in self._machines.values():
+            if machine.fault is None and machine.actor is not None:
+                watched.append(machine)
+        watched += [worker for worker in self._workers if worker.job is not None]
+        return watched
+
     def _end_silent(self) -> Iterator[Record]:
         """Ask agents and busy workers for a sign of life; give up those that do not answer.
 
@@ -467,12 +476,7 @@ class RayPool:
             A record of an error for each job that was lost.
         """
         now = time.monotonic()
-        asked: list[_Machine | _Worker] = []
-        for machine in self._machines.values():
-            if machine.fault is None and machine.actor is not None:
-                asked.append(machine)
-        asked += [worker for worker in self._workers if worker.job is not None]
-        for process in asked:
+        for process in self._watched():
             if isinstance(process, _Worker) and process not in self._workers:
                 continue  # it was lost with its machine's agent
             silence_s = now - process.heard_at

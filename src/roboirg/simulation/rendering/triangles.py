@@ -109,8 +109,8 @@ class _VertexList:
 
         Args:
             number: of the triangle.
-            corners: (3,) positions of its corners.
-            normal: of the triangle.
+            corners: (3,) ids of the positions of its corners.
+            normal: id of its normal.
         """
         for corner, position in enumerate(corners):
             if (position, normal) in self.with_normal:
@@ -122,22 +122,32 @@ class _VertexList:
         return fewest
 
     def vertices_of(self, corners: Sequence[int], normal: int, first: int) -> list[int]:
-        """Return the three vertices of a triangle, in the same sense of rotation.
+        """Return the numbers of the three vertices of a triangle, in its order of corners.
 
-        The second and third are those with the nearest numbers to the first, which are likely to be
-        in the graphics processor's vertex cache as well.
+        A triangle that begins with corner 2 gets vertices at its corners 2, 0 and 1, so that it
+        still faces the same side. Only the first must have its normal; of those at the position
+        of each other corner it takes the one with the nearest number to the first, which is likely
+        to be in the graphics processor's vertex cache as well.
+
+        Needs a vertex at every position, so all triangles must have begun before.
 
         Args:
-            corners: (3,) positions of its corners.
-            normal: of the triangle.
-            first: the corner that it begins with, as `begin_triangle` returned it.
+            corners: (3,) ids of the positions of its corners.
+            normal: id of its normal.
+            first: the corner that it begins with, 0 to 2, as `begin_triangle` returned it.
         """
         first_vertex = self.with_normal[corners[first], normal]
-        found = [first_vertex]
-        for corner in (first + 1, first + 2):
-            candidates = self.at[corners[corner % 3]]
-            found.append(min(candidates, key=lambda vertex: abs(vertex - first_vertex)))
-        return found
+
+        def distance(vertex: int) -> int:
+            return abs(vertex - first_vertex)
+
+        second = corners[(first + 1) % 3]
+        third = corners[(first + 2) % 3]
+        return [
+            first_vertex,
+            min(self.at[second], key=distance),
+            min(self.at[third], key=distance),
+        ]
 
 
 def duplicate_vertices(indexed: IndexedTriangles) -> IndexedTriangles:

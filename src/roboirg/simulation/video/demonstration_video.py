@@ -79,7 +79,7 @@ def make_video(
     """
     frames = spec.demonstration_frames
     every = frames if isinstance(frames, int) else 1
-    sequences: dict[str, FrameSequence] = {}
+    sequences = {}
     if frames != "none":
         for field, kind in picture_fields(spec).items():
             sequence = FrameSequence(episode, recording, field, kind, every, spec.rendering)

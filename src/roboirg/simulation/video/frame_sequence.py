@@ -79,7 +79,7 @@ def read_frames(sequences: Sequence[FrameSequence]) -> list[NDArray[Any]]:
     """
     cache = open_cache("frames")
     pictures = [_Pictures(sequence, sequence.empty()) for sequence in sequences]
-    missing: list[_Pictures] = []
+    missing = []
     for sequence, array in pictures:
         if not array.size:
             continue

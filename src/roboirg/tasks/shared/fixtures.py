@@ -198,7 +198,7 @@ def draw_cubes(
     Returns them in the order of `plans`. A plan is asked for after the draws of the one before.
     """
     taken = list(obstacles)
-    drawn: list[SceneObject] = []
+    drawn = []
     for plan in plans:
         cube = draw_item(rng, plan, taken)
         drawn.append(cube)
@@ -274,7 +274,7 @@ def draw_targets(
     Returns them in the order of `plans`.
     """
     taken = list(obstacles)
-    targets: list[SceneObject] = []
+    targets = []
     for plan in plans:
         target = draw_target(rng, plan, taken)
         targets.append(target)

@@ -32,7 +32,7 @@ def layout_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ...
     angle = 2.0 * math.pi * rng.random()
     cos = math.cos(angle)
     sin = math.sin(angle)
-    points: list[PlanePoint] = []
+    points = []
     for x, y in pattern:
         turned_x = cos * x - sin * y
         turned_y = sin * x + cos * y

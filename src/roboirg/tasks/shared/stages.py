@@ -76,7 +76,7 @@ def placing_stages(kind: str, color: str, repeats: int) -> list[Stage]:
     ``("cube", "red", 2)`` -> pick up ``cube_red``, place it, pick it up again, place it again.
     """
     name = f"{kind}_{color}"
-    plan: list[Stage] = []
+    plan = []
     for ordinal in ORDINALS[:repeats]:
         pick = f"pick up the {color} {kind} {{at}} for the {ordinal} time"
         put = f"place the {color} {kind} onto the target {{at}}"

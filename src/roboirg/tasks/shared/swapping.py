@@ -39,7 +39,7 @@ def plan_swaps(
             that is not known. At most as many as `initiators`.
     """
     places = {item.name: item.position for item in objects}
-    swaps: list[Swap] = []
+    swaps = []
     for first, partner in itertools.zip_longest(initiators, partners):
         second = partner or nearest(places, first)
         others = [name for name in places if name not in (first, second)]

@@ -78,7 +78,7 @@ def draw_containers_in(
     then the yaw.
     """
     taken = list(obstacles)
-    containers: list[SceneObject] = []
+    containers = []
     for index, region in enumerate(regions):
         spot = _free_spot(rng, region, gap, taken)
         if spot is None:

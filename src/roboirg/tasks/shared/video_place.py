@@ -144,7 +144,7 @@ def _demonstration_of(past: Sequence[Fact]) -> tuple[Stage, ...]:
     *Placed on target_0, pressed* -> pick, place on target_0, press, and then what ends every video:
     put the cube back, move away, hold still, go home.
     """
-    plan: list[Stage] = []
+    plan = []
     cube = ""
     for fact in past:
         if fact.kind == "pressed":

@@ -48,7 +48,7 @@ def plain(value: object) -> Plain:
     if type(value) in PLAIN_TYPES:
         return value  # type: ignore[return-value] # mypy does not narrow by `in`
     kind = type(value).__name__
-    row: dict[str, Plain] = {}
+    row = {}
     for field in fields_of(value):
         if (kind, field.name) not in NOT_COUNTED:
             name = HASHED_AS.get((kind, field.name), field.name)

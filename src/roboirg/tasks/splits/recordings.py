@@ -66,7 +66,7 @@ def _recorded_indices(task: str, split: str) -> frozenset[int]:
     file = _file(task, split)
     if not file.is_file():
         return frozenset()
-    indices: set[int] = set()
+    indices = set()
     with file.open("rb") as opened, zipfile.ZipFile(opened) as archive:
         for member in archive.namelist():
             found = _MEMBER.match(member)

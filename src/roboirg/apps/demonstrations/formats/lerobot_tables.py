@@ -44,13 +44,14 @@ def read_tables(root: Path) -> Iterator[ReplayableTrajectory]:
     action = _present(_ACTIONS, info)
     files = sorted((root / "data").rglob("*.parquet"))
     frames = parquet.ParquetDataset(files).read(columns=[state, action])
-    seen: set[str] = set()
+    seen = set()
     for row in read_rows(root / EPISODE_TABLE):
-        if row["trajectory"] not in seen:  # else it is of another instruction
-            seen.add(row["trajectory"])
-            after_video = row["from_index"] + row["video_length"]
-            own = frames.slice(after_video, row["length"] - row["video_length"])
-            yield _trajectory(row, own[state].to_pylist(), own[action].to_pylist())
+        if row["trajectory"] in seen:
+            continue  # the same with another instruction
+        seen.add(row["trajectory"])
+        after_video = row["from_index"] + row["video_length"]
+        own = frames.slice(after_video, row["length"] - row["video_length"])
+        yield _trajectory(row, own[state].to_pylist(), own[action].to_pylist())
 
 
 def _trajectory(

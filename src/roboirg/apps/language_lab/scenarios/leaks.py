@@ -33,7 +33,7 @@ def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
     """
     text = _ONE_THING.sub("", _without_references(instruction).lower())
     words = set(re.findall(r"[a-z0-9]+", text))
-    leaked: set[str] = set()
+    leaked = set()
     for slot in hidden_slots(instruction, goal):
         leaked |= words & _spellings(goal[slot])
     for landmark in cast("list[str]", instruction.metadata["landmarks"]):

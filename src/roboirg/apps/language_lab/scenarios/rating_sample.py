@@ -32,7 +32,7 @@ scene, text."""
 def draw_sample(tasks: Sequence[str], settings: Sequence[str], seed: int) -> list[SampledText]:
     """Return up to `TEXTS` texts of each setting for a blind rating, shuffled.
 
-    Each is of another *frame*, the situation that a text tells of, such as a school trip. Equal
+    Each is of another *frame*, the situation that a text describes, such as a school trip. Equal
     arguments give the same sample.
 
     Args:
@@ -54,7 +54,7 @@ def draw_sample(tasks: Sequence[str], settings: Sequence[str], seed: int) -> lis
 
 
 def _texts(task: str, setting: str, seed: int) -> Iterator[SampledText]:
-    """Yield a text of a task for each frame (the situation that it tells of), up to `TEXTS`.
+    """Yield a text of a task for each frame (the situation that it describes), up to `TEXTS`.
 
     They are from random scenes that only this seed uses, in the words of the test pool. In a
     setting without frames, each scene gives a text.

@@ -95,7 +95,7 @@ def check_scenarios(
         name: of the frame (the situation) whose scenarios are checked; None for all.
         scenes: episodes of the task; at least one.
     """
-    reports: list[ScenarioReport] = []
+    reports = []
     for scenario in words.scenarios:
         if name in (None, scenario.fields.frame):
             reports.append(check_scenario(scenario, words, scenes))
@@ -409,22 +409,21 @@ def _unclear_references(instruction: Instruction, scenario: Scenario) -> Iterato
     """
     # "Red or blue? Red is gone." names one of two again, and so says which one is meant.
     is_named_again = "taken" in slots_in(scenario.text("introduction"))
-    has_list = bool(scenario.fields.list)
     has_chosen = is_named_again  # whether one of the list has been chosen so far
-    antecedents: list[Mention] = []
+    antecedents = []  # that came so far
     for mention in instruction.mentions:
         if mention.role == "antecedent":
             if instruction.utterances[mention.utterance].stage != "distractor":
                 antecedents.append(mention)
             continue
-        values = [
-            str(other.value) for other in _possible_antecedents(mention, antecedents, instruction)
-        ]
+        # Any other mention points back.
+        possible = _possible_antecedents(mention, antecedents, instruction)
+        values = [str(antecedent.value) for antecedent in possible]
         words = repr(instruction.span(mention))
         yield from _wrong_antecedents(mention, words, values, is_named_again=is_named_again)
         if mention.expression in _CHOOSING_CLASSES:
             has_chosen = True
-        elif not (has_list and has_chosen):
+        elif not (scenario.fields.list and has_chosen):
             yield from _ambiguous(mention, words, values)
 
 

@@ -160,7 +160,7 @@ def _rival_named_last(text: Text) -> Iterator[str]:
     *That one* would then mean it. If *before* is meant, *not after but before* is right, and
     *before and not after* is wrong.
     """
-    names: list[str] = []  # in the order of speaking
+    names = []  # in the order of speaking
     for part in text:
         if isinstance(part, Pointer):
             names.append(part.of)

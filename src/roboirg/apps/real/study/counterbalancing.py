@@ -71,7 +71,7 @@ def counterbalanced_order(task: str) -> tuple[Arrangement, ...]:
     episode = get_episode(task, "train", 0)
     first, second = sorted(left_to_right(episode.scene, target_kind(task)))
     numbers = _numbers(episode)
-    ordered: list[Arrangement] = []
+    ordered = []
     # A number has an opposite only where there are two.
     for number, opposite in zip(numbers, reversed(numbers), strict=True):
         ordered.append(Arrangement(first, first, number))

@@ -28,7 +28,7 @@ from roboirg.util.short_hash import short_hash
 NO_KEY = "none"
 """Sent as the key to a server that needs none."""
 _PRICED_TOKENS = 1_000_000
-"""Prices are those of so many tokens."""
+"""How many tokens a price is for."""
 MOST_TOKENS = 100_000_000
 """Of one query or reply: ten times the longest context of a model, ten million tokens."""
 

@@ -148,7 +148,7 @@ class ReplyStore:
         if self.settings.anew:
             return {}
         rows = self._execute(_REPLIES, self.episode, self.calls)
-        replies: dict[str, ModelReply] = {}
+        replies = {}
         for sent, text, input_tokens, output_tokens in rows:
             replies[sent] = ModelReply(
                 without_keys(text), tokens_of(input_tokens), tokens_of(output_tokens)
