@@ -212,6 +212,33 @@ def test_a_round_whose_grasp_failed_unseen_in_the_middle_is_not_a_wrong_count():
     assert failure_of(play) == "missed_grasp"
 
 
+@pytest.mark.parametrize(
+    ("above", "hovers", "failure"),
+    [
+        (("cube_blue",), False, "missed_grasp"),
+        (("cube_blue", "cube_red"), False, "ambiguous_act"),
+        (("cube_red",), False, "wrong_object"),
+        ((), False, "wrong_count"),
+        (("cube_blue",), True, "wrong_count"),
+    ],
+)
+def test_an_empty_hand_that_was_above_the_cube_and_then_at_the_target_missed_it(
+    above, hovers, failure
+):
+    """It pushed the cube, which no fact says; at the button it is not at the target for a cube."""
+    play = played_without_simulator("PickXtimes", 18)  # the blue cube, twice
+    play.play(play.episode.stages[:2])
+    play.tried = {Fact("above", "robot", name) for name in above}
+    play.tick(50).tried = set()
+    play.tick()
+    if hovers:
+        play.hover()
+
+    play.attempt(Fact("emptied", "robot", "target")).press()
+
+    assert failure_of(play) == failure
+
+
 def test_a_swing_that_wobbles_over_a_disc_is_not_a_wrong_count():
     """The red cube is meant to swing once; over the right disc it is twice."""
     play = played_without_simulator("SwingXtimes", 14)

@@ -41,7 +41,8 @@ class DeclaredIntent:
         """
         if self.listens:
             return self._revise_listener(found, episode)
-        last_verdict = self._last_verdict(found.step)
+        verdicts = [verdict for said_at, verdict in self.verdicts if said_at <= found.step]
+        last_verdict = verdicts[-1] if verdicts else ""
         if last_verdict == "right":
             return _not_followed(found)
         if last_verdict in _FAILURE_BY_VERDICT and found.kind != "grounding":
@@ -50,11 +51,6 @@ class DeclaredIntent:
                 _FAILURE_BY_VERDICT[last_verdict], found.subject, found.step, words
             )
         return found
-
-    def _last_verdict(self, step: int) -> str:
-        """Return the verdict of the last subgoal up to a step; empty if there was none."""
-        verdicts = [verdict for said_at, verdict in self.verdicts if said_at <= step]
-        return verdicts[-1] if verdicts else ""
 
     def _revise_listener(self, found: FailureAttribution, episode: Episode) -> FailureAttribution:
         """Return the failure of a policy whose model named the goal that it understood.

@@ -69,14 +69,13 @@ explain it |
     | it moved elsewhere | ``no_attempt`` |
     """
     unmet = replay.unmet()
-    unexpected = _unexpected_act(replay, unmet)
-    # An object that fell where it lies was not put there: then the drop, a slip, decides below.
-    if unexpected is not None and drop_before(replay, unexpected.act) is None:
-        explained = explain_early_act(replay, unexpected.act.fact)
-        return explained or _describe_act(replay, unexpected.failure, unexpected.act)
+    unexpected = _judge_standing_act(replay, unmet)
+    if unexpected is not None:
+        return unexpected
 
+    held = {fact.subject for fact in replay.facts[-1] if fact.traits.grips}
     # With the expected object in the hand, the tries to take it have succeeded: none decides.
-    if not _is_in_hand(replay, unmet):
+    if held.isdisjoint(fact.subject for fact in unmet):
         failed_try = judge_tries(replay)
         if failed_try is not None:
             return failed_try
@@ -86,12 +85,6 @@ explain it |
         return _at_rest(replay)
     # Who missed a grasp and went on without noticing has misunderstood nothing.
     return explain_missing(replay, replay.stages_left) or misunderstanding
-
-
-def _is_in_hand(replay: EpisodeReplay, facts: Sequence[Fact]) -> bool:
-    """Return whether the object of any of some facts is in the hand at the end of the episode."""
-    held = {fact.subject for fact in replay.facts[-1] if fact.traits.grips}
-    return any(fact.subject in held for fact in facts)
 
 
 def explain_early_act(replay: EpisodeReplay, act: Fact) -> FailureAttribution | None:
@@ -126,7 +119,7 @@ def explain_missing(replay: EpisodeReplay, skipped: range) -> FailureAttribution
     meant = _objects_meant_by_any(replay, skipped)
     unnoticed = []
     for slip in find_slips(replay):
-        if slip.subjects <= meant and not is_noticed(replay, slip):
+        if slip.subjects & meant and not is_noticed(replay, slip):
             unnoticed.append(slip)
     if not unnoticed:
         return None
@@ -140,6 +133,8 @@ def explain_missing(replay: EpisodeReplay, skipped: range) -> FailureAttribution
             explained_objects += 1  # the object that was carried past all places
     if explained_objects < missing.objects:
         return None
+    if any(slip.subjects - meant for slip in unnoticed):
+        return describe_slip(replay, unnoticed[0], "ambiguous_act")
     return describe_slip(replay, unnoticed[0])
 
 
@@ -295,23 +290,20 @@ def _describe(
     return FailureAttribution.of(failure, subject, step, f"{words}; {expected}")
 
 
-class _UnexpectedAct(NamedTuple):
-    """An act that is not expected, and the failure that it is."""
+def _judge_standing_act(replay: EpisodeReplay, unmet: Sequence[Fact]) -> FailureAttribution | None:
+    """Return the failure of the last act that still stands and is not expected; None without any.
 
-    act: FactInterval
-    failure: FailureName
-
-
-def _unexpected_act(replay: EpisodeReplay, unmet: Sequence[Fact]) -> _UnexpectedAct | None:
-    """Return the last act that still stands and that the current stage does not expect; else None.
-
-    `unmet` has the facts that the stage expects and that do not hold yet.
+    None also if an object fell where it lies and was not put there: then the drop, a slip, decides.
+    `unmet` has the facts that the current stage expects and that do not hold yet.
     """
     acts = list(_standing_acts(replay))
     for act in reversed(acts):
         failure = _failure_of_act(replay, act.fact, unmet)
-        if failure is not None:
-            return _UnexpectedAct(act, failure)
+        if failure is None:
+            continue
+        if drop_before(replay, act) is not None:
+            return None
+        return explain_early_act(replay, act.fact) or _describe_act(replay, failure, act)
     return None
 
 

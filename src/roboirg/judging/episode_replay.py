@@ -289,7 +289,9 @@ def _spans(events: Sequence[Event], elapsed_steps: int) -> list[_Span]:
     A new span begins at each step with an event, a fact that begins or ceases to hold. Events at 3
     and 7 of 10 steps -> the spans 0 to 2, 3 to 6 and 7 to 10.
     """
-    events_by_step = _events_by_step(events)
+    events_by_step: dict[int, list[Event]] = {0: []}
+    for event in events:
+        events_by_step.setdefault(event.step, []).append(event)
     starts = sorted(step for step in events_by_step if 0 <= step <= elapsed_steps)
     facts_now = set()
     spans = []
@@ -301,14 +303,6 @@ def _spans(events: Sequence[Event], elapsed_steps: int) -> list[_Span]:
                 facts_now.remove(event.fact)
         spans.append(_Span(start, end, frozenset(facts_now)))
     return spans
-
-
-def _events_by_step(events: Sequence[Event]) -> dict[int, list[Event]]:
-    """Return the events at each step that has any, and at step 0."""
-    by_step: dict[int, list[Event]] = {0: []}
-    for event in events:
-        by_step.setdefault(event.step, []).append(event)
-    return by_step
 
 
 def _intervals(events: Sequence[Event]) -> tuple[FactInterval, ...]:

@@ -73,11 +73,7 @@ class FactHistory:
 
     def _count_holding(self, facts: tuple[Fact, ...]) -> int:
         """Return how many of some facts hold at the last evaluation."""
-        count = 0
-        for fact in facts:
-            if fact in self.facts:
-                count += 1
-        return count
+        return sum(fact in self.facts for fact in facts)
 
     def _count_occurrences(self, facts: tuple[Fact, ...], until: int | None) -> int:
         """Return how many times some facts have started to hold, up to a step if one is given."""

@@ -101,37 +101,21 @@ def attribute_failure(
 
     # The first deviation comes before the end, as what follows it can no longer succeed.
     deviation = min(_deviations(replay), key=lambda deviation: deviation.step, default=None)
-    if deviation is None:
-        failure = _attribute_end(replay, timed_out=timed_out, cause=cause)
-    else:
-        failure = _attribute_deviation(replay, deviation)
+    if deviation is not None and deviation.act is not None:
+        failure = _attribute_act(replay, deviation, deviation.act)
+    elif deviation is not None:
+        failure = _attribute_time(replay, deviation)
+    elif timed_out:
+        failure = describe_end_state(replay)
+    else:  # the environment ended the episode, for example at a pose that the arm cannot reach
+        words = f"could not reach a pose: {cause}"
+        failure = FailureAttribution.of("unreachable", None, replay.last_step, words)
     failure = refine_wrong_object(failure, replay, mirrored or {}, deviation)
     # Up to here, steps count since the world began; a declaration counts them in the policy's turn.
     failure = failure._replace(step=failure.step - policy_start_step)
     if intent is None:
         return failure
     return intent.revise(failure, episode)
-
-
-def _attribute_deviation(replay: EpisodeReplay, deviation: _Deviation) -> FailureAttribution:
-    """Return the failure of an episode that could no longer succeed: of an act, or of the time."""
-    if deviation.act is None:
-        return _attribute_time(replay, deviation)
-    return _attribute_act(replay, deviation, deviation.act)
-
-
-def _attribute_end(
-    replay: EpisodeReplay, *, timed_out: bool, cause: str | None
-) -> FailureAttribution:
-    """Return the failure of an episode that ended while it could still succeed.
-
-    If the policy used up its steps, that is what it had not done yet; if not, the environment ended
-    the episode with a cause, for example a pose that the arm cannot reach.
-    """
-    if timed_out:
-        return describe_end_state(replay)
-    words = f"could not reach a pose: {cause}"
-    return FailureAttribution.of("unreachable", None, replay.last_step, words)
 
 
 def _attribute_time(replay: EpisodeReplay, deviation: _Deviation) -> FailureAttribution:
@@ -300,8 +284,7 @@ def _latest_act(replay: EpisodeReplay, violation: Fact | Rule, step: int) -> Fac
     if not acts:
         return None
     still_holding = [act for act in acts if act.lasts_until(step + 1)]
-    latest = max(still_holding or acts, key=lambda act: act.start)
-    return latest.fact
+    return max(still_holding or acts, key=lambda act: act.start).fact
 
 
 def _describe_deviation(replay: EpisodeReplay, deviation: _Deviation) -> str:

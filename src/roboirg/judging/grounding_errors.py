@@ -79,8 +79,4 @@ def _classify_early(fact: Fact, skipped: Sequence[tuple[Fact, ...]]) -> FailureN
 
 def _is_elsewhere(fact: Fact, expected: tuple[Fact, ...]) -> bool:
     """Return whether the same act with the same object is expected at another place."""
-    for other in expected:
-        is_same_act = other.kind == fact.kind and other.subject == fact.subject
-        if is_same_act and other.place != fact.place:
-            return True
-    return False
+    return any(other != fact and other._replace(place=fact.place) == fact for other in expected)

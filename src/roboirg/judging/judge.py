@@ -135,8 +135,6 @@ class _StageWatch:
 
     def next_change(self, history: FactHistory) -> float:
         """Return the next step at which time alone may complete or violate the stage."""
-        if self._met_since is None and not self._elapsed:
-            return math.inf
         changes = [history.next_change(condition) for condition in self._elapsed]
         if self._met_since is not None:
             changes.append(self._met_since + self._stage.lasting)
@@ -207,9 +205,10 @@ def describe_object(name: str, scene: Scene) -> str:
     ``cube_red`` -> *the red cube*, ``target`` -> *the target*, ``container_2`` -> *the container
     over the blue cube*, or *an empty container*.
     """
-    if all(item.name != name for item in scene.objects):
+    try:
+        item = scene[name]
+    except KeyError:
         return name
-    item = scene[name]
     if item.kind != "container":
         noun = item.kind.removeprefix("hidden_")
         return f"the {item.color} {noun}" if item.color else f"the {item.kind}"

@@ -32,6 +32,9 @@ RETRY_STEPS = 120
 WOBBLE_STEPS = 18
 """Control steps within which an object that is over a place again has not been carried away."""
 
+VISIT_STEPS = 40
+"""Control steps for which the hand is above an object to which it went, and not past it."""
+
 MISSES = ("missed_grasp", "missed_press")
 """Slips at which the hand did not reach its object; at all others it lost it, or passed a place."""
 
@@ -65,6 +68,7 @@ def find_slips(replay: EpisodeReplay) -> tuple[Slip, ...]:
         *_lost_objects(replay),
         *_missed_passes(replay),
     ]
+    slips += _empty_rounds(replay, slips)
     slips.sort(key=lambda slip: slip.step)
     return tuple(slips)
 
@@ -116,7 +120,8 @@ def is_noticed(replay: EpisodeReplay, slip: Slip) -> bool:
     """
     if slip.failure not in MISSES:
         return False
-    later_acts = [act for act in _acts_and_tries(replay) if act.step > slip.step]
+    all_acts = _acts_and_tries(replay, find_slips(replay))
+    later_acts = [act for act in all_acts if act.step > slip.step]
     next_act = min(later_acts, key=lambda act: act.step, default=None)
     if next_act is None or next_act.subjects.isdisjoint(slip.subjects):
         return False
@@ -133,14 +138,14 @@ class _Act(NamedTuple):
     subjects: frozenset[str]
 
 
-def _acts_and_tries(replay: EpisodeReplay) -> Iterator[_Act]:
+def _acts_and_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> Iterator[_Act]:
     """Yield all that the hands did or tried, with the objects it was about, in no order.
 
     An empty hand that opens is an act about no object.
     """
     for act in replay.started(FactRole.RAISE, FactRole.PRESS):
         yield _Act(act.start, frozenset({act.subject}))
-    for slip in find_slips(replay):
+    for slip in slips:
         yield _Act(slip.step, slip.subjects)
     for emptied in replay.tried("emptied"):
         yield _Act(emptied.start, frozenset())
@@ -210,6 +215,26 @@ def _lifts_during(replay: EpisodeReplay, hold: FactInterval) -> list[FactInterva
     return lifts
 
 
+def _empty_rounds(replay: EpisodeReplay, slips: Sequence[Slip]) -> Iterator[Slip]:
+    """Yield each empty hand that put down, at a place, what it had gone to just before.
+
+    It was above the object after the last act or slip, so no other slip says how it missed it: it
+    pushed the object, or closed its fingers too high.
+    """
+    act_steps = [act.step for act in _acts_and_tries(replay, slips)]
+    for emptied in replay.tried("emptied"):
+        last_act = max((step for step in act_steps if step < emptied.start), default=0)
+        names = set()
+        for above in replay.tried("above"):
+            is_latest = last_act < above.start < emptied.start
+            if is_latest and replay.end_of(above) - above.start >= VISIT_STEPS:
+                names.add(str(above.fact.place))
+        # A hand that opens at a cube begins a grasp, and a target may be next to the button.
+        is_at_button = FactRole.APPROACH in replay.roles_at(emptied.start)
+        if names and emptied.fact.place not in names and not is_at_button:
+            yield Slip(emptied.start, "missed_grasp", frozenset(names))
+
+
 def _missed_presses(replay: EpisodeReplay) -> Iterator[Slip]:
     """Yield each try to press a button next to which closed fingers came down without pressing it.
 
@@ -276,16 +301,12 @@ def _releases(replay: EpisodeReplay) -> Iterator[_Release]:
             continue
         step = replay.end_of(hold)
         name = hold.subject
-        is_in_air = raises[-1].lasts_until(step) and not _is_lowered(replay, name, step)
+        lowered = replay.tried("lowered", name)
+        is_lowered = any(low.start < step and low.lasts_until(step) for low in lowered)
+        is_in_air = raises[-1].lasts_until(step) and not is_lowered
         expected_facts = facts_of(replay.stage_at(step).expects)
         of_object = tuple(fact for fact in expected_facts if fact.subject == name)
         yield _Release(step, name, is_in_air, of_object)
-
-
-def _is_lowered(replay: EpisodeReplay, name: str, step: int) -> bool:
-    """Return whether the hand has lowered an object, to put it down, when it lets go."""
-    attempts = replay.tried("lowered", name)
-    return any(lowered.start < step and lowered.lasts_until(step) for lowered in attempts)
 
 
 def _has_landed(replay: EpisodeReplay, release: _Release) -> bool:

@@ -62,8 +62,10 @@ def judge_subgoal(
         return "wrong_place" if is_placing else "wrong_thing"
     if said.words == right.words:
         return "right"
-    # A stage may point at nothing; None would stand for all that is inside of nothing.
-    meant = _objects(episode.scene, {*right_things, due.points_at} - {None})
+    # With a container, the cube inside is meant. A stage may point at nothing; None would stand for
+    # all that is inside of nothing.
+    names = {*right_things, due.points_at} - {None}
+    meant = [item for item in episode.scene.objects if item.name in names or item.inside in names]
     # "Pick up the cube" without a color or a point does not name one of several cubes.
     if pointed_at is None and said.is_vaguer(right) and _has_others_of_kind(meant, episode.scene):
         return "wrong_thing"
@@ -168,11 +170,6 @@ def _without_point(subgoal: str) -> str:
     words = " ".join(words.lower().split()).rstrip(".")
     words, _ = split_steps(words)
     return words
-
-
-def _objects(scene: Scene, names: Collection[str | None]) -> list[SceneObject]:
-    """Return the objects of some names, and the cubes that are inside such an object."""
-    return [item for item in scene.objects if item.name in names or item.inside in names]
 
 
 def _has_others_of_kind(meant: Sequence[SceneObject], scene: Scene) -> bool:
