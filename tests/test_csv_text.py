@@ -7,7 +7,9 @@ import pytest
 from roboirg.util.csv_text import csv_text
 
 
-@pytest.mark.parametrize("text", ["=cmd|' /C calc'!A0", "@SUM(1)", "+1+1", "-2+3", "-x", "\t=1"])
+@pytest.mark.parametrize(
+    "text", ["=cmd|' /C calc'!A0", "@SUM(1)", "+1+1", "-2+3", "-x", "\t=1", "-1 (A1+1)"]
+)
 def test_a_text_that_a_spreadsheet_would_compute_gets_an_apostrophe(text):
     """Names come from strangers; "=cmd|…" would start a program when the file is opened."""
     assert csv_text([{"name": text}]).strip() == f"name\n'{text}"
@@ -18,6 +20,8 @@ def test_numbers_intervals_and_plain_texts_are_written_to_csv_as_they_are():
     row = {"change": Decimal("-3.2"), "excess": "-0.0125", "share": "-5%", "name": "pick-2=a"}
     assert csv_text([row]) == "change,excess,share,name\n-3.2,-0.0125,-5%,pick-2=a\n"
 
-    intervals = {"gap": "-12.9 to -0.3", "change": "+6.0 (0.0 to +14.0)"}
-    assert csv_text([intervals]) == "gap,change\n-12.9 to -0.3,+6.0 (0.0 to +14.0)\n"
+    intervals = {"gap": "-12.9 to -0.3", "change": "+6.0 (0.0 to +14.0)", "none": "-5.0 (too few)"}
+    assert csv_text([intervals]) == (
+        "gap,change,none\n-12.9 to -0.3,+6.0 (0.0 to +14.0),-5.0 (too few)\n"
+    )
     assert csv_text([]) == ""
