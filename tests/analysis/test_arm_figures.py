@@ -185,6 +185,19 @@ def test_the_table_of_arms_is_as_stored(snapshot):
     assert get_format("markdown").draw(make_arm_table(data)) == snapshot
 
 
+def test_rates_of_arms_are_rounded_half_up():
+    """Of 16 scenes one is solved when told: 6.25 %, which Python rounds to 6.2."""
+    results = []
+    for scene in range(16):
+        outcome = "failure" if scene else "success"
+        results.append(make_result(outcome, scene))
+        results.append(make_result("failure", scene, arm="silent"))
+
+    (row,) = make_arm_table(RunData(frame_of(results))).rows
+
+    assert str(row.entries[1]).startswith("6.3 (")
+
+
 def test_sentences_that_compare_the_language_use_of_two_policies_are_as_stored(snapshot):
     mine = frame_of(results_of_a_policy_that_mostly_listens())
     knows = frame_of(results_of_policy("knows", SAME_GOAL_IN_EVERY_ARM))

@@ -71,14 +71,14 @@ def test_the_table_of_facts_says_what_was_planned_played_and_begun_again(tmp_pat
 
 
 def test_steps_per_call_are_over_all_episodes_and_without_failed_attempts(tmp_path):
-    """60 steps by 4 calls; a mean of the episodes' 10 and 30 would be 20."""
+    """61 steps by 4 calls, 15.25, is rounded up; a mean of the episodes' numbers would be 20.7."""
     failed = record_of(0, "error", error="policy", steps=50, calls=1, executed=20)
     again = record_of(0, attempt=2, steps=30, calls=3, executed=16)
-    other = record_of(1, steps=30, calls=1, executed=10)
+    other = record_of(1, steps=31, calls=1, executed=10)
 
     found = facts_of_run(tmp_path, failed, again, other)
 
-    assert found["mine"]["control steps per call, mean"] == "15.0"
+    assert found["mine"]["control steps per call, mean"] == "15.3"
     assert found["mine"]["actions executed per call, most"] == "16"
 
 

@@ -143,11 +143,17 @@ def test_the_page_strikes_out_the_words_that_the_model_did_not_read(
 
 @pytest.mark.parametrize("guessed", [True, False])
 def test_a_note_counts_the_episodes_in_which_a_policy_had_to_guess_what_was_meant(guessed):
-    """One of four, or none. Would find a guess that passes for an understood instruction."""
+    """One of four, or none; a fifth is still to be played.
+
+    Would find a guess that passes for an understood instruction.
+    """
     known = make_results("111")
     last = make_result("failure", 3, guessed=guessed)
 
-    (table,) = make_run_tables(frame_of([*known, last]))
+    explicit = InstructionOptions("explicit")
+    unplayed = Job(policy="listener", task="PickXtimes", split="test", episode=4, options=explicit)
+
+    (table,) = make_run_tables(frame_of([*known, last], planned=[unplayed]))
 
     words = "guessed a goal in 1 of 4 episodes, whose words have no meaning for it."
     assert (words in " ".join(table.notes)) == guessed

@@ -98,12 +98,19 @@ def test_an_episode_without_an_end_is_named_by_what_became_of_the_last_subgoal(
 
 
 def test_what_models_cost_is_in_the_table_of_a_policy_that_names_no_subgoal():
-    """A listener that asked a model four times, at a price that is not known."""
+    """A listener that asked a model in two episodes, at a price that is not known.
+
+    It read 1,200.5 tokens in the mean, which is rounded up.
+    """
     options = InstructionOptions("explicit")
     job = Job(policy="random", task="PickXtimes", split="test", episode=0, options=options)
-    usage = {"calls": 4.0, "input_tokens": 1200.0}
-    record = replace(make_record(job, "success", None), usage=usage)
-    data = RunData(make_frame([("run", [record])], ()), [record])
+    first = make_record(job, "success", None)
+    second = make_record(replace(job, episode=1), "success", None)
+    records = [
+        replace(first, usage={"calls": 4.0, "input_tokens": 1200.0}),
+        replace(second, usage={"calls": 1.0, "input_tokens": 1201.0}),
+    ]
+    data = RunData(make_frame([("run", records)], ()), records)
 
     table = make_subgoal_table(data)
 
@@ -111,5 +118,5 @@ def test_what_models_cost_is_in_the_table_of_a_policy_that_names_no_subgoal():
         column.name: str(entry)
         for column, entry in zip(table.columns, table.rows[0].entries, strict=True)
     }
-    assert (cells["subgoals"], cells["calls"], cells["tokens in"]) == ("0", "4", "1200")
+    assert (cells["subgoals"], cells["calls"], cells["tokens in"]) == ("0", "2.5", "1201")
     assert "US$" not in cells

@@ -27,6 +27,7 @@ from roboirg.core.plain_text import counted
 from roboirg.records.record import Record, Summary
 from roboirg.records.run_files import run_folder
 from roboirg.records.store import read_records
+from roboirg.stats.rates import half_up
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -190,7 +191,7 @@ class Results:
         episodes = counted(len(self.summaries), "episode")
         lines = [f"Results of {episodes} ({counts}) in {self.folder}"]
         for (policy, setting), rate in self.rates().items():
-            lines.append(f"  {policy} {setting}: {100 * rate:.1f} %")
+            lines.append(f"  {policy} {setting}: {half_up(100 * rate, 1)} %")
         return "\n".join(lines)
 
     def _repr_markdown_(self) -> str:

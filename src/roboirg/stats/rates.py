@@ -44,7 +44,7 @@ def change_text(change: Decimal) -> str:
 
 def whole_percent(rate: float | Fraction) -> str:
     """Return a rate from 0 to 1 as a whole percentage, rounded half up: 1/8 becomes 13."""
-    return str(_half_up(100 * float(rate), 0))
+    return str(half_up(100 * float(rate), 0))
 
 
 def percent_range(low: Fraction, high: Fraction) -> str:
@@ -56,7 +56,7 @@ def percent_range(low: Fraction, high: Fraction) -> str:
 
 def points(gap: float, decimals: int = 0) -> str:
     """Return a gap, -1 to 1, in signed percentage points: ``−12``, ``+3``, ``±0``."""
-    text = f"{_half_up(100 * gap, decimals):+}".replace("-", "−")  # the typographic minus
+    text = f"{half_up(100 * gap, decimals):+}".replace("-", "−")  # the typographic minus
     is_zero = not text.strip("+−0.")
     return f"±{text[1:]}" if is_zero else text
 
@@ -74,8 +74,8 @@ def interval_note(interval: Interval | None) -> str:
 
 
 def p_text(p_value: float) -> str:
-    """Return a p-value with its sign: ``p = 0.012``, ``p < 0.001``."""
-    return f"p < {_SMALLEST_P}" if p_value < _SMALLEST_P else f"p = {p_value:.3f}"
+    """Return a p-value with its sign, rounded half up: ``p = 0.012``, ``p < 0.001``."""
+    return f"p < {_SMALLEST_P}" if p_value < _SMALLEST_P else f"p = {half_up(p_value, 3)}"
 
 
 class GapWords(NamedTuple):
@@ -110,8 +110,8 @@ def _rounded(value: Fraction) -> Decimal:
     return (Decimal(hundredths) * DIGITS).quantize(DIGITS, ROUND_HALF_UP)
 
 
-def _half_up(number: float, decimals: int) -> Decimal:
-    """Round to some decimals, halves away from 0: −12.5 becomes −13.
+def half_up(number: float, decimals: int) -> Decimal:
+    """Round to some decimals, halves away from 0: with none, −12.5 becomes −13.
 
     A half may come as 12.499999999999998, so what is below nine decimals is dropped first.
     """

@@ -8,10 +8,12 @@ import re
 from collections.abc import Iterable, Mapping
 
 _FORMULA = re.compile(
-    r"(?![+-]?[\d.,]+%?(?: to [+-]?[\d.,]+%?| \([+-]?[\d.,]+%? to [+-]?[\d.,]+%?\))?\Z)"
+    r"(?![+-]?[\d.,]+%?"
+    r"(?: to [+-]?[\d.,]+%?| \([+-]?[\d.,]+%? to [+-]?[\d.,]+%?\)| \([a-z ]+\))?\Z)"
     r"[=@\t\r+-]"
 )
-"""How a text begins that spreadsheets compute; a signed number or interval is none."""
+"""How a text begins that spreadsheets compute; a signed number is none, alone, with its interval
+or with words in brackets."""
 
 
 def csv_text(rows: Iterable[Mapping[str, object]]) -> str:

@@ -42,7 +42,8 @@ def heard_notes(frame: Frame, names: RunNames) -> list[str]:
     Prompts count that were cut at the limit of the policy's model, and those that may have been.
     """
     counts = count_heard(frame, ())
-    episodes = Counter(frame["run"])
+    played = frame.take([outcome != MISSING for outcome in frame["outcome"]])
+    episodes = Counter(played["run"])
     guesses = Counter(itertools.compress(frame["run"], frame["guessed"]))
     notes = []
     for run, name in names.items():

@@ -27,6 +27,7 @@ from roboirg.stats.intervals import TOO_FEW, Interval
 from roboirg.stats.rates import (
     NOT_APPLICABLE,
     gap_words,
+    half_up,
     interval_note,
     p_text,
     points,
@@ -148,12 +149,12 @@ def _chance_text(figure: ArmFigure) -> str:
     for task, silent in figure.others.items():
         scenes = [silent_chance(task, split, trial.episode) for trial in silent.verdicts]
         chances.append(np.mean(scenes))
-    return f"{100 * float(np.mean(chances)):.1f}"
+    return str(half_up(100 * float(np.mean(chances)), 1))
 
 
 def _rate_text(cells: ByTask, interval: Interval | None) -> str:
     """Return a rate with its interval in percent, such as ``50.0 (31.2 to 68.8)``."""
     ends = TOO_FEW
     if interval is not None:
-        ends = f"{100 * interval.low:.1f} to {100 * interval.high:.1f}"
-    return f"{100 * float(mean_rate(cells) or 0):.1f} ({ends})"
+        ends = f"{half_up(100 * interval.low, 1)} to {half_up(100 * interval.high, 1)}"
+    return f"{half_up(100 * float(mean_rate(cells) or 0), 1)} ({ends})"

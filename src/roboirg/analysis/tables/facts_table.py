@@ -16,6 +16,7 @@ from roboirg.analysis.tables.table import Column, Row, Table
 from roboirg.core.word_pools import words_label
 from roboirg.policies.contract.policy_calls import SERVER
 from roboirg.records.record import Record, Summary
+from roboirg.stats.rates import half_up
 from roboirg.util.media import CONTROL_RATE
 
 RUN = "the run"
@@ -138,7 +139,7 @@ def _of_calls(calls: Counter[str]) -> Facts:
     """
     steps_per_call = None
     if calls["calls"]:
-        steps_per_call = f"{calls['steps'] / calls['calls']:.1f}"
+        steps_per_call = half_up(calls["steps"] / calls["calls"], 1)
     yield "control steps per call, mean", [steps_per_call]
     yield "actions executed per call, most", [calls["executed"] or None]
 

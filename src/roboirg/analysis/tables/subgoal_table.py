@@ -15,7 +15,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.judging import SUBGOAL_VERDICTS
 from roboirg.records.record import Record
 from roboirg.stats.cells import rows_of
-from roboirg.stats.rates import whole_percent
+from roboirg.stats.rates import half_up, whole_percent
 
 _NOTE = (
     "Subgoals that a planner named, each counted when it or the due stage was new: right (the one "
@@ -34,8 +34,6 @@ _COSTS = {
     "missed": "misses",
 }
 """What a planner costs: keys of a record's usage, and their headings."""
-_FROM_WHOLE = 100
-"""Means from here on have no decimals."""
 _UNKNOWN_IF_ABSENT = ("input_tokens", "output_tokens", "cost_usd")
 """What a service may not report, so that the records of its replies lack it."""
 
@@ -169,9 +167,13 @@ def _words(counts: Counter[str], failures: Iterable[str], costs: Iterable[str]) 
 
 
 def _mean_text(mean: float) -> str:
-    """Return a mean cost: ``0.0125``, ``4``, ``1234``; *unknown* for NaN, an unknown cost."""
+    """Return a mean cost: ``0.0125``, ``4``, ``1234``; *unknown* for NaN, an unknown cost.
+
+    It has at least three digits, rounded half up, and no zeros at the end of its decimals.
+    """
     if math.isnan(mean):
         return "unknown"
-    if mean >= _FROM_WHOLE:
-        return f"{mean:.0f}"
-    return f"{mean:.3g}"
+    decimals = 0
+    if mean > 0:
+        decimals = max(0, 2 - math.floor(math.log10(mean)))
+    return f"{half_up(mean, decimals).normalize():f}"

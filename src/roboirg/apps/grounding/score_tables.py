@@ -13,7 +13,7 @@ from roboirg.apps.grounding.answer_scores import GroundingScore, ScoreRow, score
 from roboirg.apps.grounding.items.grounding_item import GroundingItem
 from roboirg.core.plain_text import counted
 from roboirg.stats.intervals import TOO_FEW, Interval
-from roboirg.stats.rates import NOT_APPLICABLE, gap_words
+from roboirg.stats.rates import NOT_APPLICABLE, gap_words, half_up
 
 COLUMNS = named_columns(
     "items", "right", "95 % interval", "random", "above random", "command", "hidden slots", "gap",
@@ -108,7 +108,7 @@ def _percent(rate: float | None) -> str:
     """Return a rate in percent, as in ``−5.0``; a dash if there is none."""
     if rate is None:
         return NOT_APPLICABLE
-    return f"{100 * rate:.1f}".replace("-", "−")
+    return str(half_up(100 * rate, 1)).replace("-", "−")
 
 
 def _interval(interval: Interval | None) -> str:
