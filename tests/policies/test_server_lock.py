@@ -86,7 +86,7 @@ def test_waiting_for_a_busy_server_is_reported_counted_and_ends_in_an_error(tmp_
 
 @pytest.mark.usefixtures("process_with_first_server")
 def test_of_two_servers_the_free_one_is_taken(tmp_path):
-    """Another process (the fixture) has the first server, and both are asked for, without a wait."""
+    """Another process (the fixture) has the first server; both are asked for, without a wait."""
     lock = lock_server([FIRST_SERVER, SECOND_SERVER], wait=0, folder=tmp_path)
 
     assert lock.endpoint == SECOND_SERVER
