@@ -129,9 +129,8 @@ def test_a_phrase_means_the_same_object_for_the_robot_and_for_the_camera(task):
 def test_each_phrase_selects_the_object_it_was_made_for(task):
     """`names_by_phrase` has the name of the object for which each phrase was made, in all scenes.
 
-    `things_at` finds the object of a phrase that was heard: the same one, for words that people
-    say and for those of the older setting (`selectors`), for the robot's and the camera's point of
-    view.
+    `things_at` finds the object of a phrase that was heard: the same one, also for the phrases of
+    `selectors`, from the robot's and the camera's point of view.
     """
     kind = get_task(task).things.pointed
     for scene, frame in itertools.product(scenes_of(task), FRAMES):

@@ -53,7 +53,7 @@ def test_any_bytes_are_a_message_or_refused(data):
 
 
 def test_decoded_arrays_keep_their_values_in_any_memory_order():
-    """The array is stored by columns and read backward: rows 0 1 2 and 3 4 5 become 2 1 0, 5 4 3."""
+    """The array is stored by columns and read backward: 0 1 2 and 3 4 5 become 2 1 0, 5 4 3."""
     array = np.asfortranarray(np.arange(6).reshape(2, 3))[:, ::-1]
 
     found = unpack(pack({"x": array}))["x"]

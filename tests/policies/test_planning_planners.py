@@ -366,9 +366,8 @@ def test_planners_send_nothing_of_the_last_episode_in_the_next_one(kind, shades)
     """Neither words nor video, pictures or subgoals of the first episode are sent in the second.
 
     A picture's shade of grey is the number of its step. The second episode has a video of the
-    shades 7, 8 and 9, of which two frames are sent (a clip of Gemini counts only its first), and a
-    current frame of the shade 0; the first episode had shades from 0 to 112 and its own
-    instruction.
+    shades 7, 8 and 9, of which at most two frames are sent, and a current frame of the shade 0;
+    the first episode had shades from 0 to 112 and its own instruction.
     """
     second_video = {name: frames[7:] for name, frames in video(10).items()}
     with fake_vlm([REPLY_OF[kind].replace("[]", "[1]")]) as server:
@@ -497,10 +496,9 @@ def test_the_memer_planner_sends_recent_frames_and_the_key_frames_it_chose():
     """It sends every second frame since the last question, with the key frames before them.
 
     Questions come at steps 0, 16, 32, 48 and 64; a picture has its step as its shade of grey. A
-    reply names the frames to keep by their position in the request, from 1. The first names a
-    frame of one picture only. The second names 16 (the 8th new one) and 4 (the 2nd): 4 and 16 are
-    sent first at step 32. The third names the first new frame, 18, which replaces 16, as they are
-    close to each other. The fifth names the last frame, 64.
+    reply names frames to keep by their position among the new ones, from 1. The first keeps 0; the
+    second 16 (the 8th) and 4 (the 2nd), which replaces 0, as they are close to each other; the
+    third 18, which replaces 16; the fourth none; the fifth 64.
     """
     replies = [memer_reply(1), memer_reply(8, 2), memer_reply(1), memer_reply(), memer_reply(8)]
     with fake_vlm(replies) as server:

@@ -123,7 +123,7 @@ def test_a_learner_without_words_finds_what_the_scene_gives_away():
     """In the video the robot moves the cube that the goal asks for, which shows its color.
 
     So all 80 colors are right. The relation (before or after the press) is not shown: 1 of 2, so
-    40 of 80, and 24 to 56 are within four standard deviations (4.5).
+    40 of 80, and 25 to 55 are within four standard deviations (4.5).
     """
     learner = GoalLearner(
         episodes_with_instructions(1000, 100), episodes_with_instructions(5000, 40)
