@@ -57,7 +57,11 @@ THREE_CUBES = get_episode("PickXtimes", "test", 3)
     ],
 )  # fmt: skip
 def test_each_operation_on_numbers_leads_to_four_repetitions(repeats):
-    """The words say *the blue cube*, and a number in one of seven ways; `ids` say them in words."""
+    """The words say *the blue cube*, and a number in one of seven ways; `ids` say them in words.
+
+    For example, *rank 2* of (2, 4) is *two or four, the latter*, and a *step* of -2 from 6 is *two
+    fewer than six*. Each way gives 4; the scene has three cubes, of which one is blue.
+    """
     words = Meaning({"color": Term("same", ("blue",)), "repeats": repeats})
     assert meaning.meant_goals(words, THREE_CUBES) == (Goal.of(color="blue", repeats=4),)
 

@@ -127,7 +127,11 @@ def test_a_phrase_means_the_same_object_for_the_robot_and_for_the_camera(task):
 
 @each_task
 def test_each_phrase_selects_the_object_it_was_made_for(task):
-    """`things_at` finds the object of a phrase that was heard, for both kinds of phrases."""
+    """`names_by_phrase` has the name of the object for which each phrase was made, in all scenes.
+
+    `things_at` finds the object of a phrase that was heard: the same one, also for the phrases of
+    `selectors`, from the robot's and the camera's point of view.
+    """
     kind = get_task(task).things.pointed
     for scene, frame in itertools.product(scenes_of(task), FRAMES):
         heard = things_at(scene, kind, frame)
@@ -139,7 +143,7 @@ def test_each_phrase_selects_the_object_it_was_made_for(task):
 
 @each_task
 def test_everyday_phrases_have_at_most_twelve_words(task):
-    """Longer ones are no words that people say."""
+    """Longer ones are no words that people say: these are checked in all published scenes."""
     kind = get_task(task).things.pointed
     for scene, frame in itertools.product(scenes_of(task), FRAMES):
         for words, _ in words_with_things(everyday_places(scene, kind, frame)):
@@ -229,12 +233,18 @@ def spots_of(scene):
 
 
 def test_in_a_row_only_the_first_and_the_last_thing_have_a_spot():
-    """A spot says where something happens: *There's a stain on the far right.*"""
+    """A spot says where something happens: *There's a stain on the far right.*
+
+    Five containers stand in a row: 0 on the robot's right, 4 on its left.
+    """
     assert spots_of(ROW_OF_FIVE) == {"on the far left": 4, "on the far right": 0}
 
 
 def test_the_things_of_a_square_have_spots_in_its_corners():
-    """Containers 0 and 1 stand in front, 0 and 2 on the left. *On the left* would mean two."""
+    """Points are (x, y): x grows away from the robot, y to its left.
+
+    So containers 0 and 1 stand in front, 0 and 2 on the left. *On the left* would mean two.
+    """
     square = containers([(-0.15, 0.15), (-0.15, -0.15), (0.15, 0.15), (0.15, -0.15)])
 
     assert spots_of(square) == {
@@ -250,7 +260,11 @@ def test_the_things_of_a_square_have_spots_in_its_corners():
 
 
 def test_things_that_stand_apart_have_spots_in_every_direction():
-    """Container 0 stands between button and target, 1 next to the button, 2 in the back."""
+    """Container 0 stands between button and target, 1 next to the button, 2 in the back.
+
+    x grows away from the robot, y to its left: so 1 (y = 0.09) is the leftmost and 2 (y = -0.2)
+    the rightmost one. The numbers are those of the containers.
+    """
     scene = containers([(-0.05, -0.03), (-0.19, 0.09), (0.1, -0.2)], BUTTON, TARGET)
 
     assert spots_of(scene) == {
@@ -343,13 +357,19 @@ def test_everyday_words_for_the_corners_of_a_square(name, phrase):
     ],
 )
 def test_everyday_words_for_things_near_a_button_or_a_target(name, phrase):
-    """The button stands at (-0.2, 0), the target at (0.1, 0)."""
+    """The button stands at (-0.2, 0), the target at (0.1, 0): x grows away from the robot.
+
+    y grows to its left, in meters. So container_1 stands 1 cm behind the button and 9 cm left of
+    it.
+    """
     scene = containers([(-0.05, -0.03), (-0.19, 0.09), (0.1, -0.2)], BUTTON, TARGET)
     assert phrase in phrases_after_a_noun(scene, name)
 
 
 def test_what_is_more_behind_the_button_than_beside_it_is_not_to_its_left():
-    """container_0 stands 15 cm behind the button and 4 cm to its left."""
+    """The button stands at (-0.2, 0). container_0 stands 15 cm behind it (x) and 4 cm to its left
+    (y).
+    """
     scene = containers([(-0.05, 0.04), (0.1, -0.2)], BUTTON)
     assert "to the left of the button" not in phrases_after_a_noun(scene, "container_0")
 
@@ -382,7 +402,10 @@ def test_places_do_not_depend_on_cubes_that_arrive_later():
 
 @each_task_with_places
 def test_a_clue_leads_to_one_object(task):
-    """A clue is what can be seen of an object: *the cube in the middle*."""
+    """A clue is what can be seen of an object: *the cube in the middle*.
+
+    `setdefault` keeps the first object of the words; another one of the same words would fail.
+    """
     for scene in scenes_of(task):
         found = {}
         for thing, clue in thing_clues(scene, get_task(task)):

@@ -372,7 +372,11 @@ def test_the_word_one_is_a_leak_only_where_it_is_a_number(command, leaks):
     ("text", "setting"), [(BIRTHDAY, "direct"), (FEWER, "reasoning")], ids=["direct", "reasoning"]
 )
 def test_adding_a_scenario_changes_only_the_episodes_that_choose_it(text, setting):
-    """Each episode draws one of the scenarios that fit; a new one must not redraw all others."""
+    """Each episode draws one of the scenarios that fit; a new one must not redraw all others.
+
+    Of the published episodes 4 to 59 choose the added one, so that both cases occur; the others
+    keep what they chose before.
+    """
     (added,) = read_scenario_file(text).scenarios
     known = []
     for scenario in task_scenarios("PickXtimes").scenarios:
@@ -862,7 +866,11 @@ def said_with(scenario, episode):
 
 @each_pool
 def test_that_many_times_is_never_said_of_once(pool):
-    """It is said of two to five times."""
+    """All our scenarios of PickXtimes that may say *that many times* speak in all scenes that they
+    fit.
+
+    It is said of two to five times, and never of one.
+    """
     numbers = set()
     for scenario in task_scenarios("PickXtimes").scenarios:
         fields = scenario.fields

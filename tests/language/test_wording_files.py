@@ -378,7 +378,10 @@ def test_a_user_s_spatial_scenario_replaces_ours_in_the_spatial_setting(pool):
 
 @each_pool
 def test_a_user_s_spatial_scenario_leaves_the_other_settings_alone(pool):
-    """They express the same episodes, in the same words."""
+    """The user's file (DUSTY) has one spatial scenario for PickXtimes, and nothing else.
+
+    In twelve episodes the other settings can be said as before, in the same words.
+    """
     identity = identity_of(DUSTY)
     for index in range(12):
         episode = get_episode("PickXtimes", pool, index)

@@ -129,7 +129,12 @@ def clients():
 def test_a_hostile_policy_server_ends_in_a_named_error_without_filling_memory(
     attack, clients, good
 ):
-    """Attacks: huge messages, huge arrays, terminal escapes, floods of pings, a redirect."""
+    """Attacks: huge messages, huge arrays, terminal escapes, floods of pings, a redirect.
+
+    A row of ATTACKS has a name, how the server answers, the client's options, and the kind and
+    words of the error that is expected. The error names the server and can be printed, and the
+    client's memory grows by MAX_MIB at most. QUICK clients wait a second only.
+    """
     _, answer, options, kind, words = attack
     with answering(answer) as place:
         error, message, mib = clients.play(f"openpi://{place}{options}", good)
@@ -228,7 +233,11 @@ def drip(peer, piece):
 
 @pytest.mark.parametrize("answer", [sends_blanks_for_ever, sends_interim_answers_for_ever])
 def test_what_reads_an_endless_answer_of_a_model_ends_after_the_time_limit(answer):
-    """A thread that reads on would stay with a connection for each answer that came too late."""
+    """A thread that reads on would stay with a connection for each answer that came too late.
+
+    Two questions run into the time limit of 1 s. Of the threads that began since, those that read
+    an answer (`_fetch`) end soon; one that has ended already is no longer listed.
+    """
     before = set(threading.enumerate())
     with answering(answer) as place:
         options = ModelOptions(model="m", base_url=f"http://{place}", timeout_s=1)

@@ -25,6 +25,11 @@ from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes
     ],
 )
 def test_numbers_of_more_than_63_bits_paths_and_keys_are_reported_as_texts(value, stored):
+    """`value` is what a policy declares in its metadata, `stored` what a record then holds.
+
+    Whole numbers between -2^63 and 2^63 stay numbers, which every reader of JSON takes; others,
+    paths and keys of a mapping become texts.
+    """
     assert as_json([value], "the metadata") == [stored]
 
 
@@ -38,12 +43,16 @@ def test_what_is_neither_text_nor_number_is_refused_by_its_key():
     [("v1", "v1"), (2, "2"), (0.5, "0.5"), (np.int64(3), "3"), (Path("a.pt"), "a.pt")],
 )
 def test_a_version_is_a_text_a_number_or_a_path(declared, version):
+    """A policy declares its version in one of these ways; records hold it as a text."""
     assert read_version(SimpleNamespace(version=declared)) == version
 
 
 @pytest.mark.parametrize(("frames", "count"), [("all", 10), (4, 3)])
 def test_made_up_videos_have_the_pictures_that_a_policy_wants(frames, count):
-    """Of ten steps, all or every fourth."""
+    """The video has ten steps, of which a policy wants all pictures, or every fourth (0, 4 and 8).
+
+    It wants the front camera only, so there are no pictures of the wrist.
+    """
     needs = PolicyNeeds(cameras=("front",), demonstration_frames=frames)
 
     video = SyntheticEpisodes(needs).episode("Go.", 10).demonstration
@@ -54,6 +63,7 @@ def test_made_up_videos_have_the_pictures_that_a_policy_wants(frames, count):
 
 
 def test_made_up_videos_have_no_pictures_for_a_policy_that_wants_none():
+    """The made-up video has 10 steps, and the policy declares `demonstration_frames="none"`."""
     needs = PolicyNeeds(cameras=("front",), demonstration_frames="none")
 
     video = SyntheticEpisodes(needs).episode("Go.", 10).demonstration
@@ -62,7 +72,12 @@ def test_made_up_videos_have_no_pictures_for_a_policy_that_wants_none():
 
 
 def test_made_up_observations_have_depth_matrices_and_a_history_that_ends_in_the_present():
-    """In a chunk of 16 steps a policy that observes every 4 sees four moments."""
+    """A policy declares that it wants depth, the cameras' matrices, and every 4th step as a
+    history.
+
+    After a chunk of 16 steps it is shown, for each camera, depth in pictures of 256 x 256 and the
+    usual 3 x 4 and 3 x 3 matrices. Its history has 16 / 4 = 4 moments, the last of which is now.
+    """
     needs = PolicyNeeds(cameras=CAMERAS, observe_every=4, depth=True, calibration=True)
     studio = SyntheticEpisodes(needs)
 

@@ -262,6 +262,7 @@ def test_long_repetitive_replies_are_read_quickly(text):
     ("value", "number"), [(3, 3), (3.0, 3), ("3", 3), (-0.0, 0), (10**400, 10**400)]
 )
 def test_json_values_that_are_whole_numbers_are_read(value, number):
+    """Also as a float or a text, and larger than any float; the result is an int."""
     found = whole_number(value)
 
     assert found == number
@@ -270,6 +271,7 @@ def test_json_values_that_are_whole_numbers_are_read(value, number):
 
 @pytest.mark.parametrize("value", [True, 2.5, "two", "9" * 5000, float("inf"), None, [3]])
 def test_json_values_that_are_no_whole_numbers_give_none(value):
+    """Python takes True for 1, and reads no text of 5,000 digits."""
     assert whole_number(value) is None
 
 
@@ -299,7 +301,10 @@ def usage_after_a_reply_with(provider, usage, **prices):
 @pytest.mark.parametrize("provider", NAMES)
 @pytest.mark.parametrize("count", [None, "many", True, 1.5, [], -(10**6), 10**9])
 def test_an_answer_counts_though_its_number_of_tokens_makes_no_sense(provider, count):
-    """What is unknown is no number (NaN), and so is the cost of an answer with such a count."""
+    """A service reports 5 tokens sent, and received a `count` that makes no sense.
+
+    What is unknown is no number (NaN), and so is the cost of an answer with such a count.
+    """
     sent, received = NAMES[provider]
 
     usage = usage_after_a_reply_with(
@@ -333,6 +338,7 @@ def test_an_answer_counts_though_the_service_reports_no_tokens(provider, usage):
 @pytest.mark.parametrize("provider", NAMES)
 @pytest.mark.parametrize("count", [7, 7.0, "7"])
 def test_numbers_of_tokens_may_be_integers_floats_or_texts(provider, count):
+    """A service reports 7 received tokens in one of three ways."""
     _, received = NAMES[provider]
 
     usage = usage_after_a_reply_with(provider, {received: count})

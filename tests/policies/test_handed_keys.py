@@ -80,6 +80,7 @@ def test_a_long_text_full_of_almost_keys_is_searched_in_linear_time(letters):
 
 
 def test_a_key_too_short_to_be_a_secret_masks_nothing():
+    """*none* is no key, and a word that texts need."""
     handed_keys.remember_key("none")
     assert printable("none of the cubes") == "none of the cubes"
 
@@ -94,6 +95,13 @@ MESSAGES_WITH_KEY = {
 
 @pytest.mark.parametrize("place_of_key", MESSAGES_WITH_KEY)
 def test_a_key_that_a_policy_server_sends_back_is_masked_in_records_and_errors(place_of_key):
+    """A server sends the key that its client handed over back: in its metadata, an error, or a
+    close.
+
+    What records keep of it (cause and details of the error, metadata, version) has stars, and
+    neither the first nor the last six characters of the key, also where a long text is cut.
+    """
+
     def answer(peer):
         shake_hands(peer)
         peer.sendall(MESSAGES_WITH_KEY[place_of_key])
@@ -130,6 +138,7 @@ def test_a_key_in_the_reply_of_a_model_is_masked_when_shown_and_stored(tmp_path)
 
 
 def test_a_key_that_a_library_prints_is_masked_in_the_log(tmp_path):
+    """While a log is kept, its file holds the key; afterwards as many stars."""
     handed_keys.remember_key(KEY)
     with EpisodeLog(tmp_path / "log.txt") as log:
         log.path.write_text(f"closed: {KEY}\n")
@@ -137,6 +146,11 @@ def test_a_key_that_a_library_prints_is_masked_in_the_log(tmp_path):
 
 
 def test_the_password_of_a_proxy_is_masked_in_plain_and_base64_text(monkeypatch):
+    """The proxy's URL has the password `pass!word`, in which `!` is written as %21.
+
+    Masked are the password and what a client sends to the proxy, `me:pass!word` in Base64; a star
+    stands for each character.
+    """
     monkeypatch.delenv("NO_PROXY", raising=False)
     monkeypatch.delenv("no_proxy", raising=False)
     monkeypatch.setenv("HTTPS_PROXY", "http://me:pass%21word@proxy.example:3128")

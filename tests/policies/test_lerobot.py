@@ -169,7 +169,11 @@ def policy_after_reset(seed=0, options=""):
 
 
 def test_a_checkpoint_gets_pictures_and_state_under_lerobot_s_names(checkpoint):
-    """A picture has its channels first and values from 0 to 1."""
+    """STATE, FRONT and WRIST are LeRobot's names, such as `observation.state`.
+
+    A picture has its channels first and values from 0 to 1: turned back, it is the one that was
+    seen.
+    """
     policy_after_reset().act(moment(1))
 
     (batch,) = checkpoint.model.batches
@@ -180,6 +184,10 @@ def test_a_checkpoint_gets_pictures_and_state_under_lerobot_s_names(checkpoint):
 
 
 def test_the_metadata_of_a_checkpoint_name_its_processors_and_its_chunk(checkpoint):
+    """The stand-in has a tokenizer before the model, an unnormalizer behind it, and chunks of six.
+
+    Of a chunk four actions are played, as the option says.
+    """
     policy = policy_after_reset(options="?execute=4")
 
     assert "tokenizer_processor" in policy.metadata["preprocessing"]
@@ -190,12 +198,14 @@ def test_the_metadata_of_a_checkpoint_name_its_processors_and_its_chunk(checkpoi
 
 
 def test_the_type_and_device_of_a_checkpoint_s_weights_are_reported(checkpoint):
+    """The stand-in model has one weight, in bfloat16, on the CPU."""
     facts = inference_facts(policy_after_reset())
 
     assert (facts.dtypes, facts.devices) == (("bfloat16",), ("cpu",))
 
 
 def test_the_noise_of_a_checkpoint_depends_on_the_seed_of_the_policy(checkpoint):
+    """The stand-in model adds random noise to its actions: seed 5 repeats it, seed 6 does not."""
     checkpoint.config.is_noisy = True
 
     first = policy_after_reset(5).act(moment(1))
@@ -208,7 +218,11 @@ def test_the_noise_of_a_checkpoint_depends_on_the_seed_of_the_policy(checkpoint)
     ("declared", "size"), [((3, 4, 4), (4, 4)), ((3, 4, 6), (8, 8))], ids=["square", "no square"]
 )
 def test_pictures_are_resized_to_the_square_that_a_checkpoint_declares(checkpoint, declared, size):
-    """Pictures here have 8 x 8 pixels; the checkpoint has no wrist camera."""
+    """Pictures here have 8 x 8 pixels, and the checkpoint (a stand-in) has no wrist camera.
+
+    A declared square of 4 x 4 is what it gets; a shape that is no square, 4 x 6, is ignored. A
+    batch is one picture, with its three channels first.
+    """
     checkpoint.config.input_features = {STATE: None, FRONT: SimpleNamespace(shape=declared)}
 
     policy_after_reset().act(moment(1))
@@ -219,6 +233,11 @@ def test_pictures_are_resized_to_the_square_that_a_checkpoint_declares(checkpoin
 
 
 def test_a_resized_picture_has_the_means_of_its_pixels(checkpoint):
+    """Pictures of 8 x 8 pixels are shrunk to the 4 x 4 that the checkpoint (a stand-in) declares.
+
+    Each new pixel is the mean of 2 x 2 old ones. The model gets channels first and values from 0
+    to 1; in values from 0 to 255, rounding to whole numbers makes a difference of at most 0.5.
+    """
     checkpoint.config.input_features = {FRONT: SimpleNamespace(shape=(3, 4, 4))}
 
     policy_after_reset().act(moment(1))
@@ -251,6 +270,16 @@ def actions_of_lerobot_s_loop(model, length):
 def test_two_interleaved_episodes_get_the_actions_of_lerobot_s_own_loop(
     checkpoint, kind, remembered, steps, ensembles
 ):
+    """The stand-in model sums what it remembers, so that any difference in its inputs shows.
+
+    LeRobot's loop plays 24 steps of one episode: it asks the model for each action. Two episodes
+    of our policy take turns, and both get the same 24 actions, with no more calls of the model for
+    each of them. `remembered` is how many observations the model sees, `steps` how many actions of
+    a chunk are played; averaging over chunks (`ensembles`) plays one action at a time.
+
+    A kind of model that we know plays from the present action on: the chunk's first actions belong
+    to the remembered observations, so that steps - remembered + 1 are left.
+    """
     config = checkpoint.config
     config.type = kind
     config.n_obs_steps = remembered
@@ -301,6 +330,7 @@ def test_more_actions_than_a_chunk_has_cannot_be_played(checkpoint):
 
 
 def test_a_checkpoint_without_a_tokenizer_is_noted_as_not_reading_text(checkpoint):
+    """The stand-in's steps before the model are removed, and with them its tokenizer."""
     checkpoint.before.steps = ()
 
     assert policy_after_reset().metadata["reads_text"].startswith("no, ")
@@ -315,7 +345,11 @@ def test_a_checkpoint_of_groot_reads_text_without_a_tokenizer_in_front_of_it(che
 
 
 def test_episodes_in_a_batch_get_the_actions_that_they_get_alone(checkpoint):
-    """Five episodes in batches of four, of which the second is filled up."""
+    """Five episodes come to the model in batches of four: the second is filled up to four.
+
+    Each episode's noise comes from its own seed, so that its actions are to the bit those that it
+    gets alone.
+    """
     checkpoint.config.max_action_dim = 32
     moments = [moment(number) for number in range(5)]
     episodes = [policy_after_reset(seed, "?batch=4") for seed in range(5)]
@@ -329,6 +363,9 @@ def test_episodes_in_a_batch_get_the_actions_that_they_get_alone(checkpoint):
 
 
 def test_each_call_of_a_batched_episode_has_noise_of_its_own(checkpoint):
+    """Both calls show the same moment, so only their noise can differ. (A model that declares
+    `max_action_dim` takes its noise from outside.)
+    """
     checkpoint.config.max_action_dim = 32
     policy = policy_after_reset(0, "?batch=4")
 
@@ -337,6 +374,11 @@ def test_each_call_of_a_batched_episode_has_noise_of_its_own(checkpoint):
 
 @pytest.mark.parametrize("changes", [{"type": "diffusion"}, {"temporal_ensemble_coeff": 0.01}])
 def test_checkpoints_with_memory_are_not_batched(checkpoint, changes):
+    """A model of the kind "diffusion", or one that averages over chunks, remembers past calls.
+
+    So three episodes make three batches of one, despite `batch=4`; and the noise of the third,
+    whose seed is 2, is the one that it draws alone.
+    """
     vars(checkpoint.config).update(changes, is_noisy=True)
     episodes = [policy_after_reset(seed, "?batch=4") for seed in range(3)]
 

@@ -11,6 +11,11 @@ SQUARE = [3, 96, 96]
 
 
 def test_cameras_and_sizes_are_read_from_the_checkpoint_s_configuration(tmp_path):
+    """The checkpoint's folder holds a configuration; it names cameras and a number of tokens.
+
+    SQUARE is a picture of 96 x 96. Without a folder here, a checkpoint is taken to need both
+    cameras.
+    """
     one = write_checkpoint(tmp_path / "one", pictures(front=SQUARE), tokenizer_max_length=48)
     both = write_checkpoint(tmp_path / "both", pictures(wrist=[3, 256, 256], front=SQUARE))
 

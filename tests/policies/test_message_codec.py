@@ -47,11 +47,13 @@ def test_any_message_is_decoded_as_it_was_encoded(message):
 @settings(max_examples=50)
 @given(st.binary(max_size=200) | MESSAGES.map(pack).map(lambda data: data[:-1]))
 def test_any_bytes_are_a_message_or_refused(data):
+    """Random bytes, and messages without their last byte: the result is a map, or a CodecError."""
     with contextlib.suppress(CodecError):
         assert isinstance(unpack(data), dict)
 
 
 def test_decoded_arrays_keep_their_values_in_any_memory_order():
+    """The array is stored by columns and read backward: 0 1 2 and 3 4 5 become 2 1 0, 5 4 3."""
     array = np.asfortranarray(np.arange(6).reshape(2, 3))[:, ::-1]
 
     found = unpack(pack({"x": array}))["x"]
@@ -86,6 +88,7 @@ def test_numpy_scalars_keep_their_type(number):
     ],
 )
 def test_objects_complex_numbers_and_sets_are_refused_by_the_encoder(value):
+    """Also an array of records, and a whole number of more than 64 bits, 2^80."""
     with pytest.raises(CodecError, match="cannot be encoded"):
         pack({"x": value})
 
@@ -106,6 +109,11 @@ def test_objects_complex_numbers_and_sets_are_refused_by_the_encoder(value):
 def test_an_array_with_wrong_size_or_unsafe_type_is_refused_by_the_decoder(
     data, dtype, shape, words
 ):
+    """A message has an array's bytes with its type and shape, which may be made up by a stranger.
+
+    Objects (O), raw bytes (V8) and complex numbers (c8) are not accepted. Eight bytes are no array
+    of 3 or of 2^64 numbers of one byte (u1). Bytes given as a text, or not at all, are none.
+    """
     described = {b"__ndarray__": True, b"data": data, b"dtype": dtype, b"shape": shape}
     with pytest.raises(CodecError, match=words):
         unpack(msgpack.packb({"x": described}))
@@ -139,6 +147,10 @@ FLOATS = np.array([[0, 1, 2], [3, 4, 5]], np.float32)
     ids=["keys of text", "array of msgpack-numpy", "number of msgpack-numpy"],
 )
 def test_arrays_encoded_by_other_packages_are_decoded(encoded, decoded):
+    """Other packages name type and bytes of an array by other keys, of text or of bytes.
+
+    FLOATS is [[0, 1, 2], [3, 4, 5]]. The four bytes 00 00 00 3F are 0.5 as a 32-bit float.
+    """
     found = unpack(msgpack.packb({"x": encoded}))["x"]
 
     assert found.tolist() == decoded
@@ -152,6 +164,7 @@ def test_a_pickled_array_stays_encoded():
 
 
 def test_arrays_can_be_encoded_with_text_keys_for_servers_that_need_them():
+    """Keys of an array are bytes otherwise; single numbers become plain numbers."""
     array = np.arange(6, dtype=np.float32).reshape(2, 3)
     data = pack({"x": array, "y": np.float32(0.5), "z": np.bool_(True)}, text_keys=True)
     assert msgpack.unpackb(data) == {
@@ -161,5 +174,6 @@ def test_arrays_can_be_encoded_with_text_keys_for_servers_that_need_them():
 
 
 def test_a_list_nested_100000_times_is_refused():
+    """91 begins a list of one element. The decoder must not run out of its stack."""
     with pytest.raises(CodecError):
         unpack(b"\x81\xa1x" + b"\x91" * 100_000 + b"\x00")

@@ -63,6 +63,11 @@ def test_thousandths_become_pixels_rounded_down_and_within_the_picture(thousandt
     ],
 )
 def test_subgoals_with_a_broken_point_or_too_many_letters_are_refused(text):
+    """A point has two numbers from 0 to 1000: here one is missing, is no number, or is 1001.
+
+    The others have no words, one letter more than a subgoal may have, or a character that is no
+    text.
+    """
     with pytest.raises(UnparsableReplyError):
         parse_points(text)
 
@@ -79,11 +84,20 @@ def test_subgoals_with_a_broken_point_or_too_many_letters_are_refused(text):
     ids=["none", "apart", "middle of three", "later of two", "in any order"],
 )
 def test_key_frames_closer_than_a_gap_are_merged_into_one(steps, gap, kept):
-    """Of a chain of steps, each at most a gap after the one before, the middle one is kept."""
+    """Steps that follow each other by at most `gap` form a chain, and only its middle one is kept.
+
+    5 and 8 are 3 apart: with a gap of 2 both are kept. Of the two of 5, 6 the later counts as the
+    middle. The last row is sorted first: 5, 7, 9 is a chain with the middle 7.
+    """
     assert merge_keyframes(steps, gap) == kept
 
 
 def test_the_list_of_subgoal_forms_for_planners_covers_all_tasks_and_nothing_else():
+    """Planners are told all forms of subgoals, such as *pick up the {color} cube [at]*.
+
+    Each subgoal of 40 episodes of every task, with and without a point, fits one of the forms; and
+    each form is used by some task. No subgoal reads like *all is done*, at which planners stop.
+    """
     forms = load_prompts("subgoals").lines("forms")
     patterns = [_pattern(form) for form in forms]
     used = set()
@@ -118,7 +132,10 @@ def _pattern(form):
     [(3, 5, [0, 1, 2]), (10, 4, [0, 3, 6, 9]), (9, 1, [0]), (7, 3, [0, 3, 6])],
 )
 def test_frames_sampled_from_a_video_are_spread_evenly_with_both_ends(length, most, kept):
-    """At most `most` of `length` frames are kept."""
+    """Of `length` frames, numbered from 0, at most `most` are kept: `kept` are their numbers.
+
+    The first one is always kept, and with two or more also the last one.
+    """
     frames = np.arange(length)[:, None, None, None]
 
     assert sample_evenly(frames, most).ravel().tolist() == kept
@@ -132,7 +149,12 @@ def test_a_clip_of_sampled_frames_lasts_as_long_as_the_video():
 
 
 def test_a_contact_sheet_shows_frames_in_reading_order_each_with_its_label():
-    """Tiles have 64 pixels, four in a row; the second of five frames has the label "x"."""
+    """Five frames of one shade each, 10 to 50, are shrunk to tiles of 64 pixels, four in a row.
+
+    The lowest right pixel of each tile (row and column 63, 127 …) shows its frame's shade. Only
+    the second frame has a label, "x", so the first tile has one shade all over, and the second has
+    more.
+    """
     shades = [10, 20, 30, 40, 50]
     frames = np.stack([np.full((128, 128, 3), shade, np.uint8) for shade in shades])
 
@@ -147,11 +169,13 @@ def test_a_contact_sheet_shows_frames_in_reading_order_each_with_its_label():
 
 @pytest.mark.parametrize("value", [None, 3, "", " ", ["x"]])
 def test_a_reply_field_that_must_hold_words_is_refused_without_any(value):
+    """`a` is the field of the reply; the values are no text, or a text without a word."""
     with pytest.raises(UnparsableReplyError, match="'a' has to hold words"):
         text_of({"a": value}, "a")
 
 
 def test_each_of_our_prompt_files_has_a_fingerprint_of_its_own():
+    """Records tell by the fingerprint which file a model was prompted with."""
     fingerprints = {load_prompts(name).fingerprint for name in PROMPTS}
 
     assert len(fingerprints) == len(PROMPTS)
@@ -166,6 +190,7 @@ def prompts_of_a_user(tmp_path):
 
 
 def test_a_user_s_prompt_file_replaces_ours_and_has_another_fingerprint(prompts_of_a_user):
+    """The user's file of the fixture says for *again*: `no: $why`."""
     assert prompts_of_a_user.fill("again", why="so") == "no: so"
     assert prompts_of_a_user.fingerprint != load_prompts("qwen").fingerprint
 
@@ -176,6 +201,10 @@ def test_a_user_s_prompt_file_replaces_ours_and_has_another_fingerprint(prompts_
 def test_a_prompt_that_a_user_s_file_lacks_or_that_cannot_be_filled_is_refused(
     prompts_of_a_user, name, reason
 ):
+    """The file of the fixture has no text `goal`; its text `system` has a field `$missing`.
+
+    Only `$why` can be filled, so the error names the text and what it may have.
+    """
     with pytest.raises(InvalidValueError, match=reason):
         prompts_of_a_user.fill(name, why="so")
 
@@ -210,7 +239,11 @@ def test_the_video_has_the_frames_that_planner_and_policy_need_together(planner,
     ("wanted", "seen"), [("all", [0, 2, 4, 6, 8]), (4, [0, 4, 8]), (6, [0, 6])]
 )
 def test_each_sees_its_own_part_of_the_frames_of_a_video(wanted, seen):
-    """Of 10 steps every 2nd was drawn; fields without pictures keep all steps."""
+    """A video of 10 steps has the pictures of every second one: 0, 2, 4, 6 and 8.
+
+    Who wants all gets these; who wants every 4th or 6th step gets those of them. Fields without
+    pictures, such as joint positions, keep all 10 steps.
+    """
     video = {"joint_positions": np.arange(10), "front_rgb": np.arange(0, 10, 2)}
 
     part = DemonstrationSubset(video, 2, wanted)
@@ -223,6 +256,11 @@ def test_each_sees_its_own_part_of_the_frames_of_a_video(wanted, seen):
     ("planner", "policy", "every"), [(None, 3, 3), (2, 3, 1), (4, 6, 2), (None, None, None)]
 )
 def test_observations_come_as_often_as_planner_and_policy_need_together(planner, policy, every):
+    """Of a planner and a policy, each wants a history of every so many steps, or none (None).
+
+    Together they need the greatest common divisor: every 2nd and 3rd step are both among all
+    steps.
+    """
     assert merge_observe_every(planner, policy) == every
     assert merge_observe_every(policy, planner) == every
 
@@ -231,7 +269,11 @@ def test_observations_come_as_often_as_planner_and_policy_need_together(planner,
     ("wanted", "seen"), [(2, {"history": (6, 8, 10)}), (4, {"history": (8,)}), (None, {})]
 )
 def test_each_sees_its_own_part_of_the_history(wanted, seen):
-    """Observations of steps 6, 8 and 10 follow the two of an earlier chunk, of steps 2 and 4."""
+    """The chunk has observations of steps 6, 8 and 10, every second step.
+
+    Two came in an earlier chunk, those of steps 2 and 4. Who wants every 4th step gets only 8, as
+    4, 8, 12 … are the multiples of 4; who wants none gets no history at all.
+    """
     observation = {"now": 10, "history": (6, 8, 10)}
 
     found = select_history(observation, earlier=2, every=2, wanted=wanted)

@@ -151,6 +151,11 @@ def clip(body):
     [("qwen", "each-chunk"), ("memer", "each-chunk"), ("qwen", "every 7 steps")],
 )
 def test_a_planner_asks_once_a_chunk_also_if_its_period_is_shorter(kind, asked):
+    """A policy acts in chunks of 80 steps, and its planner can ask only when a chunk begins.
+
+    So in the steps from 0 to 320 a planner asks at 0, 80, 160, 240 and 320, whether it wants to
+    ask at each chunk or, more often, every 7 steps.
+    """
     steps = steps_asked(kind, REPLY_OF[kind], chunk=80, asked=asked)
 
     assert steps == [0, 80, 160, 240, 320]
@@ -173,7 +178,12 @@ def test_a_planner_asks_at_the_first_chunk_of_each_period():
     ],
 )
 def test_the_qwen_planner_does_not_ask_while_it_holds_a_button_s_subgoal(subgoal, asked_again):
-    """Its model names the same subgoal each time; chunks have ten steps."""
+    """The model always names the same subgoal, and chunks have ten steps, in an episode of 320
+    steps.
+
+    A planner asks at step 0, then at each chunk from `asked_again` on: a button's subgoal is held
+    until the step of the comment, and other words are not held, so that it asks ten steps later.
+    """
     asked = steps_asked("qwen", subgoal, chunk=10)
 
     assert asked == [0, *range(asked_again, 321, 10)]
@@ -189,12 +199,22 @@ def test_the_qwen_planner_does_not_ask_while_it_holds_a_button_s_subgoal(subgoal
     ids=["no pause", "the usual one of 75 steps", "144 steps"],
 )
 def test_the_gemini_planner_asks_every_48_steps_after_its_first_pause(options, steps):
+    """Chunks have 16 steps, and `steps` are those of 0 to 320 at which the planner asks.
+
+    After its first question it pauses for 75 steps unless the option says otherwise. 96 is the
+    first multiple of 48 after 75; from there on it asks at each multiple of 48.
+    """
     assert steps_asked("gemini", REPLY_OF["gemini"], **options) == steps
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_after_an_unreadable_reply_the_last_subgoal_stays_and_the_question_is_counted(kind):
-    """Questions come at steps 0, 96 and 192; {} is unreadable, and each question has two tries."""
+    """Chunks have 96 steps, so questions come at steps 0, 96 and 192, each with two tries.
+
+    `{}` is unreadable. Both tries fail at step 0, so that no subgoal is told; the one read at step
+    96 stays at step 192, where both tries fail again. That makes 5 calls, and 2 questions without
+    an answer, one of them the last one in a row.
+    """
     with fake_vlm(["{}", "{}", REPLY_OF[kind], "{}", "{}"]) as server:
         planner = make_planner(kind, server)
         policy = play_in_chunks(planner, 192, chunk=96)
@@ -205,7 +225,11 @@ def test_after_an_unreadable_reply_the_last_subgoal_stays_and_the_question_is_co
 
 
 def test_a_planner_that_waits_for_a_subgoal_s_end_repeats_an_unreadable_question_five_times():
-    """One readable question, then five unreadable ones of two tries each: 11 requests."""
+    """The first reply names a subgoal, and all later ones, `{}`, are unreadable.
+
+    What is said at step 1 makes the planner ask anew. It asks at five chunks, with two tries each,
+    and then gives up, though 19 chunks follow: 1 + 5 · 2 = 11 requests.
+    """
     with fake_vlm([REPLY, "{}"]) as server:
         planner = make_planner("qwen", server, asked="when-done")
         planner.reset("Do it.", NO_VIDEO)
@@ -218,7 +242,11 @@ def test_a_planner_that_waits_for_a_subgoal_s_end_repeats_an_unreadable_question
 
 
 def test_the_qwen_planner_sends_the_current_picture_alone_besides_the_video():
-    """Pictures have their step as their shade of grey; the video of 60 frames is a clip."""
+    """Chunks have 16 steps, so it asks at steps 0, 16, 32 and 48.
+
+    Each picture has the number of its step as its shade of grey. A request has one picture, that
+    of its own step: the video of 60 frames is sent as a clip, which does not count as a picture.
+    """
     with fake_vlm([REPLY]) as server:
         play_in_chunks(make_planner("qwen", server, video="mp4"), 48, demonstration=video(60))
 
@@ -226,7 +254,10 @@ def test_the_qwen_planner_sends_the_current_picture_alone_besides_the_video():
 
 
 def test_the_qwen_planner_sends_the_subgoals_so_far():
-    """The same words at another place are not another subgoal."""
+    """At four questions the model names: here, there, put down, here.
+
+    *There* has the same words as *here* at another point, so it is not listed as another subgoal.
+    """
     here = "pick up the cube at <|box_start|>(500,250)<|box_end|>"
     there = "pick up the cube at <|box_start|>(700,250)<|box_end|>"
     with fake_vlm([here, there, "put it down", here]) as server:
@@ -252,6 +283,10 @@ def three_turns():
 
 
 def test_the_gemini_planner_continues_one_conversation(three_turns):
+    """The fixture holds the requests at steps 0, 96 and 144.
+
+    The third starts with all three turns of the second (question, reply, question).
+    """
     _, second, third = three_turns
 
     assert third["contents"][:3] == second["contents"]
@@ -265,6 +300,10 @@ def test_the_first_clip_of_the_gemini_planner_is_the_demonstration_and_the_first
 
 
 def test_the_gemini_planner_asks_google_to_sample_its_clip_at_the_given_rate(three_turns):
+    """The planner of the fixture was made with the option `sampling_fps=5`.
+
+    So a part of its first message asks Google for five frames a second.
+    """
     parts = three_turns[0]["contents"][0]["parts"]
 
     assert {"fps": 5} in [part.get("videoMetadata") for part in parts]
@@ -273,7 +312,12 @@ def test_the_gemini_planner_asks_google_to_sample_its_clip_at_the_given_rate(thr
 def test_later_clips_of_the_gemini_planner_have_every_second_frame_since_the_turn_before(
     three_turns,
 ):
-    """Pictures have their step as their shade of grey, which a video keeps to within 4."""
+    """The fixture holds the requests at steps 0, 96 and 144 of a planner that sees every second
+    step.
+
+    So the second clip has steps 2, 4 … 96, and the third the 24 steps 98, 100 … 144. A picture has
+    its step as its shade of grey, which the compression of a clip keeps to within 3.
+    """
     _, second, third = three_turns
     shades = clip(second)[0][:, 0, 0, 0].astype(int)
 
@@ -282,6 +326,7 @@ def test_later_clips_of_the_gemini_planner_have_every_second_frame_since_the_tur
 
 
 def test_the_gemini_planner_asks_for_the_demonstration_at_its_own_period():
+    """Its policy wants no demonstration, and the planner every second frame: so they get these."""
     with fake_vlm([]) as server:
         planner = make_planner("gemini", server, observe_every=2)
 
@@ -289,6 +334,11 @@ def test_the_gemini_planner_asks_for_the_demonstration_at_its_own_period():
 
 
 def test_the_gemini_planner_sends_pictures_to_a_service_that_takes_no_clips():
+    """The service here is not Google's but another one, which takes single pictures only.
+
+    The planner asks at steps 0, 3 and 6, and a picture has its step as its shade of grey. Each
+    request has the whole conversation: the pictures of the questions so far, one of each.
+    """
     with fake_vlm([REPLY_OF["gemini"]]) as server:
         options = {"asked": "every 3 steps", "first_pause": 0, "observe_every": 2}
         play_in_chunks(make_planner("gemini", server, **options), 6, chunk=3)
@@ -296,7 +346,11 @@ def test_the_gemini_planner_sends_pictures_to_a_service_that_takes_no_clips():
 
 
 def test_the_gemini_planner_repeats_the_clip_after_an_unreadable_answer():
-    """The frames since the last answer of use are sent once more."""
+    """Chunks have 16 steps, and without a pause questions come at steps 0, 48 and 96.
+
+    Both tries at step 48 are unreadable (*?*). So the clip at step 96 has all 96 frames since step
+    0, and the conversation the three turns question, answer, question.
+    """
     answers = [REPLY_OF["gemini"], "?", "?", REPLY_OF["gemini"]]
     with fake_vlm(answers) as server:
         policy = play_in_chunks(make_planner("gemini", server, "google", first_pause=0), 96)
@@ -309,7 +363,12 @@ def test_the_gemini_planner_repeats_the_clip_after_an_unreadable_answer():
     ("kind", "shades"), [("qwen", [7, 9, 0]), ("gemini", [7, 0]), ("memer", [7, 9, 0])]
 )
 def test_planners_send_nothing_of_the_last_episode_in_the_next_one(kind, shades):
-    """Neither words, video and pictures nor subgoals: the second video has the shades 7, 8, 9."""
+    """Neither words nor video, pictures or subgoals of the first episode are sent in the second.
+
+    A picture's shade of grey is the number of its step. The second episode has a video of the
+    shades 7, 8 and 9, of which at most two frames are sent, and a current frame of the shade 0;
+    the first episode had shades from 0 to 112 and its own instruction.
+    """
     second_video = {name: frames[7:] for name, frames in video(10).items()}
     with fake_vlm([REPLY_OF[kind].replace("[]", "[1]")]) as server:
         planner = make_planner(kind, server, clip_frames=2)
@@ -340,7 +399,12 @@ class Refusing(PolicyThatStandsStill):
 
 @pytest.mark.parametrize("when", ["when-done", "every 99 steps"])
 def test_a_planner_whose_subgoals_are_refused_asks_five_times_in_an_episode(when):
-    """And five times more in the next one."""
+    """The hands refuse every subgoal at once, so the planner asks anew, whatever its usual period
+    is.
+
+    After the fifth refusal it gives up: the second chunk brings no more questions. The next
+    episode begins with five tries again, so that there are 10 requests in all.
+    """
     with fake_vlm([REPLY]) as server:
         policy = HierarchicalPolicy(make_planner("stateless", server, asked=when), Refusing())
 
@@ -355,6 +419,10 @@ def test_a_planner_whose_subgoals_are_refused_asks_five_times_in_an_episode(when
 
 
 def test_a_planner_learns_that_a_subgoal_was_refused_and_not_what_it_meant():
+    """The hands report also which thing a subgoal meant, *cube*, and the step at which it ended.
+
+    Both are left out of what the planner learns: only the simulator knows what was meant.
+    """
     with fake_vlm([REPLY]) as server:
         planner = make_planner("stateless", server)
         policy = HierarchicalPolicy(planner, Refusing())
@@ -397,6 +465,9 @@ def test_a_refused_stage_ends_the_planning(planner_of_three_stages):
 
 
 def test_a_planner_that_listens_guesses_by_the_seed_of_the_policy():
+    """The policy is made with seed 3, and its planner's guesses at unclear words draw from that
+    seed.
+    """
     policy = make_policy("planner:listener", 3)
 
     assert policy.planner._decider.seed == 3
@@ -404,7 +475,11 @@ def test_a_planner_that_listens_guesses_by_the_seed_of_the_policy():
 
 @pytest.mark.parametrize("last", ["all tasks completed", "the task is complete", "it is done"])
 def test_all_is_done_from_the_gemini_model_leaves_the_last_subgoal(last):
-    """The model says so at step 96, after a subgoal at step 0."""
+    """The model names a subgoal at step 0, and at step 96 says in one of three ways that all is
+    done.
+
+    That is no subgoal, so the policy is told the subgoal of step 0 again.
+    """
     done = json.dumps({"description": "x", "subgoal": last})
     with fake_vlm([REPLY_OF["gemini"], done]) as server:
         policy = play_in_chunks(make_planner("gemini", server), 96, chunk=96)
@@ -418,9 +493,12 @@ def memer_reply(*positions):
 
 
 def test_the_memer_planner_sends_recent_frames_and_the_key_frames_it_chose():
-    """Of every second frame since the last question; a frame has its step as its shade.
+    """It sends every second frame since the last question, with the key frames before them.
 
-    It keeps 4 (the 2nd of *0, 2, 4, …*) and 16 (the 8th), then 18, which joins 16.
+    Questions come at steps 0, 16, 32, 48 and 64; a picture has its step as its shade of grey. A
+    reply names frames to keep by their position among the new ones, from 1. The first keeps 0; the
+    second 16 (the 8th) and 4 (the 2nd), which replaces 0, as they are close to each other; the
+    third 18, which replaces 16; the fourth none; the fifth 64.
     """
     replies = [memer_reply(1), memer_reply(8, 2), memer_reply(1), memer_reply(), memer_reply(8)]
     with fake_vlm(replies) as server:
@@ -439,7 +517,11 @@ def test_the_memer_planner_sends_recent_frames_and_the_key_frames_it_chose():
 
 
 def test_the_policy_behind_a_memer_planner_sees_the_moments_of_its_own_period():
-    """Every third, where the planner sees every second."""
+    """The planner sees every second step, and the policy behind it wants every third.
+
+    A picture has its step as its shade of grey. In an episode of 32 steps the policy sees 3, 6 …
+    30: its own period, and nothing of the planner's.
+    """
     with fake_vlm([memer_reply()]) as server:
         policy = play_in_chunks(make_planner("memer", server), 32).policy
 
@@ -451,6 +533,11 @@ def test_the_policy_behind_a_memer_planner_sees_the_moments_of_its_own_period():
 
 @pytest.mark.parametrize("positions", [[0], [9], ["one"], [1.5], [True], "1", None])
 def test_key_frame_positions_that_do_not_exist_make_a_memer_reply_unreadable(positions):
+    """A position is a whole number, from 1 to the number of frames that were sent: at most 8 here.
+
+    Questions come at steps 0 and 16, so that two of them stay without an answer, and no frame is
+    kept.
+    """
     with fake_vlm(
         [json.dumps({"current_subtask": REPLY, "keyframe_positions": positions})]
     ) as server:
@@ -463,10 +550,12 @@ def test_key_frame_positions_that_do_not_exist_make_a_memer_reply_unreadable(pos
 
 @pytest.mark.parametrize(("option", "kept"), [({"most": 2}, [66, 82]), ({"near": 16}, [82])])
 def test_options_of_the_memer_planner_limit_the_key_frames_it_keeps(option, kept):
-    """The newest of at most `most`; those within `near` steps are one.
+    """Questions come every 16 steps up to step 96; in each reply the model keeps the first new
+    frame.
 
-    In each reply the model chooses the first of the frames that it sees, so 66 at step 80 and 82
-    at step 96.
+    That is 66 of the frames shown at step 80, and 82 of those at step 96, so they are the last two
+    that were chosen. With `most` = 2 both stay. With `near` = 16 frames within 16 steps of each
+    other are one, of which the newest stays: 82.
     """
     choose = json.dumps({"current_subtask": REPLY, "keyframe_positions": [1]})
     with fake_vlm([choose]) as server:
@@ -537,6 +626,11 @@ def test_the_costs_of_planner_and_policy_are_summed():
 
 
 def test_a_planner_and_its_policy_form_a_policy_with_the_metadata_of_both():
+    """The policy behind the planner declares the checkpoint *seven*, and the planner asks model
+    *fake*.
+
+    It is not privileged, as neither of the two reads the simulator.
+    """
     with fake_vlm([REPLY]) as server:
         policy = HierarchicalPolicy(make_planner("qwen", server), PolicyThatStandsStill())
 
@@ -547,6 +641,11 @@ def test_a_planner_and_its_policy_form_a_policy_with_the_metadata_of_both():
 
 
 def test_the_oracle_planner_refuses_an_environment_without_pixel_positions():
+    """It names things by the pixel at which they are seen, and an environment has to publish
+    these.
+
+    That takes `grounded=True`, which the error names and the environment of this test lacks.
+    """
     policy = HierarchicalPolicy(OraclePlanner(), PolicyThatStandsStill())
     assert isinstance(policy, PrivilegedPolicy)
     with pytest.raises(InvalidValueError, match="grounded=True"):
@@ -555,7 +654,11 @@ def test_the_oracle_planner_refuses_an_environment_without_pixel_positions():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_planner_quotes_also_the_sentence_that_was_said_during_the_episode(kind):
-    """*Take it.* is said after the second chunk."""
+    """*This one is red.* is said at the start, and *Take it.* after the chunk that begins at step
+    16.
+
+    So the first request has only the first sentence, and the last one both, in order, and once.
+    """
     with fake_vlm([REPLY_OF[kind]]) as server:
         policy = HierarchicalPolicy(make_planner(kind, server), PolicyThatStandsStill(CHUNK))
         policy.reset("This one is red.", NO_VIDEO)
@@ -586,6 +689,10 @@ class HandsThatDoNotReport:
 
 @pytest.mark.sim
 def test_a_planner_moves_on_with_hands_that_do_not_report_the_end_of_a_subgoal():
+    """The hands here can do what is needed, but have no `endings`, by which others report.
+
+    The planner then tells from what was done that a stage is over, and the episode succeeds.
+    """
     policy = HierarchicalPolicy(make_by_kind("listener", {}, "test"), HandsThatDoNotReport())
     env = roboirg.make("StopCube", setting="explicit", cameras=(), demonstration_frames="none")
 

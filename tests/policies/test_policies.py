@@ -23,13 +23,18 @@ from roboirg.tasks.splits.splits import get_episode
 
 @pytest.mark.parametrize("name", BUILTIN)
 def test_built_in_policies_have_the_methods_of_a_policy(name):
+    """All but "random" are privileged: they read the simulator, as no robot could."""
     policy = make_policy(name, 3)
     assert isinstance(policy, Policy)
     assert isinstance(policy, PrivilegedPolicy) == (name != "random")
 
 
 def test_costs_that_are_unknown_or_beyond_reason_are_left_out_of_a_record():
-    """Also one that no float can hold; and what is unknown in a part makes the sum unknown."""
+    """The parts' costs are summed: 1 and 1 calls make 2.
+
+    Left out are tokens, as those of the planner are unknown (NaN); x, which no float can hold; and
+    the negative y.
+    """
     planner = SimpleNamespace(usage=lambda: {"calls": 1, "input_tokens": math.nan})
     policy = SimpleNamespace(usage=lambda: {"calls": 1, "input_tokens": 5, "x": 10**400, "y": -1})
     # 1 and 1 calls; tokens, x and y are left out.
@@ -45,6 +50,7 @@ def random_walk(seed, instruction):
 
 
 def test_random_actions_are_valid():
+    """20 chunks of the policy "random", seed 1: joint angles within the arm's limits."""
     actions = random_walk(1, "Go.")
 
     assert ((actions >= JOINT_ANGLE.low) & (actions <= JOINT_ANGLE.high)).all()
@@ -52,6 +58,7 @@ def test_random_actions_are_valid():
 
 
 def test_random_actions_depend_on_seed_and_instruction_alone():
+    """Seed 1 and *Go.* give the same actions again; seed 2 or *Stop.* give others."""
     actions = random_walk(1, "Go.")
 
     assert np.array_equal(random_walk(1, "Go."), actions)
@@ -68,7 +75,14 @@ def test_random_actions_depend_on_seed_and_instruction_alone():
     ],
 )
 def test_the_expert_repeats_a_failed_motion_at_most_three_times(monkeypatch, completed, executed):
-    """`completed` is how many stages are complete each time that it looks."""
+    """The expert has three stages, hover, pick and drop, and executes the first that is not
+    complete.
+
+    `completed` is how many stages are complete each time that it looks, in place of the
+    simulator's judgment. 1, 1: the pick failed, and is done again; 2, 2, 2: the drop failed, so
+    the cube is picked up again first. In the second row the hover fails four times: one try and
+    three repetitions.
+    """
     kinds = ("hover", "pick_cube", "drop_into")
     stages = tuple(SimpleNamespace(primitive=Primitive(kind, "cube")) for kind in kinds)
     primitives = SimpleNamespace(execute=lambda primitive: [primitive.kind])
@@ -86,7 +100,7 @@ def test_the_expert_repeats_a_failed_motion_at_most_three_times(monkeypatch, com
     ids=["the last one before the first", "the one before"],
 )
 def test_the_policy_previous_goal_takes_the_goal_of_the_episode_before(task, number, before):
-    """A split has 50 episodes."""
+    """It is a blind baseline. A split has 50 episodes, so before number 0 comes number 49."""
     env = SimpleNamespace(episode=get_episode(task, "test", number))
 
     assert PreviousGoalPolicy().decide(env, "") == get_episode(task, "test", before).goal

@@ -44,7 +44,11 @@ def two_tokens_a_word(text):
     ids=["all", "no line break", "red cu", "red", "nothing"],
 )
 def test_a_model_reads_as_many_characters_as_its_tokens_spell(tokens, verdict, reached):
-    """*red cube* has six tokens: the beginning, re, d, cu, be, and a line break."""
+    """*red cube* has six tokens: the beginning, re, d, cu, be, and a line break.
+
+    With fewer, the text is heard up to a character: with four up to *red cu*, 6 characters.
+    Without the line break the text is complete, but the model expects it: *cut*.
+    """
     found = audit_instruction([["red cube"]], PromptLimit(tokens, 0, two_tokens_a_word))
 
     assert found == (6, 6, (reached,), verdict)
@@ -56,7 +60,10 @@ def test_a_model_reads_as_many_characters_as_its_tokens_spell(tokens, verdict, r
 def test_without_the_model_s_tokenizer_a_prompt_may_be_heard_or_cut_or_this_is_unknown(
     tokens, verdict, reached
 ):
-    """Only bounds are known: these 30 characters have 8 to 11 tokens."""
+    """Only bounds are known: these 30 characters have 8 to 11 tokens.
+
+    With room for 11 the whole is heard; with 8 no one knows; with 4 at most 16 characters are.
+    """
     limit = PromptLimit(tokens, 0, None)
 
     found = audit_instruction([["Put the red cube into the bin."]], limit)
@@ -220,7 +227,10 @@ def test_a_policy_that_declares_no_token_limit_has_none(spec):
     ],
 )
 def test_each_system_of_the_paper_declares_its_token_limit(system, tokens):
-    """Those of 128 also read a subgoal, which is added to the instruction."""
+    """Those of 128 also read a subgoal, which is added to the instruction.
+
+    In the last row the limit is an option of the system's policy. All of them lower their prompts.
+    """
     limit = prompt_limit_of(f"system:{system}")
 
     assert limit.tokens == tokens

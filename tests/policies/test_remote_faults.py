@@ -62,6 +62,12 @@ def failing_at_inference(protocol, fault):
     ],
 )
 def test_a_malformed_reply_is_reported_with_the_server_that_sent_it(reply, words):
+    """The server answers the question for actions with `reply`: a text is an error by protocol,
+    bytes are sent as they are, and maps are encoded.
+
+    Right would be an array of (n, 8) finite numbers under *actions*, in a message of 1 MiB at most
+    (the client's option). The error says in `words` what is wrong, and names the server.
+    """
     with (
         WireServer(faults=[reply]) as server,
         client_of(server, "openpi", "?max_reply_mib=1") as policy,
@@ -74,6 +80,10 @@ def test_a_malformed_reply_is_reported_with_the_server_that_sent_it(reply, words
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_after_a_malformed_reply_the_next_episode_works(protocol):
+    """The server's reply to the first question is no array but *left*: that episode ends.
+
+    Its next one, of a new client, gets its chunk of actions.
+    """
     with failing_at_inference(protocol, {"actions": "left"}) as server:
         with client_of(server, protocol) as policy, pytest.raises(PolicyReplyError):
             play_episode(policy)
@@ -102,6 +112,7 @@ def test_an_error_in_a_reply_is_shown_in_the_words_of_the_server(protocol, reply
 
 
 def test_an_error_in_place_of_the_metadata_is_shown():
+    """A server sends its metadata first; here it sends an error, with a message."""
     with WireServer() as server, client_of(server, "openpi") as policy:
         server.metadata = {"status": "error", "message": "The checkpoint is missing."}
         with pytest.raises(PolicyReplyError, match="with an error: The checkpoint is missing"):
@@ -198,6 +209,7 @@ def test_a_server_that_ends_the_connection_ends_the_episode(protocol):
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_the_reset_after_a_lost_connection_connects_again(protocol):
+    """The server cuts the connection at the first question. The client then plays two steps."""
     with (
         failing_at_inference(protocol, "die") as server,
         client_of(server, protocol) as policy,
@@ -273,6 +285,12 @@ def test_a_client_waits_for_a_server_that_starts_late():
 
 
 def test_a_client_finds_a_server_again_that_was_restarted_at_its_port():
+    """A server ends after an episode; the next act fails, and a new server starts at the same
+    port.
+
+    It answers with the number of frames that it has, 3, and of the demonstration, 2: so it was
+    shown this episode from its beginning, and nothing of the last server's.
+    """
     with MmeVlaServer(port=PORT) as server:
         policy = make_policy(f"mme-vla://{server.place}?connect=300", 0)
         play_episode(policy)
@@ -288,6 +306,7 @@ def test_a_client_finds_a_server_again_that_was_restarted_at_its_port():
 
 
 def test_an_absent_server_is_reported_in_one_sentence():
+    """No server listens at port 9, and the client tries for 0.2 s."""
     policy = make_policy("openpi://127.0.0.1:9?connect=0.2", 0)
     with pytest.raises(
         PolicyConnectionError,

@@ -29,6 +29,11 @@ def stored_messages(protocol):
 
 @pytest.mark.parametrize("protocol", ["openpi", "mme-vla", "challenge", "challenge-sensors"])
 def test_the_documentation_has_the_type_and_shape_of_every_message_key(protocol):
+    """Each stored message is a map from keys to values; PAGE is the documentation of the
+    protocols.
+
+    The page has a row for each key, with the type and shape of its value.
+    """
     for data in stored_messages(protocol):
         for key, value in unpack(data).items():
             assert re.search(rf"`{key}`.* \| {re.escape(type_and_shape_of(value))}[: ]", PAGE)
@@ -79,7 +84,10 @@ def test_mme_vla_messages_are_byte_for_byte_the_stored_ones():
     ],
 )
 def test_challenge_messages_are_byte_for_byte_the_stored_ones(name, options, has_sensors):
-    """The server answers with the number of moments that it was shown: 4, then 6."""
+    """Moments 3, then 4 and 5, are shown after a video of three moments (0 to 2).
+
+    The server answers with the number of moments that it was shown: 3 + 1 = 4, then 6.
+    """
     now, later, latest = (moment(number, sensors=has_sensors) for number in (3, 4, 5))
     with ChallengeServer() as server, client_of(server, "challenge", options) as policy:
         policy.reset(INSTRUCTION, video(3, sensors=has_sensors))
@@ -160,7 +168,11 @@ def test_a_subgoal_is_sent_under_the_key_that_the_checkpoint_expects(option, sen
     ("length", "parts"), [(0, [1]), (15, [16]), (16, [16, 1]), (40, [16, 16, 9])]
 )
 def test_a_video_is_sent_in_parts_of_16_frames_with_the_current_frame_last(length, parts):
-    """15 frames and the current one make a part of 16."""
+    """A video of `length` frames and the current one are sent in parts of at most 16: `parts`.
+
+    15 frames and the current one make one part; 40 and one make 16 + 16 + 9. The server answers
+    with the number of frames that it has, and of those before the current one.
+    """
     with MmeVlaServer() as server, client_of(server, "mme-vla") as policy:
         policy.reset(INSTRUCTION, video(length))
         rows = policy.act(moment(length, history=()))

@@ -80,6 +80,9 @@ def test_replies_stored_for_an_episode_are_used_when_it_is_played_again(tmp_path
     ids=["another episode", "the same words once more"],
 )
 def test_what_was_not_asked_before_in_an_episode_is_asked(tmp_path, episode, words):
+    """Stored is the reply to *first* in episode a. Another episode, or the same words a second
+    time, are questions of their own, so the service is asked and says *two*.
+    """
     settings = ReplySettings(tmp_path)
     with fake_vlm(["one", "two"]) as server:
         ask_in_episode(server, settings, "a", "first")
@@ -92,6 +95,7 @@ def test_what_was_not_asked_before_in_an_episode_is_asked(tmp_path, episode, wor
 
 @pytest.mark.parametrize("is_kept", [True, False], ids=["anew", "nothing is stored"])
 def test_a_run_that_measures_the_spread_or_stores_nothing_asks_everything_again(tmp_path, is_kept):
+    """Stored is the reply *one*; a run with `anew`, or without a store, gets the next, *two*."""
     with fake_vlm(["one", "two"]) as server:
         ask_in_episode(server, ReplySettings(tmp_path), "a", "first")
         passing = ReplySettings(tmp_path, anew=True) if is_kept else None
@@ -132,6 +136,11 @@ def test_a_stored_reply_is_used_unless_an_option_changes_that_would_change_it(
 
 
 def test_the_digest_of_a_question_changes_with_everything_that_is_sent():
+    """Each question differs from the others in one respect: in its system text, its schema, who
+    speaks, how many turns it has, or a clip in it (black, grey, or black at half the rate).
+
+    As many questions, as many digests: no two share a stored reply.
+    """
     asked = query_of("words")
     frames = np.zeros((2, 4, 4, 3), np.uint8)
     clips = Clip(frames, Fraction(30)), Clip(frames + 1, Fraction(30)), Clip(frames, Fraction(15))
@@ -186,7 +195,11 @@ NO_CHOICES = Garbage(json.dumps({"choices": [], "usage": {"prompt_tokens": 7}}).
     ids=["no tokens", "too many tokens", "less than none"],
 )
 def test_a_reply_of_unknown_cost_stops_a_run_with_a_budget_but_is_stored(tmp_path, reply):
-    """A service may report no tokens, or a number that makes no sense: the cost is NaN."""
+    """A service may report no tokens, or a number that makes no sense: the cost is unknown (NaN).
+
+    With a budget of 90 dollars the second question is refused. Without one, the first question
+    gets its stored reply, *one*, and no one knows what it cost.
+    """
     with fake_vlm([reply, "two"]) as server:
         with pytest.raises(BudgetError, match=r"what 1 reply cost is unknown, .* of model 'fake'"):
             ask_in_episode(server, ReplySettings(tmp_path, 90.0), "a", "0", "1", **PRICES)
@@ -200,6 +213,10 @@ def test_a_reply_of_unknown_cost_stops_a_run_with_a_budget_but_is_stored(tmp_pat
 
 
 def test_an_unreadable_reply_makes_the_cost_of_a_run_unknown(tmp_path):
+    """A reply without a choice is an error, but it was paid: what is left of a budget is unknown.
+
+    So the next episode's question is refused, and the service gets one request only.
+    """
     limited = ReplySettings(tmp_path, 1e-6)
     with fake_vlm([NO_CHOICES]) as server:
         with pytest.raises(PolicyReplyError):
@@ -254,7 +271,12 @@ SELECT 'a' AS episode, 0 AS call, 'x' AS sent, 'x' AS text, i AS cost_usd FROM n
 def test_a_file_of_replies_that_cannot_be_read_ends_the_run_and_is_named(
     tmp_path, statements, words
 ):
-    """It would be an error of the policy in every episode, or be read for ever."""
+    """The file of stored replies holds a view without an end, another table, or no database at all
+    ("" stands for a file of other bytes).
+
+    Otherwise it would be an error of the policy in every episode, or be read for ever. Nothing is
+    asked of the model.
+    """
     with changed_store(tmp_path) as database:
         database.executescript(statements)
     if not statements:
@@ -268,6 +290,7 @@ def test_a_file_of_replies_that_cannot_be_read_ends_the_run_and_is_named(
 
 
 def test_a_stored_cost_that_is_no_number_is_unknown(tmp_path):
+    """A stranger wrote the cost *free* into the file of replies, so that no budget can be kept."""
     with changed_store(tmp_path) as database:
         database.execute("INSERT INTO replies VALUES ('a', 0, 'x', 'one', 1, 1, 'free')")
     store = reply_store.ReplyStore(ReplySettings(tmp_path, 9.0), "a")
@@ -279,6 +302,7 @@ def test_a_stored_cost_that_is_no_number_is_unknown(tmp_path):
 
 
 def test_a_stored_reply_that_is_no_text_is_left_out(tmp_path):
+    """A stranger wrote the byte FF, which is no text, as a reply into the file."""
     with changed_store(tmp_path) as database:
         database.execute("INSERT INTO replies VALUES ('a', 0, 'x', x'ff', 1, 1, 1)")
     store = reply_store.ReplyStore(ReplySettings(tmp_path), "a")
@@ -289,6 +313,10 @@ def test_a_stored_reply_that_is_no_text_is_left_out(tmp_path):
 
 
 def test_a_turn_years_away_as_by_a_wrong_clock_is_not_waited_for(tmp_path, monkeypatch):
+    """The file says that the service's next turn is at 1e308 s; the clock of the test says 5 s.
+
+    Its `sleep` fails the test: so the turn comes at once.
+    """
     with changed_store(tmp_path) as database:
         database.execute("UPDATE services SET next_at = 1e308")
     monkeypatch.setattr(reply_store, "time", SimpleNamespace(time=lambda: 5.0, sleep=pytest.fail))
@@ -299,6 +327,7 @@ def test_a_turn_years_away_as_by_a_wrong_clock_is_not_waited_for(tmp_path, monke
 
 
 def test_a_budget_without_prices_is_refused_before_anything_is_asked(tmp_path):
+    """Of a budget of one dollar nothing could be counted off, so no request is sent."""
     with (
         fake_vlm(["one"]) as server,
         pytest.raises(BudgetError, match="needs the prices of model 'fake'"),
@@ -310,7 +339,11 @@ def test_a_budget_without_prices_is_refused_before_anything_is_asked(tmp_path):
 @pytest.mark.parametrize("provider", ["openai", "google"])
 @pytest.mark.parametrize("code", [429, 503, 502])
 def test_a_busy_model_service_is_asked_again_after_the_pause_it_names(tmp_path, provider, code):
-    """Other processes of the run wait, too: the time of the next request is stored."""
+    """A service says three times that it is busy, and to come again in 0.05 s; then it replies.
+
+    So there are four requests and waits of 0.15 s or more. The time of the next request is stored,
+    so that other processes of the run wait, too.
+    """
     busy = Status(code, headers={"Retry-After": "0.05"})
     started = time.time()
     with fake_vlm([busy, busy, busy, "at last"]) as server:
@@ -334,7 +367,14 @@ def test_a_busy_model_service_is_asked_again_after_the_pause_it_names(tmp_path, 
     ],
 )
 def test_pauses_for_a_busy_service_double_until_retries_or_patience_end(monkeypatch, said, waits):
-    """`said` are the errors of the service in order, `waits` the pauses in seconds."""
+    """`said` are the errors of the service in order, `waits` the pauses in seconds before it is
+    asked again.
+
+    Pauses double from 1 s on, unless the service names a longer one (7 s). An answer that is lost
+    uses up one of two retries: the third one ends the asking. In the second row the service asks
+    for 99.5 s, which with the pause of 1 s is more than the patience of 100 s. The clock of the
+    test does not wait.
+    """
     waited: list[float] = []
     clock = SimpleNamespace(monotonic=lambda: sum(waited), sleep=waited.append)
     monkeypatch.setattr(vlm_query, "time", clock)
@@ -442,7 +482,13 @@ class EpisodeProcess:
 
 @pytest.mark.parametrize("kills", [4, pytest.param(24, marks=pytest.mark.slow)])
 def test_no_answered_call_is_made_again_after_a_kill(tmp_path, kills):
-    """Each episode is killed twice after a random number of replies, and then finished."""
+    """A process plays episodes; each is killed twice after a random number of replies, then
+    finished.
+
+    Replies are stored, so an answered call is never made again: how often it was requested when
+    its answer was first seen equals how often it was in the end. What was under way at a kill may
+    be asked once more.
+    """
     rng = random.Random(0)
     answered: dict[str, int] = {}
     """How often a call had been made when its answer was seen first."""

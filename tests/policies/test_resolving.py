@@ -79,6 +79,11 @@ def test_a_namer_that_is_always_right_turns_every_setting_into_the_explicit_one(
 
 
 def test_the_command_is_said_in_the_words_that_the_policy_knows():
+    """Said is, in words for tests, *I want to see how you handle the green cube. Grab it and …*.
+
+    The policy was trained with the words of the pool "train": it hears the explicit command in
+    these.
+    """
     policy = resolving(MeaningNamer(), wordings="train")
 
     policy.reset(DIRECT, {})
@@ -89,15 +94,29 @@ def test_the_command_is_said_in_the_words_that_the_policy_knows():
 
 
 def test_of_an_instruction_in_turns_only_the_last_utterance_is_replaced():
+    """The first sentence is said at the start, and the command at step 20.
+
+    What *it* means is known only then, so the policy hears the first sentence as it was said, and
+    then the command with the value in place of *it*.
+    """
     policy = resolving(MeaningNamer(), unheard=1)
 
-    policy.reset(INTRODUCTION, {})
-    policy.hear(COMMAND, 20)
+    policy.reset("I want to see how you handle the green cube.", {})
+    policy.hear("Grab it and place it on the target three times, then press the button.", 20)
 
-    assert policy.policy.heard == [INTRODUCTION, EXPLICIT]
+    assert policy.policy.heard == [
+        "I want to see how you handle the green cube.",
+        "Grab the green cube and place it on the target three times, then press the button.",
+    ]
 
 
 def test_observations_show_the_instruction_as_the_policy_has_heard_it():
+    """The introduction names the green cube; the command, at step 20, says *grab it*.
+
+    The policy repeats the instruction that its observation shows: first the introduction as it was
+    said, then the explicit command, *grab the green cube*, though the observation has the one
+    said.
+    """
     policy = resolving(MeaningNamer(), unheard=1)
 
     policy.reset(INTRODUCTION, {})
@@ -108,6 +127,7 @@ def test_observations_show_the_instruction_as_the_policy_has_heard_it():
 
 
 def test_before_the_last_utterance_nothing_is_understood():
+    """Of two utterances only the first, *I want to see how you handle the green cube*, was said."""
     policy = resolving(MeaningNamer(), unheard=1)
 
     policy.reset(INTRODUCTION, {})
@@ -127,6 +147,7 @@ def test_a_goal_that_the_scene_does_not_have_is_said_as_well():
 
 
 def test_without_a_goal_the_policy_hears_what_was_said_and_that_is_counted():
+    """The namer of this test finds no goal in any text."""
     policy = resolving(NamesNothing())
 
     policy.reset(DIRECT, {})
@@ -137,7 +158,11 @@ def test_without_a_goal_the_policy_hears_what_was_said_and_that_is_counted():
 
 
 def test_a_rewritten_command_is_counted_and_kept_with_the_goal():
-    """The namer names the goal of the episode: the green cube, three times."""
+    """The namer names the goal of the episode: the green cube, three times.
+
+    Said was *I want to see how you handle the green cube. Grab it …*; EXPLICIT is *Grab the green
+    cube and place it on the target three times, then press the button.*
+    """
     policy = resolving(Names(get_episode("PickXtimes", "test", 0).goal))
 
     policy.reset(DIRECT, {})
@@ -158,7 +183,11 @@ def test_a_rule_without_eyes_says_no_more_of_a_thing_than_the_text(text):
 
 
 def test_a_model_behind_http_names_the_goal_from_what_was_said():
-    """It is asked once."""
+    """The service (a stand-in) names the green cube, three times, in JSON; it is asked once.
+
+    DIRECT is what was said, *… the green cube. Grab it …*, and stands in the request; EXPLICIT is
+    the command with the value, *Grab the green cube … three times …*, which the policy hears.
+    """
     with fake_vlm(['{"color": "green", "repeats": 3}']) as server:
         policy = resolving(VLMNamer(ListenerOptions(model=model_options(server))))
 
@@ -170,7 +199,10 @@ def test_a_model_behind_http_names_the_goal_from_what_was_said():
 
 
 def test_needs_of_namer_and_policy_are_merged():
-    """The namer sees the front camera and every 8th frame, the policy the wrist and all frames."""
+    """The namer sees the front camera and every 8th frame, the policy the wrist and all frames.
+
+    Together they need both cameras and all frames.
+    """
     with fake_vlm([]) as server:
         namer = VLMNamer(ListenerOptions(model=model_options(server)))
         policy = ResolvingPolicy(namer, Hearer())
@@ -189,6 +221,11 @@ def test_needs_of_namer_and_policy_are_merged():
     ],
 )
 def test_the_whole_is_privileged_if_the_namer_or_the_policy_is(spec, is_privileged):
+    """A policy is privileged if it reads more of the simulator than a robot could see.
+
+    The namer "listener" does so, and the policy "last-mention"; "surface" reads the text, and a
+    model's service and openpi get pictures.
+    """
     assert read_policy(spec).is_privileged == is_privileged
 
 
@@ -209,10 +246,12 @@ def test_the_whole_is_privileged_if_the_namer_or_the_policy_is(spec, is_privileg
     ids=["wordings", "namer", "policy", "model of the namer"],
 )
 def test_another_part_makes_another_policy(spec, other):
+    """Runs of one `makeup` are counted as those of one policy."""
     assert read_policy(f"resolve:{spec}").makeup != read_policy(f"resolve:{other}").makeup
 
 
 def test_the_version_names_that_of_the_namer_and_of_the_policy():
+    """The namer "surface" is built in; the policy behind it declares the version *v7*."""
     policy = ResolvingPolicy(RuleNamer("surface"), Hearer())
 
     assert policy.version == "built-in → v7"

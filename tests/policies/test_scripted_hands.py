@@ -61,28 +61,46 @@ def play_with(planner, task, episode=0, setting="explicit"):
     return play(env, policy), policy
 
 
+def stages_of(task):
+    """Yield (stage, scene) for all goals of the scenes of eight test episodes."""
+    for index in range(8):
+        scene = get_episode(task, "test", index).scene
+        for goal in get_task(task).goals(scene):
+            for stage in get_task(task).stages(scene, goal):
+                yield stage, scene
+
+
 @pytest.mark.parametrize("task", TASKS)
 def test_the_text_of_every_subgoal_is_read_as_the_motion_it_stands_for(task):
-    """With a point, at <12, 200>, and without."""
-    for index in range(8):
-        episode = get_episode(task, "test", index)
-        for goal in get_task(task).goals(episode.scene):
-            for stage in get_task(task).stages(episode.scene, goal):
-                kind = stage.primitive.kind
-                grounded = stage.subgoal.replace("{at}", "at <12, 200>")
-                for words in (plain_subgoal(stage), grounded):
-                    request = read_subgoal(words)
-                    assert request is not None, words
-                    assert request.kind == AS_READ.get(kind, kind)
-                    assert request.point == ((12, 200) if "<" in words else None)
-                if stage.points_at:
-                    assert request.thing == episode.scene[stage.points_at].kind
+    """The motion of a stage has a kind, such as *pick_cube*, and `read_subgoal` returns it too.
+
+    Two kinds have words of another one (AS_READ): *press from above* is read as a press, and *hold
+    until …* as a hold. Stages are those of all goals of the scenes of eight test episodes.
+    """
+    for stage, _ in stages_of(task):
+        kind = stage.primitive.kind
+        assert read_subgoal(plain_subgoal(stage)).kind == AS_READ.get(kind, kind), stage.subgoal
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_point_of_a_subgoal_and_the_kind_of_thing_at_it_are_read(task):
+    """A subgoal has `{at}` where a point belongs, here <12, 200>: a row and a column of a picture.
+
+    A stage points at a thing of its scene, such as cube_red: what is read is its kind, *cube*.
+    """
+    stages_with_a_point = [(stage, scene) for stage, scene in stages_of(task) if stage.points_at]
+
+    assert stages_with_a_point
+    for stage, scene in stages_with_a_point:
+        request = read_subgoal(stage.subgoal.replace("{at}", "at <12, 200>"))
+        assert (request.point, request.thing) == ((12, 200), scene[stage.points_at].kind)
 
 
 @pytest.mark.parametrize(
     ("words", "steps"), [("remain static", 16), ("Remain static for 40 steps.", 40)]
 )
 def test_remain_static_is_read_with_its_number_of_steps(words, steps):
+    """Without a number it means 16 steps, the length of a chunk."""
     assert read_subgoal(words).steps == steps
 
 
@@ -103,6 +121,11 @@ def test_nonsense_and_incomplete_words_are_not_read_as_a_subgoal(words):
     ],
 )
 def test_a_subgoal_that_fits_no_object_or_several_is_refused_without_moving(task, subgoal, why):
+    """The hands hold nothing, and no cube is purple or seen in the upper left corner, at <0, 0>.
+
+    VideoRepick has several cubes, and *correct* tells none apart. The simulation has done as many
+    steps after the subgoal as before; the hands count one refusal.
+    """
     env, hands = environment_and_hands(task)
     before = env.session.world.elapsed
 
@@ -131,6 +154,10 @@ def cube_that_is_not_red():
 def test_a_subgoal_with_a_point_means_the_object_at_the_point_despite_its_words(
     cube_that_is_not_red,
 ):
+    """The fixture has the name of a cube that is not red, and the point where it is seen.
+
+    *Pick up the red cube at* this point: the hands pick up the cube at the point.
+    """
     env, hands, name, point = cube_that_is_not_red
 
     end = follow_to_the_end(env, hands, f"pick up the red cube at {point}")
@@ -140,6 +167,7 @@ def test_a_subgoal_with_a_point_means_the_object_at_the_point_despite_its_words(
 
 @pytest.mark.sim
 def test_what_the_hands_hold_is_meant_by_it(cube_that_is_not_red):
+    """The hands pick up a cube by the point at which it is seen; then *it* is this cube."""
     env, hands, name, point = cube_that_is_not_red
     follow_to_the_end(env, hands, f"pick up the cube at {point}")
 
@@ -150,6 +178,7 @@ def test_what_the_hands_hold_is_meant_by_it(cube_that_is_not_red):
 
 @pytest.mark.sim
 def test_a_subgoal_that_was_just_done_is_done_without_moving(cube_that_is_not_red):
+    """The cube is in the hand, so to pick it up once more is done at once, in no step."""
     env, hands, _, point = cube_that_is_not_red
     follow_to_the_end(env, hands, f"pick up the cube at {point}")
     steps = env.session.world.elapsed
@@ -163,6 +192,10 @@ def test_a_subgoal_that_was_just_done_is_done_without_moving(cube_that_is_not_re
 @pytest.mark.sim
 @pytest.mark.parametrize("task", slow_but(["StopCube", "ButtonUnmaskSwap"], TASKS))
 def test_the_oracle_with_scripted_hands_succeeds(task):
+    """The planner "oracle" names the right subgoals, and the hands read the simulator.
+
+    A grip may miss, and then is repeated; nothing may be refused or blocked.
+    """
     info, policy = play_with("oracle", task, episode=3)
 
     assert info["status"] == "success", (info["cause"], policy.endings)
@@ -180,6 +213,7 @@ def test_the_oracle_planner_succeeds_though_the_arm_hides_the_object_it_points_a
 @pytest.mark.sim
 @pytest.mark.parametrize("task", slow_but(["StopCube", "VideoUnmask"], SOME_TASKS))
 def test_the_listener_planner_succeeds_from_the_words_alone(task):
+    """The planner "listener" understands the words of the setting *reasoning* by their meaning."""
     info, _ = play_with("listener", task, episode=1, setting="reasoning")
 
     assert info["status"] == "success"
@@ -196,6 +230,10 @@ def test_the_listener_planner_succeeds_from_the_words_alone(task):
     ],
 )
 def test_a_failed_record_names_the_fault_of_its_planner(reply, timeout_s, named):
+    """The planner's model always gives this reply: a subgoal that the hands refuse, as nothing is
+    in the hand; words that are no subgoal; or a reply that comes after 10 s, where 1 s is the
+    limit.
+    """
     with fake_vlm([reply]) as server:
         model = f"base_url={server.url}/v1&model=stub&timeout_s={timeout_s}&retries=0"
         spec = f"planner:stateless?{model}&observe_every=400"  # few pictures are drawn
@@ -228,7 +266,12 @@ def test_planners_with_scripted_hands_can_be_named_on_the_command_line(spec):
 
 @pytest.mark.sim
 def test_the_stateless_planner_asks_with_a_list_of_ended_subgoals():
-    """The third reply has thoughts before the subgoal, the fourth is unreadable and asked again."""
+    """The model replies *sing*, *remain static*, the same for 5 steps after a thought, nonsense,
+    *done*.
+
+    Each question lists the subgoals so far, with their ends: *sing* is refused at step 0, standing
+    still lasts 16 steps, and the next one 5 more. The nonsense is asked again, and *done* ends it.
+    """
     replies = ["sing", "remain static", "First.\n\nRemain static for 5 steps.\n", "?<", "done"]
     with fake_vlm(replies) as server:
         policy = make_policy(f"planner:stateless?base_url={server.url}/v1&model=x", 0)
@@ -260,7 +303,11 @@ def test_the_stateless_planner_asks_with_a_list_of_ended_subgoals():
     ],
 )
 def test_the_choices_of_each_task_are_those_of_robomme(task, choices):
-    """A plus marks a motion for which a point has to be chosen."""
+    """RoboMME lets a model choose among the motions of a task, labeled a, b, c …
+
+    A plus marks a motion for which a point has to be chosen. Some episodes of StopCube leave no
+    time to wait and so have no choice *hold_until*: only those with three choices are compared.
+    """
     for index in range(20):
         found = choices_of(get_episode(task, "test", index))
         motions = []
@@ -274,7 +321,11 @@ def test_the_choices_of_each_task_are_those_of_robomme(task, choices):
 
 @pytest.mark.sim
 def test_an_episode_can_be_solved_with_the_action_space_choice():
-    """An action is a letter of the choice and a pixel: of the cube to pick, else none."""
+    """The choices of PickXtimes are a, pick; b, place; and c, press.
+
+    An action is a letter and a pixel: that of the cube to pick, or none. At each step the letter
+    of the motion that the task's judge expects next is chosen, and so the episode succeeds.
+    """
     from roboirg.simulation.expert.things import origin_pixel
 
     env = roboirg.make("PickXtimes", episode=2, actions="choice", cameras=())
@@ -295,7 +346,10 @@ def test_an_episode_can_be_solved_with_the_action_space_choice():
 @pytest.mark.sim
 @pytest.mark.parametrize("action", [[3, 0, 0], [0, -1, -1], [0.5, 1, 1]])
 def test_an_action_that_is_no_choice_is_refused_without_moving(action):
-    """There are three choices, 0 to 2; the first one needs a pixel."""
+    """An action is (choice, row, column), with choices 0 to 2.
+
+    Refused are choice 3, choice 0 (pick) without its pixel, and half a choice.
+    """
     env = roboirg.make("PickXtimes", episode=2, actions="choice", cameras=())
     env.reset()
 

@@ -49,6 +49,11 @@ def reported(monkeypatch):
 
 @pytest.mark.usefixtures("process_with_first_server")
 def test_a_free_server_is_not_waited_for(tmp_path, reported):
+    """Another process (the fixture) has the first server; the second one is free.
+
+    So its lock is got without a report that someone waits (`reported` is empty) and without a
+    second of waiting time.
+    """
     before = queued_seconds()
 
     lock_server([SECOND_SERVER], wait=5, folder=tmp_path).file.close()
@@ -59,6 +64,11 @@ def test_a_free_server_is_not_waited_for(tmp_path, reported):
 
 @pytest.mark.usefixtures("process_with_first_server")
 def test_waiting_for_a_busy_server_is_reported_counted_and_ends_in_an_error(tmp_path, reported):
+    """Another process (the fixture) has the first server, so a wait of 0.2 s ends in an error.
+
+    `reported` has what was waited for, in order: the test itself, then a free server, then the
+    test again once that ended, then nothing. The 0.2 s count as time in a queue.
+    """
     before = queued_seconds()
 
     with (
@@ -76,6 +86,7 @@ def test_waiting_for_a_busy_server_is_reported_counted_and_ends_in_an_error(tmp_
 
 @pytest.mark.usefixtures("process_with_first_server")
 def test_of_two_servers_the_free_one_is_taken(tmp_path):
+    """Another process (the fixture) has the first server; both are asked for, without a wait."""
     lock = lock_server([FIRST_SERVER, SECOND_SERVER], wait=0, folder=tmp_path)
 
     assert lock.endpoint == SECOND_SERVER
@@ -84,6 +95,10 @@ def test_of_two_servers_the_free_one_is_taken(tmp_path):
 
 @pytest.mark.usefixtures("process_with_first_server")
 def test_if_all_servers_are_busy_the_error_names_them(tmp_path):
+    """Another process (the fixture) has the first server, and this test locks the second, `/two`.
+
+    So both are asked for in vain, also by who would share a server.
+    """
     lock = lock_server([SECOND_SERVER], wait=0, folder=tmp_path)
 
     with pytest.raises(PolicyTimeoutError, match=r"Other episodes used .*h:8001/two"):
@@ -93,6 +108,10 @@ def test_if_all_servers_are_busy_the_error_names_them(tmp_path):
 
 
 def test_the_server_of_a_process_that_was_killed_becomes_free(process_with_first_server, tmp_path):
+    """The process of the fixture has the first server, and dies without giving it back.
+
+    The kernel then ends its lock, so that the server is got well before the 300 s are over.
+    """
     os.kill(process_with_first_server.pid, signal.SIGKILL)
 
     lock = lock_server([FIRST_SERVER], wait=300, folder=tmp_path)
@@ -102,6 +121,7 @@ def test_the_server_of_a_process_that_was_killed_becomes_free(process_with_first
 
 
 def test_a_shared_lock_of_a_server_allows_more_shared_ones_and_no_other(tmp_path):
+    """Three share the server, and then no one can have it alone; once all gave it back, one can."""
     locks = [lock_server([FIRST_SERVER], wait=0, folder=tmp_path, shared=True) for _ in range(3)]
     with pytest.raises(PolicyConnectionError):
         lock_server([FIRST_SERVER], wait=0, folder=tmp_path)
@@ -112,6 +132,7 @@ def test_a_shared_lock_of_a_server_allows_more_shared_ones_and_no_other(tmp_path
 
 
 def test_localhost_and_127_0_0_1_are_locked_as_the_same_server(tmp_path):
+    """Both names stand for this machine: who has port 1 of the one has it of the other."""
     lock = lock_server([Endpoint("localhost", 1)], wait=0, folder=tmp_path)
 
     with pytest.raises(PolicyConnectionError):
@@ -121,6 +142,10 @@ def test_localhost_and_127_0_0_1_are_locked_as_the_same_server(tmp_path):
 
 
 def test_two_paths_of_one_address_are_two_servers(tmp_path):
+    """Both servers have the address h:8001, but the second one has the path `/two`.
+
+    While the first is locked, the second can be locked without a wait.
+    """
     lock = lock_server([FIRST_SERVER], wait=0, folder=tmp_path)
 
     lock_server([SECOND_SERVER], wait=0, folder=tmp_path).file.close()
@@ -129,6 +154,10 @@ def test_two_paths_of_one_address_are_two_servers(tmp_path):
 
 
 def test_a_second_policy_of_the_same_thread_is_refused_instead_of_waiting_for_ever():
+    """A server plays one episode at a time, and here the only thread that could end it waits.
+
+    So the second policy gets an error that says what to do; once the first is closed, it can play.
+    """
     with MmeVlaServer() as server:
         first = make_policy(f"mme-vla://{server.place}", 0)
         second = make_policy(f"mme-vla://{server.place}", 0)
@@ -143,6 +172,7 @@ def test_a_second_policy_of_the_same_thread_is_refused_instead_of_waiting_for_ev
 
 
 def test_a_policy_that_is_forgotten_without_being_closed_leaves_its_server():
+    """Python deletes the policy, and with it its hold on the server: another one can play there."""
     with MmeVlaServer() as server:
         forgotten = make_policy(f"mme-vla://{server.place}", 0)
         forgotten.reset(INSTRUCTION, video(0))
@@ -166,6 +196,12 @@ def play(url, length):
 
 
 def test_two_processes_that_share_a_stateful_server_get_correct_replies():
+    """Each process plays three episodes, in turns, of videos of 3 and of 8 frames.
+
+    The server answers with the number of frames that it was shown, and each process (`play`)
+    checks that these are its own episode's alone: it ends with 0 if so. Each of 2 · 3 episodes
+    connects anew.
+    """
     with MmeVlaServer(delay=0.002) as server:
         url = f"mme-vla://{server.place}?part=2"
         players = [SPAWN.Process(target=play, args=(url, length)) for length in (3, 8)]

@@ -118,6 +118,13 @@ def served_episodes(protocol):
 
 @pytest.mark.parametrize("protocol", SERVED)
 def test_a_served_policy_sees_what_its_client_was_shown(protocol):
+    """A client plays two episodes at a server: in each, two moments are shown to the policy behind
+    it.
+
+    The policy writes down what it gets: seed 7 of the server, the instruction (MME-VLA lowers it),
+    and the fields that the protocol carries, equal to what the client was given. A message has one
+    number for the gripper; the policy sees it as two fingers, of which the first is compared.
+    """
     first, second = served_episodes(protocol)
 
     for policy in (first, second):
@@ -131,7 +138,12 @@ def test_a_served_policy_sees_what_its_client_was_shown(protocol):
 
 @pytest.mark.parametrize("protocol", [name for name in SERVED if name != "openpi"])
 def test_a_served_policy_sees_the_video_and_the_moments_between_two_questions(protocol):
-    """Depending on the protocol: some carry neither video nor history."""
+    """A client plays two episodes, with videos of three and of two moments.
+
+    The policy behind the server sees the videos, and at the second question the moments 4 and 5
+    since the first, as its history. MME-VLA sends no pictures of the wrist in these, and openpi
+    neither videos nor moments.
+    """
     first, second = served_episodes(protocol)
     shown = set(FIELDS_SENT[protocol])
     if protocol == "mme-vla":
@@ -145,6 +157,7 @@ def test_a_served_policy_sees_the_video_and_the_moments_between_two_questions(pr
 
 
 def test_a_policy_that_is_served_by_openpi_gets_no_video():
+    """The client has a video of three moments, which openpi has no message for."""
     first, _ = served_episodes("openpi")
     assert len(first.demonstration["joint_positions"]) == 0
 
@@ -160,7 +173,11 @@ GROWING_PROMPT = [
 
 @pytest.mark.parametrize("protocol", [name for name in SERVED if name != "openpi"])
 def test_a_served_policy_hears_each_new_sentence_of_a_growing_prompt(protocol):
-    """In the second episode steps are counted anew."""
+    """In both episodes the client's prompt changes: *this one is red*, *please note*, *take it*.
+
+    The first is the instruction; the policy hears the others with the steps at which they came, 2
+    and 5. Steps of the second episode, which is checked here, are counted from its own beginning.
+    """
     with served(HERE, protocol) as url:
         play(url, 3, *GROWING_PROMPT)
         play(url, 2, *GROWING_PROMPT)
@@ -171,6 +188,10 @@ def test_a_served_policy_hears_each_new_sentence_of_a_growing_prompt(protocol):
 
 
 def test_openpi_has_no_reset_so_that_a_new_prompt_is_a_new_episode():
+    """The client's prompt ends with *take it*: the last policy has it as its instruction.
+
+    It heard nothing during its episode, as each of the changes before began another one.
+    """
     with served(HERE, "openpi") as url:
         play(url, 3, *GROWING_PROMPT)
 
@@ -180,6 +201,12 @@ def test_openpi_has_no_reset_so_that_a_new_prompt_is_a_new_episode():
 
 
 def test_a_served_policy_sees_depth_and_calibration_if_the_client_sends_them():
+    """Moment 3 is shown at the first question, and moments 4 and 5 at the second.
+
+    The policy wants depth and declares that it observes each step. What it gets equals what the
+    client was given, field by field: in the video, at the first question, and in the history of
+    the second.
+    """
     before, between, now = (moment(number, sensors=True) for number in (3, 4, 5))
     fields = [field for field in now if field != "instruction"]
 
@@ -199,7 +226,7 @@ def test_a_served_policy_sees_depth_and_calibration_if_the_client_sends_them():
 
 
 def test_a_request_whose_lists_differ_in_length_is_refused():
-    """Two moments, and depth of one of them."""
+    """A request shows two moments in lists, one for each field, but depth of one of them only."""
     request = {"task_goal": ["go"], "is_first_step": True, "front_depth_list": [np.zeros(3)]}
     for name in ("front_rgb", "wrist_rgb", "joint_state", "eef_state", "gripper_state"):
         request[f"{name}_list"] = [np.zeros(3), np.zeros(3)]
@@ -236,7 +263,12 @@ VIDEO_OF_TWO_FRAMES_AND_THE_FIRST_MOMENT = {
 
 @pytest.mark.parametrize("kind", ["grounded", "simple"])
 def test_connections_to_an_mme_vla_server_share_one_policy(kind):
-    """The video is sent over one connection, the question with its subgoal over another."""
+    """The video comes over one connection, and the question with its subgoal over another.
+
+    The buffer holds two frames of the video and the current one: the policy sees the video of two,
+    and follows the subgoal. (The first recorded policy is the one with which the server was
+    opened.)
+    """
     request = {
         "observation/image": FRAMES[2, 0],
         "observation/wrist_image": FRAMES[2, 0],
@@ -274,6 +306,9 @@ def test_idle_connections_make_no_policy():
     ids=["no msgpack", "no state", "pictures of one camera", "text"],
 )
 def test_a_malformed_request_is_answered_by_a_traceback_and_close_code_1011(message, words):
+    """1011 is the code of WebSocket for an error of the server; before it, a text says what was
+    wrong.
+    """
     with served(HERE, "mme-vla") as url, opened(url) as raw:
         raw.send(message)
         answer = raw.recv()
@@ -286,6 +321,9 @@ def test_a_malformed_request_is_answered_by_a_traceback_and_close_code_1011(mess
 
 
 def test_after_a_malformed_request_the_next_episode_works():
+    """The byte C1 is no message of msgpack. The next client gets one chunk of 4 actions of 8
+    numbers.
+    """
     with served(HERE, "mme-vla") as url:
         with opened(url) as raw:
             raw.send(b"\xc1")
@@ -309,6 +347,7 @@ def test_an_exception_in_a_served_policy_reaches_the_client_with_its_message(pro
 
 @pytest.mark.parametrize("protocol", SERVED)
 def test_a_server_reports_its_health_to_anyone(protocol):
+    """Also without the key *sesame*, at the path /healthz."""
     with served(HERE, protocol, key="sesame") as url:
         health = HTTPConnection(url.split("://")[1], timeout=300)
         health.request("GET", "/healthz")
@@ -318,6 +357,10 @@ def test_a_server_reports_its_health_to_anyone(protocol):
 
 @pytest.mark.parametrize("protocol", SERVED)
 def test_a_server_with_a_key_refuses_clients_without_it(protocol, monkeypatch):
+    """The server's key is *sesame*; one client sends none, and the other one *sesam*.
+
+    401 is the status of HTTP for who may not enter.
+    """
     monkeypatch.setenv("KEY", "sesam")
     with served(HERE, protocol, key="sesame") as url:
         for query in ("", "?api_key_env=KEY"):
@@ -327,6 +370,7 @@ def test_a_server_with_a_key_refuses_clients_without_it(protocol, monkeypatch):
 
 @pytest.mark.parametrize("protocol", SERVED)
 def test_a_server_with_a_key_serves_a_client_with_the_same_key(protocol, monkeypatch):
+    """Both have *sesame*: one chunk of 4 actions of 8 numbers is the answer of the policy."""
     monkeypatch.setenv("KEY", "sesame")
     with served(HERE, protocol, key="sesame") as url:
         chunks, _ = play(f"{url}?api_key_env=KEY", 0, moment(0, history=()))
@@ -335,6 +379,7 @@ def test_a_server_with_a_key_serves_a_client_with_the_same_key(protocol, monkeyp
 
 
 def test_a_client_whose_variable_holds_no_key_is_refused(monkeypatch):
+    """The client takes its key from the variable KEY, which is not set."""
     monkeypatch.delenv("KEY", raising=False)
 
     with (
@@ -369,6 +414,11 @@ def test_a_client_whose_variable_holds_no_key_is_refused(monkeypatch):
     ],
 )
 def test_a_policy_that_a_protocol_cannot_serve_is_refused_with_the_reason(options, error, words):
+    """Asked for is the policy "random" by openpi at a free port, unless the options say otherwise.
+
+    The policies of this file: Remembering wants to see each step, Seeing depth as well, and Posing
+    acts in poses; the error names what the protocol does not carry, and the protocols that do.
+    """
     place = ServerOptions(port=options.get("port", 0))
     with pytest.raises(error, match=words):
         open_server(options.get("spec", "random"), options.get("protocol", "openpi"), place)

@@ -63,6 +63,9 @@ def test_observations_without_a_video_have_no_history():
 
 
 def test_a_subgoal_is_sent_with_each_observation_of_its_episode():
+    """Two observations of the first episode have it; that of the second, which begins anew, has
+    none.
+    """
     with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
         client.follow("pick it up at <1, 2>")
@@ -84,6 +87,11 @@ WISHES = {"send_wrist_image": False, "send_state": False, "send_video_history": 
     ids=["options of the URL", "wishes of the server"],
 )
 def test_options_of_the_server_or_the_url_leave_out_camera_state_and_video(query, wishes):
+    """Both say no to the wrist camera, the robot's state and the video: the URL, or the server's
+    hello.
+
+    What is left of the first message is the front camera (*agentview*) and the instruction.
+    """
     with VlaEvalServer() as server:
         server.hello = {**server.hello, "observation_params": wishes}
         with client_of(server, "vla-eval", query) as client:
@@ -95,6 +103,7 @@ def test_options_of_the_server_or_the_url_leave_out_camera_state_and_video(query
 
 
 def test_a_client_that_leaves_out_camera_and_video_does_not_need_them():
+    """`cameras` and `demonstration_frames` tell the environment what it has to draw."""
     with VlaEvalServer() as server:
         with client_of(server, "vla-eval", "?wrist=no&video=no") as client:
             assert client.cameras == ("front",)
@@ -115,6 +124,11 @@ def test_a_client_that_leaves_out_camera_and_video_does_not_need_them():
     ids=["says nothing", "says something else", "no state", "no video"],
 )
 def test_a_server_is_shown_all_that_it_does_not_refuse(params, shown):
+    """`params` are the server's wishes in its hello, and `shown` the fields that it then gets.
+
+    Images, the instruction and the mark of a new episode are always sent, so they are left out
+    here.
+    """
     with VlaEvalServer() as server:
         server.hello = {**server.hello, "observation_params": params}
         with client_of(server, "vla-eval") as client:
@@ -143,6 +157,7 @@ def test_a_server_is_shown_all_that_it_does_not_refuse(params, shown):
     ids=["action space", "version", "a version that is no number"],
 )
 def test_a_server_with_another_action_space_or_protocol_version_is_refused(hello, error, reason):
+    """The client acts in joint angles (*actions*) and speaks version 1 of the protocol."""
     with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
         server.hello = {**server.hello, **hello}
 
@@ -151,6 +166,7 @@ def test_a_server_with_another_action_space_or_protocol_version_is_refused(hello
 
 
 def test_a_server_with_another_action_space_is_used_if_the_url_agrees():
+    """Server and URL both say *ee_pose*; then the reset succeeds."""
     with VlaEvalServer() as server:
         server.hello = {**server.hello, "observation_params": {"action_space": "ee_pose"}}
         with client_of(server, "vla-eval", "?actions=ee_pose") as client:
@@ -174,6 +190,11 @@ def test_a_server_with_another_action_space_is_used_if_the_url_agrees():
     ],
 )
 def test_a_malformed_reply_of_a_vla_eval_server_ends_only_its_episode(fault, words):
+    """`fault` replaces the server's first reply: a message of another type or number, bytes that
+    are no message, or actions that are no array of 8 numbers. `words` are in the error.
+
+    The next episode of the same client gets its action.
+    """
     with VlaEvalServer(faults=[fault]) as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
         with pytest.raises(PolicyReplyError, match=words):
@@ -186,6 +207,9 @@ def test_a_malformed_reply_of_a_vla_eval_server_ends_only_its_episode(fault, wor
 @pytest.mark.parametrize("name", ["actions", "action"])
 @pytest.mark.parametrize("action", [[0.5] * 8, np.full((1, 8), 0.5), np.full(8, 0.5, np.float16)])
 def test_actions_are_read_under_both_names_and_in_any_shape(name, action):
+    """A server may call the eight numbers *actions* or *action*, and send them as a list or an
+    array, with or without a first axis. All are read as one row.
+    """
     with VlaEvalServer(faults=[{name: action}]) as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
         assert client.act(moment(0)).tolist() == [[0.5] * 8]

@@ -34,7 +34,12 @@ def names_meant(scene, noun, words):
     ],
 )
 def test_of_two_things_at_nearly_the_same_place_both_may_be_meant(words, places):
-    """container_0 and container_1 tie, or one measure chooses the one and another the other."""
+    """`places` are those of container_0, container_1 and container_2, as (x, y) in meters.
+
+    x grows away from the robot, y to its left. By each of the phrases container_0 and container_1
+    are nearly equal (they differ by 1 cm or less), or one way to measure (depth or side alone,
+    distance from the robot) chooses the one and another way the other; container_2 is never meant.
+    """
     found = names_meant(containers(*places), "container", words)
     assert found == ["container_0", "container_1"]
 
@@ -45,9 +50,12 @@ def test_of_two_things_at_nearly_the_same_place_both_may_be_meant(words, places)
     ids=["unclear", "clear"],
 )
 def test_a_place_within_a_group_is_unclear_if_the_group_is(second, names):
-    """container_1 is the leftmost one, but is it one of *the two closest to you*?
+    """container_2 stands closest to the robot, and container_1, at `second`, farther left than
+    container_0.
 
-    It is clear if it is 5 cm closer than container_0, and unclear if they are equally close.
+    So is container_1 one of *the two closest to you*? Yes if it is 5 cm closer than container_0 (x
+    is the distance along the table, in meters); unclear, so that both may be meant, if it is
+    hardly farther away (5 mm).
     """
     scene = containers((0.0, 0.1), second, (-0.1, 0.0))
     phrase = "farthest to your left among the two closest to you"
@@ -63,7 +71,11 @@ def test_a_place_within_a_group_is_unclear_if_the_group_is(second, names):
     ],
 )
 def test_left_and_right_of_the_picture_are_mirrored(words, name):
-    """container_0 stands on the robot's left; the camera looks at the robot from the front."""
+    """container_0 stands 20 cm to the robot's left (y = 0.2), and container_1 as far to its right.
+
+    The camera looks at the robot from the front, so that its picture shows container_1 on the
+    left.
+    """
     scene = containers((0.0, 0.2), (0.0, -0.2))
     assert names_meant(scene, "container", words) == [name]
 

@@ -97,7 +97,12 @@ def test_each_surface_rule_guesses_the_color_that_its_reading_of_the_words_gives
 def test_each_surface_rule_guesses_the_number_that_its_reading_of_the_words_gives(
     rule, text, numbers
 ):
-    """Numbers from one to five are possible; several are a draw between them."""
+    """Numbers from one to five are possible; several are a draw between them.
+
+    A rule sees words, not meaning: "first-mention" takes the first number, "last-mention" the
+    last, "elimination" those that were not said, and "surface" computes (*one time fewer than*
+    four is 3).
+    """
     assert guess_goal(rule, text, "PickXtimes")["repeats"] == (numbers,)
 
 
@@ -262,7 +267,11 @@ def instructions_of(task, setting):
 
 @each_task
 def test_a_rule_is_scored_on_the_slots_of_the_goal_that_the_words_hide(task):
-    """A slot is a part of the goal, such as its color."""
+    """A slot is a part of the goal, such as its color.
+
+    `told` is an episode with its instruction. The score has a share for each hidden slot, and for
+    the whole goal one from 0 to 1.
+    """
     for setting in settings_of(get_task(task)):
         for told in instructions_of(task, setting):
             for score in rule_scores(told).values():
@@ -397,6 +406,7 @@ def test_rows_by_pattern_count_each_instruction_once():
 
 
 def test_rows_by_task_have_the_task_in_their_name():
+    """50 test episodes of BinFill in the setting *reasoning* make one row."""
     (row,) = rows_by("task")
     assert (row.group, row.count) == (("reasoning", "BinFill"), 50)
 
@@ -489,10 +499,14 @@ def stopcube_row():
 
 
 def test_rates_of_learners_are_columns_after_chance_and_rules(stopcube_row):
+    """The fixture is the row of StopCube; the learners' columns come last."""
     assert list(stopcube_row.shares) == ["chance", *SURFACE_RULES, *LEARNED_FLOORS]
 
 
 def test_in_stopcube_the_words_alone_give_the_visit_away_in_nine_of_ten(stopcube_row):
+    """The fixture is the row of StopCube in the setting *direct*; "text-only" learns from words
+    alone.
+    """
     assert stopcube_row.shares["text-only"].goals > 0.9
 
 
