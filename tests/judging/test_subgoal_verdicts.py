@@ -39,11 +39,17 @@ def test_any_subgoal_is_lost_when_no_stage_is_due():
 
 @pytest.mark.parametrize("task", ["SwingXtimes", "BinFill", "ButtonUnmaskSwap"])
 def test_the_subgoal_of_a_stage_with_another_act_is_not_right(task):
+    """Each stage's own words are judged against every stage with another act, such as a press
+    instead of a pick."""
     episode = get_episode(task, "test", 3)
+    verdicts = []
     for stage in episode.stages:
         for other in episode.stages:
             if other.primitive.kind != stage.primitive.kind:
-                assert judge_subgoal(plain_subgoal(other), stage, None, episode) != "right"
+                verdicts.append(judge_subgoal(plain_subgoal(other), stage, None, episode))
+
+    assert verdicts
+    assert "right" not in verdicts
 
 
 @pytest.mark.parametrize(
