@@ -36,6 +36,7 @@ def test_an_action_of_eight_finite_numbers_passes_unchanged_as_array_or_list(act
 
 @given(actions)
 def test_a_single_action_is_a_chunk_of_one_row(action):
+    """An action is eight finite numbers."""
     assert np.array_equal(check_chunk(action), [action])
 
 
@@ -50,12 +51,15 @@ def tensor_of(array):
 
 @given(chunks)
 def test_rows_of_actions_pass_unchanged_as_array_or_tensor(chunk):
+    """A chunk is several actions of eight numbers, a row each; `tensor_of` makes a stand-in for a
+    tensor with a gradient or on a GPU."""
     assert np.array_equal(check_chunk(chunk), chunk)
     assert np.array_equal(check_chunk(tensor_of(chunk)), chunk)
 
 
 @given(hnp.arrays(np.float64, other_shapes, elements=finite))
 def test_an_action_of_another_shape_is_refused_with_its_shape(action):
+    """Any shape but (8,), the one of an action."""
     with pytest.raises(InvalidActionError, match="got shape"):
         check_action(action)
 
@@ -116,6 +120,7 @@ def test_a_masked_array_without_masked_values_is_an_action():
 
 
 def test_a_tensor_of_flags_is_refused():
+    """`tensor_of` makes a stand-in for a tensor, here of true and false."""
     with pytest.raises(InvalidActionError, match="of dtype bool"):
         check_chunk(tensor_of(np.ones((2, 8), bool)))
 
@@ -150,6 +155,7 @@ def test_an_action_of_another_size_than_its_space_s_is_refused(space, check):
 
 @pytest.mark.parametrize("name", ["waypoints", "", None, ["ee_pose"]])
 def test_unknown_action_spaces_are_named(name):
+    """Names that are nearly one, empty, or no text at all: the sentence lists those that exist."""
     with pytest.raises(UnknownNameError, match=r"There is no action space .*joint_angle, ee_pose"):
         find_action_space(name)
 

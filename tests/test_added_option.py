@@ -81,7 +81,9 @@ def source_with_the_option(tmp_path):
 def test_a_new_instruction_option_reaches_words_commands_plans_records_and_tables(
     source_with_the_option, tmp_path
 ):
-    """`greeting` is added to a copy of the package, as a field and the code that reads it."""
+    """The option `greeting` is added to a copy of the package, as a field and the code that reads
+    it in the setting *direct*. A process calls five commands there, and what each has printed
+    comes back in order; the greeting "Hello, robot." must be in all of them."""
     few = ("--tasks", "PickXtimes", "--settings", "explicit,direct")
     plan = plan_file(greeting="hello", max_steps=2, episodes=1)
     run, rows = tmp_path / "run", tmp_path / "rows.jsonl"

@@ -81,6 +81,9 @@ def socket_after(port, request):
 def test_a_client_that_hangs_up_makes_the_server_print_nothing_and_it_goes_on(
     request_text, tmp_path, capfd
 ):
+    """A raw socket sends a request that is cut off in its headers or its body, or asks for a file
+    of 64 MiB and reads ten bytes of it. Then it is closed. The next request is answered, and
+    nothing was printed."""
     server = page_server(tmp_path)
     with port_of_running(server) as port:
         raw = socket_after(port, request_text)
@@ -101,6 +104,8 @@ def test_a_client_that_hangs_up_makes_the_server_print_nothing_and_it_goes_on(
     ],
 )
 def test_a_request_with_a_wrong_or_huge_length_is_refused(headers, status, tmp_path, capfd):
+    """The server takes small bodies. 413 is "too large" and 400 "wrong": a negative length, or two
+    that differ. It goes on with the next request."""
     server = score_server(tmp_path)
     with port_of_running(server) as port:
         key = f"Cookie: {server.cookie}={server.key}\r\n"
@@ -133,6 +138,8 @@ def test_requests_from_pages_of_other_sites_are_refused(make, path, tmp_path):
 
 
 def test_a_client_that_hangs_up_before_its_body_is_not_logged_as_an_error(caplog):
+    """The server has begun to read a body of 60,000 bytes, of which the client sends one and hangs
+    up."""
     started = threading.Event()
 
     async def read(request):
@@ -163,6 +170,7 @@ def test_an_exception_in_the_servers_own_code_is_logged_with_its_traceback(caplo
 
 
 def test_a_port_in_use_or_out_of_range_is_refused(tmp_path):
+    """A server has a port already; ports go from 0 to 65,535."""
     with run_server(tmp_path) as server:
         for port in (server.port, 70_000, -1):
             with pytest.raises(InvalidValueError, match=f"Cannot listen on 127.0.0.1:{port} "):
@@ -196,6 +204,9 @@ finally:
 
 @pytest.mark.parametrize("request_line", ["GET / HTTP/1.1", "POST / HTTP/1.1"])
 def test_ctrl_c_ends_a_server_although_a_request_is_not_finished(request_line):
+    """The program serves one request that sleeps for ten minutes, and one that waits for the rest
+    of its body; it prints its port, and "waiting" once a request has come. At Ctrl-C it must
+    leave at once, with exit code 130."""
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM_WITH_A_SLOW_SERVER],
         stdout=subprocess.PIPE,

@@ -48,12 +48,15 @@ def test_a_full_cache_drops_the_entry_that_was_not_read_for_longest(full_cache, 
 
 
 def test_a_large_entry_displaces_all_others(full_cache, tmp_path):
+    """The cache takes 420 bytes and has three entries of 100, each with a head of 40. One of 300
+    bytes fits only without any of them."""
     full_cache.write("d4", bytes(300))
 
     assert file_names_in(tmp_path) == ["d4"]
 
 
 def test_what_is_larger_than_the_cache_is_not_kept_and_displaces_nothing(full_cache, tmp_path):
+    """The cache takes 420 bytes, and the new entry would have 1,000."""
     full_cache.write("d4", bytes(1000))
 
     assert file_names_in(tmp_path) == ["a1", "b2", "c3"]
@@ -69,6 +72,8 @@ WAYS_TO_DAMAGE_AN_ENTRY = {
 
 @pytest.mark.parametrize("harm", WAYS_TO_DAMAGE_AN_ENTRY.values(), ids=WAYS_TO_DAMAGE_AN_ENTRY)
 def test_a_damaged_entry_is_reported_not_returned_and_can_be_written_anew(tmp_path, caplog, harm):
+    """Entry a1 is cut off, emptied, changed by a letter, or replaced by the file of another entry,
+    b2."""
     cache = Cache(tmp_path, 1000)
     cache.write("b2", b"something else")
     cache.write("a1", b"forty-two")
@@ -107,6 +112,8 @@ def process_that_fills(folder, count, size):
 
 
 def test_two_processes_may_fill_a_cache_at_once(tmp_path):
+    """Each of two processes writes 100 entries of 20 kB, under five names, and reads each back; a
+    wrong content makes it fail."""
     processes = [process_that_fills(tmp_path, 100, 20_000) for _ in range(2)]
     for process in processes:
         _, complaints = process.communicate(timeout=600)
@@ -117,7 +124,10 @@ def test_two_processes_may_fill_a_cache_at_once(tmp_path):
 def test_a_process_killed_while_writing_leaves_no_damaged_entry_in_the_cache(
     tmp_path, caplog, monkeypatch
 ):
-    """It is killed when it begins to write, or a little later: in the middle, or between two."""
+    """A process writes entries of 3 MB under the names 0 to 4, each of its own digit alone. It is
+    killed when it begins to write, which a new .part file shows, or a little later: in the
+    middle, or between two. All entries must then be whole, and what was left unfinished is swept
+    out by the next writing."""
     unfinished = set()
     for number in range(4):
         process = process_that_fills(tmp_path, 10**9, 3_000_000)
@@ -141,6 +151,8 @@ def test_a_process_killed_while_writing_leaves_no_damaged_entry_in_the_cache(
 
 
 def test_a_cache_that_cannot_be_written_is_reported_once_and_does_without(tmp_path, caplog):
+    """Its folder would have to be below a file. Three writings give one warning, and reading finds
+    nothing."""
     (tmp_path / "file").write_bytes(b"")
     cache = Cache(tmp_path / "file" / "below", 1000)
     cache_module._warned.clear()
@@ -161,6 +173,7 @@ def test_a_cache_that_is_off_keeps_nothing(monkeypatch):
 
 
 def test_each_kind_of_entries_has_a_folder_below_that_of_the_variable(tmp_path, monkeypatch):
+    """An entry among the actions is not among the frames, though both have the name a1."""
     monkeypatch.setenv("ROBOIRG_CACHE", str(tmp_path / "here"))
 
     open_cache("actions").write("a1", b"content")
@@ -179,7 +192,7 @@ def test_the_cache_is_in_the_user_s_cache_folder_by_default(tmp_path, monkeypatc
 
 
 def test_a_variable_sets_the_size_of_the_cache(monkeypatch):
-    """1e-8 GiB are ten bytes."""
+    """1e-8 GiB are ten bytes, for which the entry with its head is too large."""
     monkeypatch.setenv("ROBOIRG_CACHE_GIB", "1e-8")
 
     open_cache("frames").write("b2", b"content")

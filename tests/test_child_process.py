@@ -51,6 +51,8 @@ def wait_for(what):
 
 
 def test_a_child_answers_and_exits_when_its_channel_is_closed():
+    """Asked "who", the child answers its process number and how it treats Ctrl-C, which it must
+    ignore: its parent handles it."""
     child = ChildProcess.spawn(answer_messages)
     child.send("who")
 
@@ -92,7 +94,8 @@ def test_closing_does_not_wait_for_a_child_that_the_kernel_cannot_end():
 
 
 def test_a_child_that_cannot_start_is_reported_with_what_would_help():
-    """The limit of open files, 64 here, has been raised to at least 1,024 before that."""
+    """The start fails with "too many files", for which stand-ins are patched in. The limit of open
+    files, 64 here, has been raised to at least 1,024 before that."""
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (64, hard))
     too_many = OSError(errno.EMFILE, "Too many files")
@@ -162,6 +165,8 @@ def test_descendants_are_found_although_their_names_contain_brackets_and_line_en
 
 
 def test_children_do_not_outlive_a_parent_that_is_killed(tmp_path):
+    """A script starts a child, prints the child's process number, and waits for it, while the child
+    hangs. The script is killed, so it cannot clean up."""
     script = tmp_path / "parent.py"
     script.write_text(
         f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
@@ -196,11 +201,14 @@ def test_a_parallel_map_yields_each_item_with_its_result():
 
 
 def test_a_parallel_map_names_the_item_at_which_a_process_died():
+    """The function ends its process with exit code 4 at the item 9."""
     with pytest.raises(RoboIRGError, match="died at 9: the process ended with exit code 4"):
         list(parallel_map(square_root_but_for_7_and_9, [9], 2))
 
 
 def test_a_parallel_map_raises_an_exception_with_a_note_of_where_it_was_raised():
+    """The function raises the exception at the item 7, in another process, whose traceback would be
+    lost."""
     with pytest.raises(ValueError, match="seven") as caught:
         list(parallel_map(square_root_but_for_7_and_9, [7], 1))
 

@@ -312,7 +312,8 @@ __main__.main()
 
 
 def test_ctrl_c_at_any_moment_prints_one_sentence_and_no_traceback():
-    """The last ones may have ended before, or be Python's again."""
+    """The command is interrupted up to 0.24 s after it has begun to handle Ctrl-C. It stops with
+    one sentence and exit code 130; the last ones may have ended before, or be Python's again."""
     ends = set()
     for delay_s in (0, 0.06, 0.12, 0.18, 0.24):
         with subprocess.Popen(
@@ -508,7 +509,8 @@ def test_a_run_deletes_the_unfinished_videos_of_one_that_died_and_no_other_file(
 
 
 def test_help_groups_the_many_options_of_run_in_four_panels(roboirg, monkeypatch):
-    """Of two to nine options each; and it has no color where there is no terminal."""
+    """A panel is a frame with two to nine options, told by lines that begin with "--"; there is no
+    color where there is no terminal."""
     monkeypatch.setenv("COLUMNS", "80")
 
     out = roboirg("run", "--help").out

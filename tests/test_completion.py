@@ -22,6 +22,8 @@ printf '%s\\n' "${COMPREPLY[@]}"
     [(["ta"], {"tables", "tasks"}), (["run", "--retry"], {"--retry-errors"})],
 )
 def test_bash_completes_commands_and_options(tmp_path, words, completed):
+    """A real bash loads the script that the command prints for it, and completes the last of these
+    words; `completed` are all suggestions."""
     command = tmp_path / "roboirg"
     command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m roboirg "$@"\n')
     command.chmod(0o755)

@@ -61,6 +61,8 @@ def test_another_packages_entry_point_may_name_a_task_or_the_module_that_has_it(
 
 
 def test_an_entry_point_is_found_by_its_name(install_entry_points):
+    """An entry point is a name under which an installed package offers something. Two are
+    installed, named outside-0 and outside-1, each with a function that loads its task."""
     install_entry_points(lambda: TASK_OF_A_LAB, lambda: SECOND_TASK_OF_THE_LAB)
 
     found = discovery.find_entry("outside-1", "TASK", Task, tasks.ENTRY_POINTS)
@@ -85,6 +87,9 @@ def test_an_entry_point_is_found_by_its_name(install_entry_points):
 def test_a_bad_entry_point_is_one_sentence_that_names_its_package(
     install_entry_points, load, sentence
 ):
+    """Installed are a bad entry point, outside-0, and a good one with the task "Other", both of the
+    package a-lab. `load` raises, gives no task, or one whose name is taken by the benchmark or
+    by the good one."""
     get_task("BinFill")  # known before the entry points change
     install_entry_points(load, lambda: SECOND_TASK_OF_THE_LAB)
 

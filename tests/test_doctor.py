@@ -34,6 +34,8 @@ def test_the_doctor_passes_all_checks_on_a_machine_with_everything():
 
 
 def test_without_vulkan_the_doctor_names_what_to_unset_or_install():
+    """Both variables name a driver's file that does not exist, so there is no driver for
+    pictures."""
     result = run_module(VK_DRIVER_FILES="/nonexistent", VK_ICD_FILENAMES="/nonexistent")
 
     assert result.returncode == 1
@@ -53,7 +55,9 @@ def test_an_unknown_render_device_is_named_with_the_known_ones():
 
 
 def test_a_missing_or_old_package_is_named_with_the_command_that_installs_it(monkeypatch):
-    """Of the extras of users only; another build of OpenCV counts as OpenCV."""
+    """Replaced are the versions that are installed and those that are required. numpy is missing
+    and av too old; jinja2 is not the final version, which is fine; ruff is of the extra of
+    developers, and is not looked at; another build of OpenCV counts as OpenCV."""
     headless = "opencv-contrib-python-headless"
     versions = {"roboirgbench": "0.1.0", "av": "9.2", "sapien": "3.0.3", "jinja2": "3.2rc1"}
     versions[headless] = "5.0"
@@ -88,6 +92,7 @@ def test_a_missing_or_old_package_is_named_with_the_command_that_installs_it(mon
 def test_missing_robot_models_are_reported_with_the_command_that_fetches_them(
     tmp_path, monkeypatch
 ):
+    """The variable names an empty folder for the models."""
     monkeypatch.setenv("ROBOIRG_MODEL_FILES", str(tmp_path))
     check = doctor._check_files()[0]
 
@@ -104,6 +109,8 @@ def test_missing_robot_models_are_reported_with_the_command_that_fetches_them(
     ],
 )
 def test_a_crash_of_the_driver_is_a_failed_check(monkeypatch, code, words):
+    """The process that draws is replaced by one that has printed the device and "drawn", and then
+    ended with a signal: a crash, or the alarm of a picture that takes too long."""
     crash = subprocess.CompletedProcess([], code, "a card\ndrawn\n", "")
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: crash)
 

@@ -178,7 +178,9 @@ def test_a_subgoal_changes_one_step_after_its_act_and_the_last_one_at_once(oracl
 
 
 def test_a_subgoal_has_a_pixel_only_if_it_points(oracle_with_subgoals):
-    """Acts that point at a thing are to pick it up, for instance; to put it down need not."""
+    """`changes` has the subgoals of an oracle's play, in words and with pixels, one for each stage
+    and one for the end. Acts that point at a thing, such as to pick it up, have a pixel; to put
+    it down need not."""
     env, changes = oracle_with_subgoals
     for stage, (_, subgoal, grounded) in zip(env.episode.stages, changes, strict=False):
         assert re.sub(r"at <\d+, \d+> ?", "", grounded).strip() == subgoal

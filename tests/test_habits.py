@@ -89,15 +89,21 @@ def habits_in(paths):
     ],
 )
 def test_a_habit_is_found(code, habit):
+    """Each line of code has the habit once: a text times a truth or a starred conditional are
+    tricks, and so on."""
     assert habits_of(ast.parse(code))[habit] == 1
 
 
 def test_what_is_plain_has_no_habit():
+    """A loop, an assignment from one value and a product of numbers: only statements and loop names
+    are counted."""
     plain = "for row in rows:\n    x, y = point\n    found.append(2 * row)\n"
     assert set(+habits_of(ast.parse(plain))) <= {"statements", "loop names"}
 
 
 def test_no_room_falls_back_into_a_habit():
+    """A room is a folder of the package. A file has the limits: of most habits so many in 1,000
+    statements, and of loop names so many in 100; one is always allowed."""
     broken = []
     scripts = sorted((ROOT / "scripts").rglob("*.py"))
     for room, paths in {**house_files(), "tests": TESTS, "scripts": scripts}.items():

@@ -44,7 +44,8 @@ def test_a_container_counts_the_cores_that_it_may_use_and_not_those_of_its_host(
     ],
 )
 def test_more_than_8_cores_come_with_the_advice_of_8_workers_for_a_gpu(cores, advice, monkeypatch):
-    """Sixteen were slower than eight on the GPU that was measured."""
+    """The count of cores is replaced. On the GPU that was measured, sixteen workers were slower
+    than eight."""
     monkeypatch.setattr(processor, "core_count", lambda: cores)
 
     assert processor.worker_advice() == advice

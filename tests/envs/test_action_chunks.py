@@ -102,6 +102,7 @@ def test_what_is_not_a_chunk_of_finite_numbers_is_refused_before_anything_moves(
 
 
 def test_the_action_space_has_the_shape_of_a_chunk():
+    """A pose and the gripper are seven numbers, and a chunk has three of them."""
     env = ActionChunks(roboirg.make("PickXtimes", cameras=(), actions="ee_pose"), 3)
 
     assert env.action_space.shape == (3, 7)

@@ -68,6 +68,9 @@ def test_between_the_verdict_and_the_end_the_episode_goes_on():
 
 
 def test_a_success_stays_one_while_the_original_goal_is_undecided():
+    """The words state an earlier visit of the moving cube than the original goal. The oracle stops
+    it then, which is a success for the words; the episode goes on until the original goal is
+    decided, here failed, and its status becomes that of the words."""
     env = make("StopCube", 6)  # the other goal is an earlier visit
     loop = EpisodeLoop(env, make_policy("oracle", seed=0))
     observation, info = loop.begin()
@@ -82,6 +85,8 @@ def test_a_success_stays_one_while_the_original_goal_is_undecided():
 
 
 def test_time_ends_an_episode_whose_original_goal_is_undecided():
+    """The words state another goal, which the policy *habit* fails by doing the original one. That
+    takes more than the 150 steps that are allowed."""
     info = play(make(max_steps=150), make_policy("habit", seed=0))
 
     assert (info["status"], info["verdict"], info["original"]) == ("failure", "failure", "ongoing")
@@ -89,6 +94,7 @@ def test_time_ends_an_episode_whose_original_goal_is_undecided():
 
 
 def test_a_pose_that_cannot_be_reached_fails_both_goals():
+    """The pose is 5 m ahead of a robot that reaches less than 1 m."""
     env = make(actions="waypoint")
     env.reset()
 

@@ -54,6 +54,7 @@ def test_a_reset_refuses_unknown_options_and_episodes(options, error, words):
 
 
 def test_an_environment_of_an_episode_of_ones_own_may_change_its_words_and_not_the_episode():
+    """The environment is made for an episode object, and not for a number of a split."""
     env = roboirg.make(get_episode("PickXtimes", "test", 3), cameras=())
     env.reset(options={"setting": "spatial"})
 
@@ -62,6 +63,8 @@ def test_an_environment_of_an_episode_of_ones_own_may_change_its_words_and_not_t
 
 
 def test_seeds_choose_episodes_if_none_is_named():
+    """There are 50 episodes, so a seed chooses the rest of its division by 50; without one the next
+    episode is played, and after the last one the first."""
     env = roboirg.make("PickXtimes", cameras=(), episode=None)
     played = []
 
@@ -91,6 +94,9 @@ def test_gymnasium_s_vector_environment_gives_what_single_environments_give(vect
 
 
 def test_gymnasium_s_vector_environment_goes_on_with_the_next_episodes(vector):
+    """Two environments begin with episodes 4 and 5, which end after two steps. Gymnasium's own
+    class resets an environment at the step after its end, so the third step begins the next
+    episode, of which 6 is the second one's."""
     vector.reset(seed=4)
     rest = np.tile(HOME_ACTION, (2, 1))
     vector.step(rest)
@@ -121,6 +127,8 @@ def test_a_fork_before_drawing_works():
 
 
 def test_a_fork_after_drawing_fails_at_once_with_the_reason():
+    """A picture was drawn in this process, and the driver does not survive a fork; "async" forks by
+    default."""
     roboirg.make("PickXtimes", **OPTIONS).reset()
     vector = gymnasium.make_vec(NAME, 2, "async", **OPTIONS)
     warnings.simplefilter("ignore")  # Gymnasium repeats the worker's traceback

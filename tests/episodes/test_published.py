@@ -49,16 +49,22 @@ def roboirg(*words):
 
 
 def test_the_shipped_file_is_what_the_rows_give(converter):
+    """The rows are RoboMME's published data; the script converts them to the lines of the file that
+    comes with the package."""
     assert list(converter.converted_lines(ROWS)) == published_text().splitlines()
 
 
 def test_a_damaged_file_is_one_sentence(monkeypatch):
+    """The expected checksum is replaced by zeros, so the file, whose checksum begins with 300e,
+    counts as damaged."""
     monkeypatch.setattr(published_episodes, "SHA256", "0" * 64)
     with pytest.raises(RoboIRGError, match=r"published\.jsonl\.gz is damaged: its SHA-256 is 300e"):
         published_text()
 
 
 def test_every_episode_is_there_but_those_that_robomme_cannot_build():
+    """Counted is, for each task and split, how many episodes RoboMME has not published; `+` drops
+    those with none missing."""
     missing = Counter()
     for task in all_tasks():
         for split in SPLITS:
@@ -96,6 +102,8 @@ numbers = st.floats(-10, 10, allow_nan=False)
 @settings(max_examples=30)
 @given(numbers, numbers, st.none() | st.floats(0.01, 1))
 def test_objects_survive_to_the_seventh_decimal(x, yaw, radius):
+    """Numbers are written with seven decimals. An object with any place, turn and radius goes
+    through JSON; all else stays equal."""
     item = SceneObject("one", "cube", Point(x, 0.0, 0.02), yaw, radius=radius, inside="container_1")
 
     (found,) = decode(json.loads(json.dumps(encode(Scene((item,)))))).objects
@@ -153,7 +161,9 @@ def is_body(episode, name, row, reference):
 
 
 def test_stages_point_at_the_objects_that_robomme_s_subgoals_point_at(converter):
-    """With the object of each subgoal that has one, in the video and after it."""
+    """For each published episode that RoboMME could build, in the video and after it: the objects
+    that our stages point at, and those that its subgoals name, are as many (`strict`), in the
+    same order, and the same by their places."""
     tasks = set()
     for row in converter.read_rows(ROWS):
         if "error" in row:
@@ -172,6 +182,9 @@ def test_stages_point_at_the_objects_that_robomme_s_subgoals_point_at(converter)
 
 
 def test_objects_change_places_with_the_partners_that_robomme_saw(converter):
+    """A schedule notes who changed places with whom, from which step to which; RoboMME may have
+    seen fewer swaps than we know of, and not every partner. The counts at the end say how many
+    partners were compared."""
     compared = Counter()
     for row in converter.read_rows(ROWS):
         schedule = row.get("facts", {}).get("swap_schedule") or []
@@ -192,6 +205,9 @@ def test_objects_change_places_with_the_partners_that_robomme_saw(converter):
     "task", slow_but(["VideoRepick"], ["VideoRepick", "VideoPlaceButton", "VideoPlaceOrder"])
 )
 def test_a_recording_replays_to_robomme_s_poses(task, converter):
+    """RoboMME noted the poses after the video. Replaying its actions here gives the joints to 1e-6
+    rad, the same step, and each object that can move within 5 mm of its place; objects are told
+    by their places at the start."""
     from roboirg.simulation.episode_session import EpisodeSession
     from roboirg.simulation.recording import Recording
 
@@ -214,7 +230,8 @@ def test_a_recording_replays_to_robomme_s_poses(task, converter):
 
 
 def test_exported_episodes_are_as_stored(tmp_path, snapshot):
-    """With hidden cubes and swaps, with acts of the video, and with yaws and radii."""
+    """The three tasks have hidden cubes and swaps, acts of the video, and yaws and radii. The
+    stored text was looked at once; a change of it is a change of the format."""
     path = tmp_path / "episodes.jsonl"
     tasks = ("VideoUnmaskSwap", "VideoPlaceOrder", "StopCube")
 
@@ -225,6 +242,7 @@ def test_exported_episodes_are_as_stored(tmp_path, snapshot):
 
 
 def test_the_command_exports_a_split(tmp_path):
+    """One task and the suite *real*, which has two: 50 test episodes of each, a line for each."""
     path = tmp_path / "episodes.jsonl"
 
     said = roboirg("export", "episodes", "--tasks", "StopCube,real", "--out", path)

@@ -56,7 +56,9 @@ def test_failures_with_a_known_cause_are_attributed_to_the_right_kind():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_failures_with_a_known_cause_get_its_name_in_most_cases(name):
-    """A name is finer than its kind: *wrong_object* is one of the kind *grounding*."""
+    """Given failures of a made cause, `name`, at least 80 % are found to be of its kind, and 60 %
+    get the very name. A name is finer than its kind: *wrong_object* is one of the kind
+    *grounding*."""
     made, right_kinds, right_names = confusion.classes(pairs_of("development"))[name]
 
     assert right_kinds >= 0.8 * made
@@ -65,7 +67,8 @@ def test_failures_with_a_known_cause_get_its_name_in_most_cases(name):
 
 @pytest.mark.parametrize("half", [half for half, path in confusion.HALVES.items() if path.exists()])
 def test_the_documentation_has_the_current_tables_of_attribution(half):
-    """From stored facts of failures that were made, in halves such as *development*."""
+    """A table counts made causes against found ones, from stored facts of failures, in halves such
+    as *development*. To put the current table into the page must leave the page as it is."""
     page = confusion.DOCUMENT.read_text()
 
     table = confusion.table(pairs_of(half))
@@ -74,6 +77,8 @@ def test_the_documentation_has_the_current_tables_of_attribution(half):
 
 
 def test_the_documentation_has_the_current_table_of_failures():
+    """The page lists the names of all failures. To put in the list that is made from the code must
+    leave the page as it is."""
     page = confusion.DOCUMENT.read_text()
 
     assert confusion.put_in(page, "failures", confusion.failures_table()) == page
@@ -103,6 +108,8 @@ def facts_in(events):
 
 
 def test_every_name_of_a_failure_has_an_entry_in_the_table_of_failures():
+    """The type lists the names for checkers, and the table says what each means: same names, same
+    order."""
     assert get_args(FailureName) == tuple(FAILURES)
 
 
@@ -165,6 +172,8 @@ def drop(play, name):
 
 
 def test_a_cube_that_fell_on_the_wrong_disc_was_dropped():
+    """The red cube is meant for target_1. The fingers open while it is up, and it comes to lie on
+    target_0: a fall is a fault of the hand, not a choice of the disc."""
     play = played_without_simulator("VideoPlaceOrder", 2)  # the red cube onto target_1
 
     play.lift("cube_red")
@@ -174,6 +183,8 @@ def test_a_cube_that_fell_on_the_wrong_disc_was_dropped():
 
 
 def test_a_cube_that_is_put_on_the_wrong_disc_is_at_the_wrong_place_though_it_fell_long_ago():
+    """The red cube is meant for target_1. It falls; 100 steps later it is lifted again and put down
+    on target_0, which is a choice of that disc."""
     play = played_without_simulator("VideoPlaceOrder", 2)  # the red cube onto target_1
 
     play.lift("cube_red")
@@ -184,7 +195,8 @@ def test_a_cube_that_is_put_on_the_wrong_disc_is_at_the_wrong_place_though_it_fe
 
 
 def test_a_failed_grasp_next_to_two_cubes_is_an_ambiguous_act():
-    """The fact "clutched" says that the fingers closed on nothing next to a thing."""
+    """The fact "clutched" says that the fingers closed on nothing next to a thing. Here they did so
+    next to the cube that is meant and next to another one, so nobody can tell which was wanted."""
     play = played_without_simulator("PickXtimes", 2)  # the blue cube is meant
 
     play.attempt(Fact("clutched", "cube_blue"), Fact("clutched", "cube_red")).rest()
@@ -260,6 +272,8 @@ def test_a_first_visit_beside_the_disc_is_not_a_wrong_order():
 
 
 def test_a_cube_let_go_by_a_hand_at_rest_over_a_wrong_disc_has_not_been_dropped():
+    """Another disc than target_0 is meant. The hand holds the red cube still above target_0 for
+    five steps and opens: that is a decision, not a fall."""
     play = played_without_simulator("VideoPlaceOrder", 14)
 
     play.lift("cube_red").set(Fact("over", "cube_red", "target_0"), Fact("still", "robot")).tick(5)
@@ -270,7 +284,8 @@ def test_a_cube_let_go_by_a_hand_at_rest_over_a_wrong_disc_has_not_been_dropped(
 
 
 def test_a_cube_set_on_another_cube_has_not_been_misplaced():
-    """It lies nowhere afterwards."""
+    """The red cube is lifted and let go, and lies neither on the table nor on a disc afterwards. So
+    it is called a wrong place, not a near miss of the right disc."""
     play = played_without_simulator("VideoPlaceOrder", 14)
 
     play.lift("cube_red").set(off=(Fact("picked", "cube_red"),))
@@ -280,6 +295,8 @@ def test_a_cube_set_on_another_cube_has_not_been_misplaced():
 
 
 def test_a_hand_that_stays_above_a_wrong_cube_has_made_its_choice():
+    """The blue cube is meant. For 100 steps the hand is above the red one, which is noted as an
+    attempt ("above"), and grasps nothing."""
     play = played_without_simulator("PickXtimes", 2)  # the blue cube is meant
     play.tried.add(Fact("above", "robot", "cube_red"))
 
@@ -289,7 +306,9 @@ def test_a_hand_that_stays_above_a_wrong_cube_has_made_its_choice():
 
 
 def test_a_hand_on_its_way_down_when_the_visit_is_over_has_not_stopped():
-    """Hands above the button linger there; this one is no longer still."""
+    """The hand is to press a button while a cube visits its target. It has waited above the button
+    ("lingering"), but is not still when the 1,000 steps are over: it came too late, and did not
+    stop."""
     play = played_without_simulator("StopCube", 0).hover()
     play.tried.add(Fact("lingering", "robot"))
 
@@ -299,6 +318,8 @@ def test_a_hand_on_its_way_down_when_the_visit_is_over_has_not_stopped():
 
 
 def test_a_button_touched_by_the_arm_is_no_wrong_count():
+    """The cube has not been picked up, and the button goes down although the hand is not above it.
+    So it was touched by accident, not pressed after a wrong number of rounds."""
     play = played_without_simulator("PickXtimes", 2)
 
     play.set(Fact("pressed", "button"))
@@ -307,6 +328,8 @@ def test_a_button_touched_by_the_arm_is_no_wrong_count():
 
 
 def test_a_button_touched_by_what_is_in_the_hand_is_no_wrong_count():
+    """The hand holds the blue cube above the button, which then goes down: whoever presses it on
+    purpose has let go of the cube before."""
     play = played_without_simulator("PickXtimes", 2)
 
     play.set(Fact("held", "cube_blue"), Fact("hovering", "robot", "button"))
@@ -319,7 +342,9 @@ def test_a_button_touched_by_what_is_in_the_hand_is_no_wrong_count():
     ("late", "failure"), [(0.3, "mistimed"), (-0.7, "ambiguous_act"), (-1.0, "wrong_time")]
 )
 def test_failures_of_stopping_the_moving_cube_too_early_or_too_late(late, failure):
-    """`late` is how late the button is pressed, in passes of the cube (negative: early)."""
+    """`late` is how late the button is pressed, in passes of the cube (negative: early). A third of
+    a pass is bad timing; a whole pass early is another visit, so a wrong time; in between it may
+    be either."""
     play = played_without_simulator("StopCube", 0)
     (shuttle,) = play.episode.scene.motions
     moment = play.episode.stages[-1].primitive.steps + round(late * shuttle.interval)
@@ -359,6 +384,8 @@ def test_metadata_called_understood_that_is_no_goal_is_ignored(understood):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_an_unreachable_pose_is_an_execution_failure_at_the_step_of_the_report(task):
+    """After five steps the environment reports as the cause that no way leads to a pose. No act was
+    wrong, so the failure has no subject."""
     play = played_without_simulator(task, 3).tick(5)
 
     found = play.finding(timed_out=False, cause="no way to (9, 9, 9)")
@@ -369,12 +396,14 @@ def test_an_unreachable_pose_is_an_execution_failure_at_the_step_of_the_report(t
 
 
 def test_an_episode_that_is_not_over_has_no_attribution():
+    """Five steps have passed, nothing is wrong, and time is not up."""
     play = played_without_simulator("PickXtimes", 3).tick(5)
 
     assert play.finding(timed_out=False) is None
 
 
 def test_an_episode_that_ends_during_its_video_counts_as_no_attempt():
+    """Time is up at step 50 without any event, before the policy had its turn."""
     episode = get_episode("VideoPlaceOrder", "test", 1)
 
     found = attribute_failure(episode, [], timed_out=True, policy_start_step=0, elapsed_steps=50)
@@ -499,6 +528,8 @@ def test_a_mistake_that_is_judged_later_is_dated_when_it_happened():
 
 
 def test_the_fingerprint_of_an_episode_ignores_how_its_failures_are_named():
+    """Splits have a fingerprint that must not change with words. A rule is a condition with a cause
+    and the name of a failure: only another condition makes its data different."""
     named = Rule(Fact("pressed", "b"), "x", "wrong_time")
     other = Rule(Fact("pressed", "b"), "y")
 

@@ -80,12 +80,16 @@ def pick_of_the_red_cube():
 
 
 def test_the_mirrored_object_of_words_is_meant_with_left_and_right_exchanged():
+    """The words mean the green cube, all the way on the right. With the sides exchanged they mean
+    the red one, all the way on the left."""
     mirrored = mirrored_objects(GREEN_ON_THE_RIGHT, instruct(GREEN_ON_THE_RIGHT, "spatial"))
 
     assert mirrored == {"cube_green": {"cube_red"}}
 
 
 def test_picking_the_cube_on_the_opposite_side_is_called_a_mirrored_pick(pick_of_the_red_cube):
+    """The words mean the green cube on the right; the fixture is a play in which the red one on the
+    left was picked. `mirrored` says which object they mean with the sides exchanged."""
     mirrored = {"cube_green": frozenset({"cube_red"})}
 
     found = attribution_of(*pick_of_the_red_cube, mirrored)
@@ -97,4 +101,6 @@ def test_picking_the_cube_on_the_opposite_side_is_called_a_mirrored_pick(pick_of
 def test_a_pick_on_the_opposite_side_is_just_a_wrong_object_if_no_mirrored_one_is_known(
     pick_of_the_red_cube,
 ):
+    """The words mean the green cube on the right; the fixture is a play in which the red one on the
+    left was picked. Without `mirrored` nobody knows that the red one is its mirror image."""
     assert attribution_of(*pick_of_the_red_cube).failure == "wrong_object"

@@ -77,6 +77,8 @@ def test_bin_fill_accepts_any_order_and_any_cubes_of_the_colors(cubes):
 
 
 def test_bin_fill_accepts_a_press_in_the_step_after_the_last_drop():
+    """The goal is two red cubes and a blue one, which are in the bin, then to press the button.
+    `then` has the facts of the steps after the last drop."""
     judge = judged_after_filling("cube_red_0", "cube_red_1", "cube_blue_0", then=[[PRESSED]])
 
     assert judge.status is Status.SUCCESS
@@ -158,7 +160,8 @@ def judged_swings(*steps):
 
 
 def test_swing_is_done_after_the_swings_the_put_down_and_the_press():
-    """The goal is to swing the red cube from the right to the left target, twice."""
+    """The goal is to swing the red cube from the right to the left target, twice. PICK_RED and
+    RIGHT_THEN_LEFT have the facts of the steps of a pick and of one such swing."""
     judge = judged_swings(
         *PICK_RED, *RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT, [RED_LYING], [RED_LYING, PRESSED]
     )
@@ -192,7 +195,9 @@ def test_swing_punishes_another_cube_in_every_stage():
 @pytest.mark.parametrize("side", [RIGHT, LEFT])
 @pytest.mark.parametrize("put_down", [[], [[RED_LYING], [RED_HELD]]], ids=["before", "after"])
 def test_swing_punishes_a_visit_too_many_before_and_after_the_put_down(side, put_down):
-    """`side` is the fact that the red cube is over one of the targets a fifth time."""
+    """The red cube was swung twice from the right to the left target, as is meant: four visits.
+    `side` is the fact that it is over one of the targets a fifth time, before or after it was
+    put down."""
     swings = [*PICK_RED, *RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT, *put_down]
 
     judge = judged_swings(*swings, [RED_HELD, side])
@@ -214,6 +219,8 @@ def test_swing_visits_of_other_cubes_do_not_count():
 
 
 def test_swing_does_not_punish_dropping_between_the_swings():
+    """The goal is to swing the red cube from the right to the left target, twice. Between the two
+    it falls, lies for two steps and is picked up again, which costs nothing."""
     dropped = [[RED_LYING], [RED_LYING], [RED_HELD]]
     swings = [*RIGHT_THEN_LEFT, *dropped, *RIGHT_THEN_LEFT]
 
@@ -223,6 +230,8 @@ def test_swing_does_not_punish_dropping_between_the_swings():
 
 
 def test_swing_does_not_punish_picking_the_cube_up_again_after_the_put_down():
+    """The two swings are done and the cube was put down. It is picked up and put down once more,
+    without a visit to a target, before the button is pressed."""
     swings = [*RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT]
     again = [[RED_LYING], [RED_HELD], [RED_LYING]]
 
@@ -283,7 +292,8 @@ def verdict_and_step(**hands):
 
 @pytest.mark.parametrize("pressed_at", [292, 300, 308])
 def test_stop_cube_is_done_when_stopped_on_the_wanted_visit(pressed_at):
-    """The cube passes its target every 120 steps; the middle of the third visit is step 300."""
+    """The cube passes its target every 120 steps; the middle of the third visit is step 300, and it
+    is on the target for 8 steps before and after. A press in that time stops it there at once."""
     judge, step = verdict_and_step(pressed_at=pressed_at)
 
     assert (judge.status, step) == (Status.SUCCESS, pressed_at)
@@ -302,7 +312,9 @@ def test_stop_cube_is_done_when_stopped_on_the_wanted_visit(pressed_at):
 def test_stop_cube_fails_at_once_if_the_button_is_pressed_while_the_cube_is_off_the_target(
     step, due
 ):
-    """The third visit is meant; the cube is on the target at steps 292 to 308, and 120 before."""
+    """The third visit is meant; the cube is on the target at steps 292 to 308, and 120 before.
+    `due` is the stage of the plan at that step: the hand is above the button from step 40 on,
+    and it is time to press after step 270."""
     judge, verdict_step = verdict_and_step(pressed_at=step)
 
     cause = "pressed the button while the cube was off the target"
@@ -314,7 +326,8 @@ def test_stop_cube_fails_at_once_if_the_button_is_pressed_while_the_cube_is_off_
 def test_stop_cube_fails_when_it_is_time_to_press_if_the_cube_was_stopped_on_an_earlier_visit(
     pressed_at,
 ):
-    """The third visit is meant, for which it is time to press after step 270."""
+    """The third visit is meant, whose middle is at step 300; the first ones are at 60 and 180. It
+    is time to press after step 270, so the mistake is noticed at step 271."""
     judge, step = verdict_and_step(pressed_at=pressed_at)
 
     assert (judge.status, step) == (Status.FAILURE, 271)
@@ -327,7 +340,8 @@ def test_stop_cube_fails_when_it_is_time_to_press_if_the_cube_was_stopped_on_an_
     ids=["never pressed", "pressed too late", "never there", "pressed but never there"],
 )
 def test_stop_cube_fails_when_the_wanted_visit_has_passed(hands):
-    """The third visit ends with the third pass of 120 steps."""
+    """The third visit ends with the third pass of 120 steps, at step 360, so the verdict is at step
+    361. In the last two cases the hand is never above the button."""
     judge, step = verdict_and_step(**hands)
 
     assert (judge.status, step) == (Status.FAILURE, 361)

@@ -27,7 +27,9 @@ SOURCE = Path(roboirg.__file__).parent
 
 
 def test_the_kinds_of_facts_in_the_code_are_those_in_the_table_of_traits():
-    """A fact is what holds in the world, such as *picked*; attempts are found by other code."""
+    """A fact is what holds in the world, such as *picked*; an attempt is a failed try. Searched are
+    all texts like `Fact("picked"` in the package: the files that detect attempts and facts must
+    make all kinds of the table, and no other file a further one."""
     kinds = {
         path.stem: set(re.findall(r"\bFact\(\s*\"(\w+)\"", path.read_text()))
         for path in SOURCE.rglob("*.py")
@@ -84,6 +86,8 @@ def test_braces_in_an_unknown_kind_of_fact_are_shown_as_they_are(kind):
 
 
 def test_an_unknown_kind_of_fact_is_shown_by_its_name_and_does_not_last():
+    """A stranger's record may name a kind that is not in the table: its underscores become spaces,
+    and it counts only while it holds."""
     fact = Fact("turned_over", "cup")
 
     assert fact_words(fact) == "cup turned over"
@@ -123,7 +127,9 @@ def stage_that_expects(expects, *forbids):
 
 
 def test_a_registered_kind_of_fact_can_be_forbidden_and_is_judged(registered_toppled):
-    """The stage expects the robot at home, and forbids that the pillar is knocked over."""
+    """The fixture has registered *toppled*, with the words "knocked {subject} over". The stage
+    expects the robot at home and forbids that the pillar is toppled, which it is at the first
+    step."""
     pillar = SceneObject("pillar", "pillar", Point(0.0, 0.0, 0.05), color="red")
     judge = Judge([stage_that_expects(Fact("home", "robot"), TOPPLED)], Scene((pillar,)))
 
@@ -155,10 +161,14 @@ def test_a_failure_by_a_registered_kind_of_fact_is_named_by_its_role(registered_
 
 
 def test_registering_the_same_kind_of_fact_again_is_allowed(registered_toppled):
+    """The fixture has registered *toppled* and holds its traits. The same traits again, as when a
+    package is imported twice, raise nothing."""
     register_fact_kind("toppled", registered_toppled)
 
 
 def test_registering_a_kind_of_fact_under_a_taken_name_is_refused(registered_toppled):
+    """*Picked* is a kind of the benchmark. The fixture has registered *toppled* and holds its
+    traits, which are others."""
     with pytest.raises(InvalidValueError, match="already a kind of fact 'picked'"):
         register_fact_kind("picked", registered_toppled)
 
@@ -197,6 +207,8 @@ def test_an_unknown_kind_of_object_is_refused():
 
 @pytest.mark.sim
 def test_registering_a_kind_of_object_under_a_taken_name_is_refused():
+    """*Cube* is a kind of the benchmark, which has its own builder; `build_pillar` is another
+    one."""
     from roboirg.simulation import bodies
 
     with pytest.raises(InvalidValueError, match="already a kind of object 'cube'"):

@@ -34,6 +34,8 @@ def judge_of(*stages):
 
 
 def test_doing_what_each_stage_expects_in_order_is_a_success():
+    """`stage(expected, forbidden)` is a step of the plan, and each list has the facts of one
+    moment. The pick lasts for two moments, then the cube is placed; the button is never pressed."""
     after = judge_of(stage(PICKED, PRESSED), stage(PLACED, PRESSED))
 
     judge = after([], [PICKED], [PICKED], [PLACED])
@@ -43,13 +45,15 @@ def test_doing_what_each_stage_expects_in_order_is_a_success():
 
 
 def test_doing_what_the_second_stage_expects_does_not_complete_the_first():
+    """A pick is due, then a placement. The placement alone leaves the first stage, of index 0,
+    due."""
     after = judge_of(stage(PICKED), stage(PLACED))
 
     assert after([PLACED]).index == 0
 
 
 def test_one_control_step_completes_at_most_one_stage():
-    """Both stages expect the same fact."""
+    """Both stages expect the same fact, which holds at one step, and then at two."""
     after = judge_of(stage(PICKED), stage(PICKED))
 
     assert after([PICKED]).index == 1
@@ -57,6 +61,7 @@ def test_one_control_step_completes_at_most_one_stage():
 
 
 def test_a_forbidden_fact_fails_even_if_the_expected_one_holds_too():
+    """The stage expects a pick and forbids to press the button; both hold at the same moment."""
     after = judge_of(stage(PICKED, PRESSED))
 
     judge = after([PICKED, PRESSED])
@@ -66,6 +71,8 @@ def test_a_forbidden_fact_fails_even_if_the_expected_one_holds_too():
 
 
 def test_a_fact_that_completes_a_stage_and_is_forbidden_by_the_next_one_has_a_step_to_go_away():
+    """The first stage expects a pick, which the second one forbids. The pick may hold at the moment
+    that completes the first stage, but not at the next one."""
     after = judge_of(stage(PICKED), stage(PLACED, PICKED))
 
     assert after([PICKED], [PLACED]).status is Status.SUCCESS
@@ -84,6 +91,8 @@ def test_a_verdict_never_changes():
 
 
 def test_a_stage_that_lasts_three_steps_is_complete_at_the_fourth_that_shows_its_fact():
+    """Each list has the facts of a moment. Three steps have passed between the first and the fourth
+    moment at which the robot is still."""
     after = judge_of(stage(STILL, lasting=3))
 
     assert after([STILL], [STILL], [STILL]).status is Status.ONGOING
@@ -91,6 +100,9 @@ def test_a_stage_that_lasts_three_steps_is_complete_at_the_fourth_that_shows_its
 
 
 def test_a_stage_that_has_to_last_starts_again_after_an_interruption():
+    """The robot must be still for three steps, which four moments in a row show. After two moments
+    and a movement, two and three more are too few and, with the one that ends the interruption,
+    enough."""
     after = judge_of(stage(STILL, lasting=3))
     interrupted = [[STILL], [STILL], []]
 

@@ -61,6 +61,8 @@ def episode_with_picks(task, count):
 
 @each_task
 def test_one_pick_succeeds_when_the_container_over_the_cube_is_lifted(task):
+    """The task begins with the presses of its buttons, if it has any (`begin`). Then the one
+    container that hides the cube of the goal, `first`, is lifted."""
     made = episode_with_picks(task, 1)
 
     judge = made.judged_after(*begin(task), [], [lifted(made.first)])
@@ -71,6 +73,8 @@ def test_one_pick_succeeds_when_the_container_over_the_cube_is_lifted(task):
 
 @each_task
 def test_two_picks_succeed_in_order_with_the_first_put_down_between(task):
+    """Two containers are to be lifted, `first` and then `second`; each list has the facts of one
+    step. Until the second one is lifted, the episode goes on."""
     made = episode_with_picks(task, 2)
     down = [*begin(task), [lifted(made.first)], [], [put_down(made.first)], []]
 
@@ -80,7 +84,8 @@ def test_two_picks_succeed_in_order_with_the_first_put_down_between(task):
 
 @each_task
 def test_lifting_another_container_before_the_first_is_put_down_fails(task):
-    """Be it the second one, or one that is never meant."""
+    """The first container is up and has to be put down. In the very step in which it is, another
+    one is lifted, be it the second one that is meant or one that never is."""
     made = episode_with_picks(task, 2)
     for wrong in (made.second, *made.others):
         up = [lifted(made.first)]
@@ -94,7 +99,8 @@ def test_lifting_another_container_before_the_first_is_put_down_fails(task):
 
 @each_task
 def test_lifting_a_wrong_container_as_the_second_one_fails(task):
-    """The first one again is wrong, too."""
+    """The first container was lifted and put down, so the second one is due. To lift the first one
+    again is as wrong as to lift one that is never meant."""
     made = episode_with_picks(task, 2)
     for wrong in (made.first, *made.others):
         judge = made.judged_after(
@@ -106,6 +112,8 @@ def test_lifting_a_wrong_container_as_the_second_one_fails(task):
 
 @each_task
 def test_holding_the_first_container_long_or_lifting_it_again_is_allowed(task):
+    """The first container is up for four steps, down for one, and up again; then it is put down,
+    and the second one lifted, as is meant."""
     made = episode_with_picks(task, 2)
     up = [lifted(made.first)]
     held = [*begin(task), up, up, up, up, [], up, []]
@@ -128,6 +136,8 @@ def test_putting_down_other_containers_does_not_complete_putting_down_the_first(
 
 @each_button_task
 def test_before_the_button_is_pressed_any_container_may_be_lifted(task):
+    """All containers are lifted before each press, of one button or two. Afterwards the two that
+    are meant are lifted in order, which is a success."""
     made = episode_with_picks(task, 2)
     up = [lifted(name) for name in (made.first, made.second, *made.others)]
     early = []
@@ -143,6 +153,9 @@ def test_before_the_button_is_pressed_any_container_may_be_lifted(task):
 @each_button_task
 @pytest.mark.parametrize("is_meant", [True, False], ids=["the meant one", "another one"])
 def test_a_container_that_is_up_during_the_last_press_counts_one_step_later(task, is_meant):
+    """A container is already up in the step of the last press. Then the press completes its stage,
+    so the episode goes on; a step later the container is judged: the meant one is a success,
+    another one a failure."""
     made = episode_with_picks(task, 1)
     up = lifted(made.first if is_meant else made.others[0])
     *before, last = PRESSES_OF[task]
@@ -156,6 +169,8 @@ def test_a_container_that_is_up_during_the_last_press_counts_one_step_later(task
 
 @each_button_task
 def test_pressing_again_later_has_no_effect(task):
+    """All buttons are pressed again at the beginning, while the first container is up, and after it
+    was put down. The second container then still makes it a success."""
     made = episode_with_picks(task, 2)
     again = [[press] for press in PRESSES_OF[task]]
     down = [*begin(task), *again, [lifted(made.first)], *again, [put_down(made.first)], *again]
@@ -171,7 +186,8 @@ def stages_complete_after(*steps):
 
 @pytest.mark.parametrize(("first", "other"), [(LEFT, RIGHT), (RIGHT, LEFT)])
 def test_both_buttons_may_be_pressed_in_any_order(first, other):
-    """With a step between, at once, or already the other one while the first is still down."""
+    """Each list has the facts of one step, and the number counts completed stages, of which each
+    press is one: with a step between, at once, or the other one while the first is still down."""
     assert stages_complete_after([first]) == 1
     assert stages_complete_after([first], [], [other]) == 2
     assert stages_complete_after([first], [other]) == 2
@@ -180,6 +196,7 @@ def test_both_buttons_may_be_pressed_in_any_order(first, other):
 
 @pytest.mark.parametrize("button", [LEFT, RIGHT])
 def test_pressing_the_same_button_twice_completes_only_one_of_two_presses(button):
-    """Also if it is held for ten steps. Each list has the facts of a step."""
+    """Two different buttons have to be pressed. One of them is pressed three times, or held for ten
+    steps; each list has the facts of a step."""
     assert stages_complete_after([button], [], [button], [], [button]) == 1
     assert stages_complete_after(*[[button]] * 10) == 1

@@ -55,7 +55,8 @@ def test_repick_succeeds_after_the_wanted_number_of_picks_and_a_press(repeats):
 
 @pytest.mark.parametrize("done", [0, 1, 2, 3, 4])
 def test_repick_of_any_other_cube_fails_at_any_time(done):
-    """`done` is how many of the four stages (pick and put down, twice) are complete before."""
+    """The meant cube is picked up and put down, twice: four stages, of which the first `done` are
+    complete. Then each other cube of the scene is picked up, which fails the stage that is due."""
     episode, picked, lying = repick_episode_and_facts(2, "hard")
     start = [[picked], [lying], [picked], [lying]][:done]
     for cube in episode.scene.of_kind("cube"):
@@ -66,6 +67,8 @@ def test_repick_of_any_other_cube_fails_at_any_time(done):
 
 
 def test_a_repick_goes_on_while_other_cubes_lie():
+    """The meant cube was picked up and has to be put down. That another cube lies on the table, as
+    it always did, neither completes nor fails this."""
     episode, picked, _ = repick_episode_and_facts(2, "hard")
     other = next(cube.name for cube in episode.scene.of_kind("cube") if cube.name != picked.subject)
 
@@ -80,7 +83,8 @@ def test_a_repick_goes_on_while_the_cube_is_in_the_air():
 
 
 def test_repick_counts_a_cube_that_was_let_go_as_put_down_wherever_it_lies():
-    """The next lift is the second one."""
+    """The cube is to be picked up twice, then the button pressed. It only has to lie somewhere; the
+    next lift is the second one."""
     episode, picked, lying = repick_episode_and_facts(2)
     picks = [[picked], [lying], [picked], [lying]]
 
@@ -199,7 +203,9 @@ def wrong_placements(episode, number):
 def test_a_place_task_needs_the_right_cube_picked_and_then_placed_on_the_right_disc(
     episode, number
 ):
-    """Each list holds the facts of one step; discs are targets on the table."""
+    """Each list holds the facts of one step; discs are targets on the table. `number` says which
+    placement of the video the goal refers to. The pick or the placement alone leaves the episode
+    undecided."""
     placed = right_placement(episode, number)
 
     assert status_after(episode, [GREEN_PICKED], [], [placed, GREEN_LYING]) is Status.SUCCESS
@@ -209,7 +215,8 @@ def test_a_place_task_needs_the_right_cube_picked_and_then_placed_on_the_right_d
 
 @every_place_goal
 def test_placing_the_right_cube_on_a_wrong_disc_fails(episode, number):
-    """Also if it is on the right one at the same time."""
+    """`number` says which placement of the video the goal refers to; its disc is the right one. On
+    every other disc the green cube fails, also if it is on the right one at the same time."""
     placed = right_placement(episode, number)
     for wrong in wrong_placements(episode, number):
         assert status_after(episode, [GREEN_PICKED], [], [wrong]) is Status.FAILURE, wrong
@@ -218,6 +225,8 @@ def test_placing_the_right_cube_on_a_wrong_disc_fails(episode, number):
 
 @every_place_goal
 def test_before_it_is_picked_up_the_right_cube_may_be_on_any_disc(episode, number):
+    """The green cube first stands on a wrong disc, as the video may have left it; then it is picked
+    up and placed on the right one, which is a success."""
     placed = right_placement(episode, number)
     for wrong in wrong_placements(episode, number):
         assert status_after(episode, [wrong], [GREEN_PICKED], [placed]) is Status.SUCCESS, wrong
@@ -226,6 +235,8 @@ def test_before_it_is_picked_up_the_right_cube_may_be_on_any_disc(episode, numbe
 @every_place_goal
 @pytest.mark.parametrize("other", ["cube_red", "cube_blue"])
 def test_picking_another_cube_fails_unless_the_right_one_was_picked_before(episode, number, other):
+    """The green cube is meant. Another one fails before it, and also together with it in the next
+    step; once the green cube was picked, the next stage is to place it, which forbids no picks."""
     placed = right_placement(episode, number)
     wrong = Fact("picked", other)
 
@@ -236,6 +247,8 @@ def test_picking_another_cube_fails_unless_the_right_one_was_picked_before(episo
 
 @every_place_goal
 def test_other_cubes_may_be_placed_anywhere(episode, number):
+    """The green cube is meant. A red one stands on a disc all the time, which matters neither
+    before the pick nor at the placement."""
     placed = right_placement(episode, number)
     other = Fact("placed", "cube_red", "target_3")
 
@@ -244,7 +257,8 @@ def test_other_cubes_may_be_placed_anywhere(episode, number):
 
 @every_place_goal
 def test_in_a_place_task_presses_drops_and_the_marked_site_are_ignored(episode, number):
-    """The site is a mark on the table that is no target."""
+    """The site is a mark on the table that is no target. The button is pressed and the green cube
+    dropped on the site and picked up again; only the right disc then ends the episode."""
     placed = right_placement(episode, number)
     site = Fact("placed", "cube_green", "site")
     steps = [[PRESSED, site], [GREEN_PICKED], [PRESSED], [GREEN_LYING, site], [GREEN_PICKED]]

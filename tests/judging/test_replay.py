@@ -38,10 +38,10 @@ def random_events(episode, rng):
 
 @pytest.mark.parametrize("task", all_tasks())
 def test_judging_stored_events_gives_the_verdict_of_judging_every_step(task):
-    """Records store events only; judging them again skips the steps without any.
-
-    StopCube's stages end by the time, so it goes on for 700 steps after the last event.
-    """
+    """Records store events only, the beginnings and ends of facts; judging them again skips the
+    steps without any. Here 12 episodes with random events are judged step by step, and then from
+    the events: stage, verdict, cause and step of the verdict must be the same. StopCube's stages
+    end by the time, so it goes on for 700 steps after the last event, others for 20."""
     rng = np.random.default_rng(3)
     for index in range(12):
         episode = get_episode(task, "test", index)

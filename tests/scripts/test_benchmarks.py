@@ -44,6 +44,8 @@ def test_baselines_are_timed_once_a_round():
 
 
 def test_a_row_has_the_median_of_all_rounds():
+    """The paces of three rounds are 8, 2 and 9, so 8 is the median; the baseline is always 4, so
+    the ratio is 2."""
     paces = iter([8.0, 2.0, 9.0])
     row = Measure(1.9, "pace", lambda: next(paces), lambda: 4.0, "one", "1/h")
 
@@ -81,6 +83,8 @@ def write_figures(path, **values):
 
 
 def test_figures_that_are_measured_anew_replace_those_in_the_file(tmp_path):
+    """A file has the first and the second figure; then the second and a third one are measured. The
+    first one stays, and each is noted with date, machine and load."""
     path = tmp_path / "bench.json"
     write_figures(path, first=1234.0, second=2.0)
 
@@ -94,6 +98,7 @@ def test_figures_that_are_measured_anew_replace_those_in_the_file(tmp_path):
 
 
 def test_figures_are_shown_in_a_table_with_their_goals(tmp_path):
+    """The figure is 1,234 s, and the goal that `write_figures` sets is 0.5 s."""
     write_figures(tmp_path / "bench.json", first=1234.0)
 
     table = markdown_table(read_figures(tmp_path / "bench.json"))
@@ -138,6 +143,7 @@ def test_the_performance_page_shows_the_file_of_figures():
 
 
 def test_no_other_page_has_figures_of_its_own():
+    """Figures of speed are written as "… steps a second behind", "… in process" or "… 1/s"."""
     for page in ROOT.glob("docs/*.md"):
         if page.name != "performance.md":
             figures = re.findall(

@@ -12,6 +12,8 @@ from roboirg.tasks.splits.splits import TaskSplits, shipped_splits
 
 
 def test_the_file_of_splits_is_read_back_and_has_a_line_for_each_task():
+    """Two tasks with a checksum each, and with the numbers of seeds that were passed over; two more
+    lines are the braces."""
     splits = {"A": TaskSplits("0f", {"train/3": 2}), "B": TaskSplits("ff", {})}
     text = seed_selection.splits_text(splits)
 
@@ -20,6 +22,10 @@ def test_the_file_of_splits_is_read_back_and_has_a_line_for_each_task():
 
 
 def test_splits_are_built_anew_for_what_is_named(tmp_path, monkeypatch, capsys):
+    """`find` stands in for the search in several processes, and gives seeds in the wrong order.
+    Three tasks have 150 episodes in the split; only the 52 that RoboMME has not published need a
+    seed. What is built must be the shipped file, printed or written."""
+
     def find(slots, workers):
         assert workers == 0
         # Backwards: no order of ending may matter.

@@ -64,6 +64,7 @@ def test_parts_install_on_a_machine_that_reaches_nothing(parts):
 
 
 def test_a_damaged_part_is_named_and_nothing_is_installed(parts):
+    """`parts` has the parts of a kit, with checksums. A bit of the second part is flipped."""
     part = parts / "part-01"
     content = bytearray(part.read_bytes())
     content[-1] ^= 1
@@ -77,6 +78,7 @@ def test_a_damaged_part_is_named_and_nothing_is_installed(parts):
 
 
 def test_another_python_is_refused_with_what_would_be_right(tmp_path, parts):
+    """The kit is packed anew for Python 3.1, which is not this one."""
     kit = tmp_path / "packed"
     other = tmp_path / "others"
     (kit / "python").write_text("3.1")
@@ -89,6 +91,9 @@ def test_another_python_is_refused_with_what_would_be_right(tmp_path, parts):
 
 
 def test_differences_are_counted_by_pixel_and_motion_by_bit():
+    """Two pictures of 4 by 5 pixels, 40 in all. In one picture a pixel is off by one level, and
+    another by 200, which is clear; the states of motion are equal, and those of events differ in
+    the last bit."""
     black = np.zeros((4, 5, 3), np.uint8)
     spotted = black.copy()
     spotted[0, 0] = (0, 1, 0)

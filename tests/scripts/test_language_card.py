@@ -16,6 +16,7 @@ MEASURED = "\n## What is said, measured\n"
 
 
 def test_the_page_is_what_the_generator_gives():
+    """The page begins with the card, and ends with measured figures that take longer to make."""
     assert PAGE.read_text().startswith(card.language_card()), "run: make card"
 
 
@@ -25,6 +26,8 @@ def test_the_measured_part_is_what_scenarios_say():
 
 
 def test_the_measured_part_has_all_tasks_that_have_words_and_no_shared_sentence():
+    """Each of five tables has a row for each task, below its head and the line under it. Sentences
+    come from pools for learning and for testing, compared in three ways: none is in two pools."""
     part = PAGE.read_text().partition(MEASURED)[2]
     written = [*written_words()]
     for table in ("Texts", "Length", "Frames", "Words", "Scenes that leave one goal"):
@@ -38,6 +41,9 @@ def test_the_measured_part_has_all_tasks_that_have_words_and_no_shared_sentence(
 
 
 def test_every_variant_has_an_example():
+    """A variant is a task in one of its implicit settings, of which there are 40; each has an
+    example in explicit words and one in resolved ones. Of the harder settings, *direct-rival* is
+    there for all 11 tasks of the benchmark, and *grounded* for 10."""
     page = PAGE.read_text()
     pairs = [
         (name, options)
@@ -58,6 +64,7 @@ def test_every_variant_has_an_example():
 
 @pytest.mark.parametrize("path", card.EXAMPLES, ids=lambda path: path.name)
 def test_a_page_of_the_settings_has_the_texts_that_the_program_says(path):
+    """The examples of a page are written anew into it, which must not change it."""
     page = path.read_text()
     assert page == card.EXAMPLES[path](page), "run: make card"
 
@@ -71,6 +78,8 @@ def test_the_walk_has_every_setting_and_how_each_implicit_one_leads_to_the_goal(
 
 
 def test_marks_are_around_the_mentions():
+    """A mention is a word that stands for a part of the goal. An anaphor, such as "it", is in bold,
+    others are in italics; without the stars it is the text that is said."""
     said = instruct(card.example_episode("PickXtimes", "direct"), "direct")
     marked = language_examples.marked(said)
 

@@ -13,6 +13,7 @@ AGAIN = "measure them anew: python scripts/measure_floors.py"
 
 
 def test_the_documentation_has_the_tables_of_the_file():
+    """A floor is the success of a policy that ignores something, such as chance."""
     page = measure_floors.PAGE.read_text(encoding="utf-8")
     assert page == measure_floors.page_text(), "python scripts/measure_floors.py --tables"
 
@@ -26,6 +27,8 @@ def measured():
 
 
 def test_floors_are_read_as_they_were_written(measured):
+    """The floors of one task, StopCube, are measured, written as text and read back: the same
+    shares to four decimals."""
     rows, read = measured
 
     assert next(iter(read)) == FloorKey("random", "direct")
@@ -37,7 +40,8 @@ def test_floors_are_read_as_they_were_written(measured):
 
 
 def test_the_file_holds_what_is_measured(measured):
-    """Chance and rules exactly, learners within 25 points."""
+    """The floors of one task are measured anew and compared with those of the shipped file: counts,
+    chance and rules exactly; learners, who learn from fewer scenes here, within 25 points."""
     _, read = measured
     kept = stored.measured_floors(measure_floors.LANGUAGE_VERSION)
     assert kept is not None, AGAIN
@@ -72,7 +76,9 @@ def rule_table(by):
     ],
 )
 def test_the_rules_are_those_of_the_documentation(by, setting, grouping, options, end):
-    """A cell has the shares of slots and of goals in percent; `end` is that of a column's name."""
+    """A cell of the table has the shares of slots and of goals in percent, as "40 / 25"; rows are
+    rules, and the name of a column is what the row is grouped by, and `end`. Every cell of such
+    a column is computed anew."""
     table = rule_table(by)
     names = {row for row, _ in table} & {"chance", *measure_floors.SURFACE_RULES}
     assert {"chance", "surface"} <= names

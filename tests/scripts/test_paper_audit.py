@@ -7,6 +7,8 @@ import write_published_figures as figures
 
 @pytest.mark.parametrize("item", paper_audit.ITEMS, ids=lambda item: item.name)
 def test_the_item_holds(item):
+    """An item is a statement of the paper with a check of it in the program, which says whether it
+    is so."""
     assert item.check()
 
 
@@ -30,6 +32,8 @@ def test_an_item_that_fails_is_named(monkeypatch, capsys):
 
 
 def test_intervals_know_a_clear_change_from_chance():
+    """Of two published systems, one loses a lot from explicit to direct words, and the interval of
+    the other's change contains 0."""
     changes = figures.setting_changes()
     assert changes["FrameS-Modul", "direct"].is_clear
 

@@ -35,7 +35,9 @@ with store.Store(Path(sys.argv[1])) as added:
 
 @pytest.mark.parametrize("seed", slow_but([0, 1], range(12)))
 def test_a_kill_at_any_moment_loses_no_entry_that_was_stored(seed, tmp_path):
-    """Would find an entry that is lost between the open lines and a pack, or a torn line read."""
+    """A program adds entries and prints the number of each that is stored; it is killed within 0.1
+    s, three times. The next one goes on where entries end, so its first number says how many
+    there were: as many as were printed, or one more that was stored and not printed yet."""
     rng = np.random.default_rng(seed)
     stored = 0
     for _ in range(3):
@@ -59,6 +61,8 @@ def add(folder, verdict, **key):
 
 
 def test_an_unfinished_line_is_moved_aside(tmp_path):
+    """One entry is stored whole, the line of a second one is cut off, as by a kill, and a third one
+    is added afterwards: two can be read."""
     add(tmp_path, "success 20")
     (tmp_path / "open.jsonl").write_bytes(b'{"key":{"body":"c3')
     add(tmp_path, "failure 30", body="c3d4")
@@ -89,6 +93,8 @@ def test_stores_are_joined_by_copying_their_packs(tmp_path):
 
 
 def test_entries_that_contradict_each_other_are_refused_with_both_files(tmp_path):
+    """The same play is a success in one store and a failure in the other. Their packs are joined in
+    one folder, and the error names both files."""
     add(tmp_path, "success 20")
     add(tmp_path / "second", "failure 30")
     join(tmp_path, tmp_path / "second")
@@ -99,6 +105,7 @@ def test_entries_that_contradict_each_other_are_refused_with_both_files(tmp_path
 
 
 def test_a_damaged_pack_is_refused(tmp_path):
+    """The last nine bytes of the one file are cut off."""
     add(tmp_path, "success 20")
     (pack,) = tmp_path.glob("*.xz")
     pack.write_bytes(pack.read_bytes()[:-9])
@@ -108,6 +115,8 @@ def test_a_damaged_pack_is_refused(tmp_path):
 
 
 def test_entries_of_earlier_code_count_only_if_it_is_named(tmp_path):
+    """An entry was made by code "old". A store for the code of today does not find it, unless "old"
+    is among the versions that it is told to accept."""
     add(tmp_path, "success 20", code="old")
     with Store(tmp_path) as store:
         assert store.get(KEY) is None
@@ -168,11 +177,15 @@ def play_key(study, monkeypatch):
     ],
 )
 def test_the_key_of_a_play_changes_with_all_that_decides_it(changes, play_key):
-    """Else a play would stand for another one."""
+    """`play_key` gives the key of a usual play, or of one with some changes: other weights or
+    another memory, episode, arm, heard goal, options of the environment, code or machine. Else a
+    play would stand for another one."""
     assert play_key() != play_key(**changes)
 
 
 def test_the_key_of_a_play_does_not_change_with_words_or_the_name_of_a_file(play_key):
+    """A policy acts on the goal that it has heard, so other words for the same goal, "direct" in
+    the form "resolved", and another name of the file of its weights change nothing."""
     assert play_key() == play_key("b", options=InstructionOptions("direct", "resolved"))
 
 

@@ -23,6 +23,8 @@ def run(tmp_path_factory):
 
 
 def test_parts_of_records_give_the_cells_of_whole_records(run):
+    """A run of 100 made-up records; `read_results` reads only the parts of them that tables
+    need."""
     plan = read_plan(run)
     assert plan is not None
 
@@ -34,6 +36,8 @@ def test_parts_of_records_give_the_cells_of_whole_records(run):
 
 
 def test_a_page_reads_one_record_after_the_other(run):
+    """A run of 100 made-up records; progress is told after each of them, and the page has the turns
+    of each."""
     told = []
     page = write_report(
         Source(run), progress=lambda done, total: told.append((done, total))

@@ -65,6 +65,9 @@ def pixels_of(cameras, camera, entity):
 
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_the_pixels_of_an_object_surround_its_projected_position(world, cameras, camera):
+    """`world` has cubes, a target and a button. The matrices of the camera take an object's center
+    to a pixel; the mean place of the pixels that the segmentation gives to it is within 2 pixels
+    of that. Of a button the movable cap is looked at."""
     for name, body in world.bodies.items():
         entity = body.entity if body.button is None else body.button.links[1].entity
         rows, columns = pixels_of(cameras, camera, entity)
@@ -88,13 +91,16 @@ def test_the_depth_of_a_cube_is_its_distance_in_millimeters(world, cameras, came
 
 
 def test_segmentation_has_a_16_bit_number_for_each_pixel(cameras):
+    """The front camera's picture has 256 by 256 pixels; each gets the number of the object that it
+    shows."""
     segmentation = cameras.segmentation("front")
 
     assert (segmentation.shape, segmentation.dtype) == ((256, 256), np.int16)
 
 
 def test_picture_depth_and_segmentation_of_a_moment_take_one_drawing(takes):
-    """`takes` has an entry for each drawing."""
+    """`takes` notes each time that a camera draws, with the camera's name. All three come from the
+    same drawing, so there is one entry for them."""
     cameras = world_after_one_step("PickXtimes", 2).cameras
 
     cameras.segmentation("front")
@@ -105,7 +111,9 @@ def test_picture_depth_and_segmentation_of_a_moment_take_one_drawing(takes):
 
 
 def test_picture_and_segmentation_show_the_same_moment():
-    """The red cube moves by 3 cm between two pictures; then the pixels that are its own are red."""
+    """The red cube is moved by 3 cm after a picture was taken. Then all pixels that the new
+    segmentation calls its own must be red in the new picture: more than 60 of 255 of red, less
+    of green and blue."""
     world = world_after_one_step("PickXtimes", 2)
     world.picture("front")
     cube = world.bodies["cube_red"]
@@ -119,6 +127,8 @@ def test_picture_and_segmentation_show_the_same_moment():
 
 
 def test_a_caller_that_paints_over_a_picture_does_not_change_the_next_one(cameras):
+    """A picture is asked for twice at the same moment, and the caller blackens the first one: the
+    second one must be a copy of its own."""
     before = cameras.picture("front")
     kept = before.copy()
     before[:] = 0
@@ -127,6 +137,8 @@ def test_a_caller_that_paints_over_a_picture_does_not_change_the_next_one(camera
 
 
 def test_pictures_of_a_world_do_not_change_when_another_world_is_drawn():
+    """A world at rest is drawn, then another world. The first one, drawn again, and an equal one
+    that is made anew have the same pixels as before."""
     world = world_after_one_step("PickXtimes", 3)
     pictures = [world.picture(camera) for camera in CAMERAS]
 

@@ -109,7 +109,9 @@ def check_same(first, second):
 
 @pytest.mark.parametrize("task", slow_but((SHORT, "VideoRepick"), VIDEO_TASKS))
 def test_replaying_a_recorded_demonstration_gives_bit_identical_states(task):
-    """One session plans the robot's motions, the other repeats the recorded actions."""
+    """One session plans the robot's motions, the other repeats the recorded actions, which went
+    through bytes. All hashes of the state, one for each moment of the video, the hash at the
+    end, and the events must be the same."""
     planned = EpisodeSession(get_episode(task, "test", 3), visible=False)
     replayed = EpisodeSession(get_episode(task, "test", 3), visible=True)
     states = []
@@ -129,7 +131,9 @@ def test_replaying_a_recorded_demonstration_gives_bit_identical_states(task):
 
 @pytest.mark.parametrize("task", slow_but((SHORT, "VideoRepick"), VIDEO_TASKS))
 def test_after_a_replay_random_actions_lead_to_the_same_state_as_after_planning(task):
-    """What cannot be read, such as the solver's memory of contacts, shows in what comes next."""
+    """One session has planned the motions of the video, the other has repeated the recorded
+    actions. What cannot be read, such as the solver's memory of contacts, shows in what comes
+    next: 100 random actions."""
     planned = EpisodeSession(get_episode(task, "test", 3), visible=False)
     replayed = EpisodeSession(get_episode(task, "test", 3), visible=False)
     recording = planned.play_demonstration()
@@ -175,6 +179,9 @@ def test_video_pictures_read_after_the_policy_acted_show_the_demonstration(task,
 
 
 def test_depth_and_calibration_of_the_video_are_those_of_its_moments():
+    """A hook reads the observation of the wrist camera, with depth and matrices, at each moment of
+    the video while it is played. The video that the reset returns, drawn later, must be the
+    stack of these."""
     moments = []
 
     def read(env, is_demonstration):
@@ -201,6 +208,8 @@ def test_a_reset_draws_no_picture_of_its_video(cameras_drawn):
 
 
 def test_pictures_of_a_video_can_be_read_after_its_environment_is_closed(cameras_drawn):
+    """Closing frees the world of the environment. The 66 pictures of the wrist camera are then
+    drawn in a new one, when they are read, and those of the front camera are not."""
     env, _, _, video = reset(cameras=("front", "wrist"))
     world = weakref.ref(env.session.world)
     env.close()
@@ -212,6 +221,8 @@ def test_pictures_of_a_video_can_be_read_after_its_environment_is_closed(cameras
 
 
 def test_a_pickled_video_has_all_its_arrays_and_needs_no_simulator():
+    """The copy has the same 66 moments to the bit, but no recorded actions from which anything
+    could be drawn: all is in it."""
     video = reset(cameras=("front",)).video
 
     other = pickle.loads(pickle.dumps(video))  # noqa: S301 - our own
@@ -234,6 +245,9 @@ def test_reading_a_camera_draws_all_its_pictures_in_one_replay(cameras_drawn, re
 
 
 def test_drawing_a_video_draws_what_was_not_read_and_nothing_twice(cameras_drawn, replays):
+    """Every fifth of 66 moments has a picture: 14 of each camera. Those of the wrist were read
+    before, so `draw` has only the front ones to draw, in one replay; a second `draw` has nothing
+    to do."""
     options = {"cameras": ("front", "wrist"), "depth": True, "demonstration_frames": 5}
     read_at_once = dict(reset(**options).video)
     video = reset(**options).video
@@ -277,7 +291,8 @@ def record_of_viewer(folder):
 
 
 def test_a_run_records_the_same_with_an_empty_a_filled_and_no_cache(cache, tmp_path, monkeypatch):
-    """The policy acts on the pictures of the video."""
+    """The policy acts on the pictures of the video, which come from the simulator at first and from
+    the cache afterwards. A wrong picture would change its actions and so the record."""
     monkeypatch.setitem(sys.modules, __name__, sys.modules[__name__])
     with_empty_cache = record_of_viewer(tmp_path)
     with_filled_cache = record_of_viewer(tmp_path)
@@ -290,6 +305,8 @@ def test_a_run_records_the_same_with_an_empty_a_filled_and_no_cache(cache, tmp_p
 
 
 def test_a_reset_fills_the_cache_with_a_recording_and_the_pictures_of_each_camera(cache):
+    """The cache is empty before. `dict` reads all arrays of the video, so that its pictures are
+    drawn: one file has its actions, and one for each of two cameras has pictures."""
     dict(reset(cameras=("front", "wrist"), demonstration_frames=6).video)
 
     assert len(list(cache.glob("actions/*"))) == 1
@@ -299,6 +316,9 @@ def test_a_reset_fills_the_cache_with_a_recording_and_the_pictures_of_each_camer
 def test_with_a_filled_cache_no_picture_of_the_video_is_drawn(
     cache, cameras_drawn, forbid_planning
 ):
+    """`cameras_drawn` notes each picture that is drawn. After a first reset has filled the cache,
+    planning is forbidden: the second one draws only its first observation, and its video is the
+    same to the bit."""
     options = {"cameras": ("front", "wrist"), "depth": True, "demonstration_frames": 6}
     first = dict(reset(**options).video)
     cameras_drawn.clear()
@@ -360,6 +380,9 @@ def without_actions(recording):
 def test_a_cached_recording_that_replays_differently_is_rebuilt_with_a_warning(
     cache, caplog, spoil
 ):
+    """The cached recording of VideoUnmask's episode 1 is spoiled: it names another final state, has
+    other actions, or none. The next reset warns with its name, gives what the first one gave,
+    and stores the right one again."""
     first = reset()
     store, name, right = stored_recording(cache)
     store.write(name, spoil(right).to_bytes())
@@ -390,6 +413,7 @@ def test_a_frame_hook_does_not_see_the_replay_of_a_wrong_recording(cache):
 
 
 def test_each_episode_has_a_cache_key_of_its_own_that_stays_the_same():
+    """The keys of test episode 1, of the same again, and of test episode 2."""
     first = demonstration_cache.recording_key(get_episode(SHORT, "test", 1))
     again = demonstration_cache.recording_key(get_episode(SHORT, "test", 1))
     other = demonstration_cache.recording_key(get_episode(SHORT, "test", 2))
@@ -411,6 +435,8 @@ def _fingerprint_made_anew():
     ("name", "other"), [("_SOURCE_HASH", "another"), ("processor_features", lambda: "another")]
 )
 def test_the_cache_key_of_a_demonstration_changes_with_code_and_processor(monkeypatch, name, other):
+    """A recording replays only with the same code and kind of processor, both of which are part of
+    the key. One of them is replaced by "another"."""
     episode = get_episode(SHORT, "test", 1)
     key = demonstration_cache.recording_key(episode)
     demonstration_cache._platform_fingerprint.cache_clear()
@@ -420,6 +446,8 @@ def test_the_cache_key_of_a_demonstration_changes_with_code_and_processor(monkey
 
 
 def test_the_cache_key_of_a_demonstration_names_the_libraries_that_compute_motions():
+    """Another version of one of them may compute other motions, so the version is part of the key;
+    NumPy and the others are named with what is installed."""
     fingerprint = demonstration_cache._platform_fingerprint()
 
     for library in ("sapien 3", "numpy ", "scipy ", "toppra ", "python 3"):
@@ -427,6 +455,8 @@ def test_the_cache_key_of_a_demonstration_names_the_libraries_that_compute_motio
 
 
 def test_the_cache_key_of_pictures_names_the_driver():
+    """Another driver may draw other pixels. Here it is Mesa's llvmpipe or NVIDIA's, named with its
+    library, a .so file."""
     key = frame_sequence.rendering_key(FAITHFUL)
 
     assert "llvmpipe" in key or "NVIDIA" in key
@@ -440,6 +470,8 @@ def pictures_with(meshes, every):
 
 
 def test_pictures_with_other_meshes_have_a_cache_entry_of_their_own(cache):
+    """Two kinds of meshes draw different pictures of the same moments, every eleventh of the video:
+    two files."""
     faithful = pictures_with("faithful", every=11)
     light = pictures_with("light", every=11)
 
@@ -448,6 +480,8 @@ def test_pictures_with_other_meshes_have_a_cache_entry_of_their_own(cache):
 
 
 def test_fewer_pictures_are_not_the_first_ones_of_a_cache_entry_that_has_more(cache):
+    """Pictures of every 11th moment are in the cache. Those of every 22nd are every second one of
+    these, and not the first half."""
     every_11th = pictures_with("light", every=11)
 
     every_22nd = pictures_with("light", every=22)

@@ -36,6 +36,8 @@ arrays_by_name = st.dictionaries(
 @settings(max_examples=12)
 @given(arrays_by_name)
 def test_packed_arrays_are_unpacked_bit_for_bit(packed):
+    """Arrays of any type and shape, by name, are packed into bytes and read back: same order,
+    types, shapes and bits."""
     unpacked = unpack_arrays(memoryview(pack_arrays(packed)))
 
     assert list(unpacked) == list(packed)
@@ -136,6 +138,8 @@ def installed_table_parts():
 
 @pytest.mark.sim
 def test_our_reduced_table_mesh_has_the_geometry_of_the_installed_model(installed_table_parts):
+    """`installed_table_parts` are those of the model file, as SAPIEN reads it. Ours are read from
+    less data: corners, triangles, normals and texture coordinates must be equal."""
     ours = table_mesh.table_shape().parts
 
     for mine, theirs in zip(ours, installed_table_parts, strict=True):
@@ -161,6 +165,8 @@ def test_what_our_table_leaves_out_of_its_material_has_no_effect(installed_table
 
 
 def test_the_cache_key_of_a_mesh_changes_with_the_code_that_computes_it(mesh_folder, monkeypatch):
+    """The same mesh of the same source is asked for before and after its code was replaced: it is
+    computed again, so there are two files."""
     cached_arrays("thing", b"", dict)
     monkeypatch.setattr(mesh_cache, "source_code", lambda *_: b"other code")
 

@@ -58,6 +58,8 @@ ALL_FILES = sorted([*model_files.MODEL_FILES, "LICENSE", "LICENSE-3RD-PARTY"])
 
 
 def test_models_and_licenses_are_unpacked_from_a_local_wheel(wheel, folder):
+    """`wheel` is a package file with small files in place of the models, and `folder` does not
+    exist yet. Its Python code is left out."""
     assert fetch_model_files(wheel, print) == folder
 
     assert files_in(folder) == ALL_FILES
@@ -92,6 +94,7 @@ def damage(path):
     ],
 )
 def test_a_missing_or_damaged_model_is_reported_and_fetched_again(wheel, folder, harm, complaint):
+    """All models were fetched; then one of them, any, is deleted or overwritten."""
     fetch_model_files(wheel, print)
     harm(folder / model_files.MODEL_FILES[5])
 
@@ -116,6 +119,7 @@ def test_a_file_with_another_hash_a_folder_or_nothing_is_refused_as_a_wheel(
 
 
 def test_a_model_folder_that_is_a_file_is_reported_by_name(wheel, folder):
+    """The variable ROBOIRG_MODEL_FILES names `folder`, at which there is a file."""
     folder.write_text("a file")
 
     with pytest.raises(InvalidValueError, match=f"{folder}.*ROBOIRG_MODEL_FILES names another"):
@@ -138,6 +142,8 @@ def fetch_models(monkeypatch, capsys):
 
 
 def test_models_are_downloaded_by_pip_with_the_user_s_configuration(wheel, folder, fetch_models):
+    """`fetch_models` calls the command while pip is configured, by its own variables, to take
+    packages from one folder alone, here that of the wheel."""
     code, out, _ = fetch_models(wheel.parent)
 
     assert not code
@@ -148,6 +154,8 @@ def test_models_are_downloaded_by_pip_with_the_user_s_configuration(wheel, folde
 def test_a_failed_download_by_pip_is_reported_with_the_option_for_a_local_wheel(
     tmp_path, folder, fetch_models
 ):
+    """`fetch_models` calls the command while pip takes packages from one folder alone, here an
+    empty one. Two lines say what failed and what to do."""
     code, out, err = fetch_models(tmp_path)
 
     assert (code, out, err.count("\n")) == (2, "", 2), err
@@ -175,6 +183,8 @@ def test_without_pip_the_models_are_downloaded_from_a_fixed_url(wheel, folder, m
 
 @pytest.mark.usefixtures("_no_pip")
 def test_a_download_with_another_hash_is_refused_and_not_kept(wheel, folder, monkeypatch):
+    """The address is that of a local file, and the expected hash is replaced by zeros, so what is
+    downloaded has another one."""
     monkeypatch.setattr(model_fetch, "WHEEL_URL", wheel.as_uri())
     monkeypatch.setattr(model_fetch, "WHEEL_SHA256", "0" * 64)
 
@@ -186,6 +196,7 @@ def test_a_download_with_another_hash_is_refused_and_not_kept(wheel, folder, mon
 
 @pytest.mark.usefixtures("_no_pip")
 def test_a_failed_download_without_pip_names_the_option_for_a_local_wheel(folder, monkeypatch):
+    """The address of the download is replaced by that of a file that does not exist."""
     monkeypatch.setattr(model_fetch, "WHEEL_URL", (folder / "nowhere").as_uri())
 
     with pytest.raises(MissingDependencyError, match=r"Cannot download .*--wheel"):

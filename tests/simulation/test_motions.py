@@ -42,6 +42,8 @@ def swapping_world():
 
 
 def test_objects_stay_where_they_are_before_their_swap_begins():
+    """Two objects, a and b, stand at y = -0.1 m and 0.1 m, and change places from step 10 on: after
+    ten steps they have not moved."""
     world = rest(swapping_world(), 10)
 
     assert place(world, "a") == pytest.approx((0.0, -0.1), abs=1e-4)
@@ -49,7 +51,8 @@ def test_objects_stay_where_they_are_before_their_swap_begins():
 
 
 def test_half_way_through_a_swap_the_objects_pass_each_other_on_opposite_lanes():
-    """a goes towards +y, so its left is -x; b comes the other way, on its own left."""
+    """a goes from y = -0.1 m towards +y, so its left is -x; b comes the other way, on its own left.
+    Both lanes are 0.07 m aside. a also turns by 0.3 rad, of which half is done."""
     world = rest(swapping_world(), 36)
 
     assert place(world, "a") == pytest.approx((-0.07, 0.0), abs=2e-3)
@@ -59,6 +62,8 @@ def test_half_way_through_a_swap_the_objects_pass_each_other_on_opposite_lanes()
 
 @pytest.mark.parametrize("step", [61, 66])
 def test_after_a_swap_two_objects_have_changed_places_and_yaw_and_the_others_stay(step):
+    """a stood at y = -0.1 m with a yaw of 0, and b at 0.1 m with 0.3 rad; they swapped from step 10
+    to 60. c was never moved. It stays so, one step and six steps later."""
     world = rest(swapping_world(), step)
 
     assert place(world, "a") == pytest.approx((0.0, 0.1), abs=1e-4)
@@ -117,11 +122,14 @@ TO_AND_FRO = Shuttle("s", Point(0, -0.3, 0.01), Point(0, 0.3, 0.01), 60, 5, PRES
     [(0, -0.3), (30, 0.0), (60, 0.3), (90, 0.0), (120, -0.3), (300, 0.3), (1000, 0.3)],
 )
 def test_a_shuttle_runs_to_and_fro_and_stays_where_its_last_pass_ends(step, y):
+    """It goes from y = -0.3 m to 0.3 m in 60 steps, and back. The fifth and last pass ends at step
+    300, at 0.3 m."""
     assert shuttle_position(TO_AND_FRO, step).y == pytest.approx(y)
 
 
 def test_a_shuttle_is_fastest_in_the_middle_of_its_way():
-    """RoboMME's goes by 0.0150 m a step there, for 60 steps a pass."""
+    """Step 30 is the middle of a pass of 60 steps. RoboMME's shuttle goes by 0.0150 m a step
+    there."""
     y = [shuttle_position(TO_AND_FRO, step).y for step in (30, 31)]
 
     assert y[1] - y[0] == pytest.approx(0.015, rel=1e-2)
@@ -136,6 +144,8 @@ def shuttle_world():
 
 
 def test_a_world_shows_a_shuttle_s_position_one_step_late():
+    """The shuttle follows a known course, from y = -0.3 m on. After 20 steps the world has it where
+    that course is at step 19."""
     world = shuttle_world()
 
     rest(world, 20)
@@ -188,6 +198,8 @@ def world_with_a_light():
 
 
 def test_a_light_is_in_its_place_a_step_after_something_was_over_its_target():
+    """A cube in the air is over the target, whose light is a disc just below the table until it
+    glows. At the second step the light is at its place, z = -0.005 m, and not parked far away."""
     world = rest(world_with_a_light(), 2)
 
     assert world.bodies["light"].position == pytest.approx((0.0, 0.0, -0.005))
@@ -206,7 +218,8 @@ def test_a_light_lingers_and_is_then_parked_far_off():
 
 
 def test_a_cube_that_falls_into_the_bin_is_gone_and_stays_counted():
-    """What has vanished is parked at x > 5 m, 10 m high. It falls in within 20 steps."""
+    """The cube falls in within 20 of the 30 steps. What has vanished is parked at x > 5 m, 10 m
+    high; the fact that it is in the bin lasts, and it lies nowhere."""
     binned = Fact("binned", "a", "bin")
     tray = SceneObject("bin", "bin", Point(0.1, 0.0, 0.025), yaw=0.2)
     world = world_with([tray, cube("a", 0.1, 0.0, z=0.15)], Vanish("a", binned))

@@ -59,6 +59,8 @@ def test_forward_kinematics_of_home_is_where_the_simulator_has_the_tool(planner)
 
 
 def test_a_planned_path_leads_from_the_start_to_the_goal(planner):
+    """For a dozen random poses: a path is rows of joint positions, from the arm's resting position,
+    HOME, to ones that have the tool within 0.01 mm and 1e-5 rad of the pose."""
     for goal in random_poses(12):
         path = planner.plan_straight(HOME, goal)
 
@@ -69,6 +71,8 @@ def test_a_planned_path_leads_from_the_start_to_the_goal(planner):
 
 
 def test_a_planned_path_is_straight_within_a_millimeter(planner):
+    """For a dozen random poses: the tool's distance from the straight line between start and goal,
+    `sideways`, at every row of joint positions."""
     start = planner.forward_kinematics(HOME).position
     for goal in random_poses(12):
         direction = (goal.position - start) / np.linalg.norm(goal.position - start)
@@ -80,7 +84,10 @@ def test_a_planned_path_is_straight_within_a_millimeter(planner):
 
 
 def test_a_planned_path_keeps_the_limits_of_speed_and_acceleration(planner):
-    """Its samples are up to a fraction of a step closer in time than the control period."""
+    """A row of joint positions for each control step, for a dozen random poses. Rows are up to a
+    fraction of a step closer in time than the control period, which `slack` allows for, with 2 %
+    of tolerance for speeds and 5 % for accelerations, as they are differences of rounded
+    numbers."""
     for goal in random_poses(12):
         path = planner.plan_straight(HOME, goal)
 
@@ -109,6 +116,8 @@ def test_inverse_kinematics_finds_joint_positions_within_their_limits(planner):
 
 
 def test_poses_one_centimeter_apart_need_small_joint_movements(planner):
+    """For ten random poses, and the same 1 cm away along each axis: no joint moves by more than 0.2
+    rad, so no other way to bend the arm is chosen."""
     for goal in random_poses(10):
         joints = planner.plan_straight(HOME, goal)[-1]
         near = ToolPose(goal.position + np.array([0.01, -0.01, 0.01]), goal.rotation)
@@ -140,6 +149,7 @@ def test_a_pose_that_no_straight_line_reaches_is_reached_by_way_of_home(planner)
 
 
 def test_a_move_to_where_one_is_takes_no_time():
+    """A path from the resting position to itself is one row of seven joint positions."""
     assert time_parameterize(np.stack([HOME, HOME])).shape == (1, 7)
 
 
@@ -159,6 +169,8 @@ def test_every_short_move_has_a_timing(exponent, direction):
 
 @pytest.mark.parametrize("distance_m", [0.0, 1e-4])
 def test_a_goal_at_the_current_pose_does_not_lead_by_way_of_home(planner, distance_m):
+    """The goal is where the tool is, or 0.1 mm away in each direction. A path by way of the resting
+    position would have dozens of rows."""
     start = planner.plan_straight(HOME, pose_facing_down(-0.1, 0.0, 0.2))[-1]
     place = planner.forward_kinematics(start)
 
@@ -178,6 +190,8 @@ def test_a_goal_at_the_current_pose_does_not_lead_by_way_of_home(planner, distan
     ids=["down 10 cm", "down 15 cm", "aside 10 cm", "aside 20 cm"],
 )
 def test_free_moves_take_as_many_control_steps_as_robomme_s(planner, goal, fewest, most):
+    """From 0.2 m above the table, down or aside. RoboMME's moves of these lengths take between
+    `fewest` and `most` control steps of 1/20 s."""
     start = planner.plan_straight(HOME, pose_facing_down(-0.1, 0.0, 0.2))[-1]
 
     path = planner.plan_straight(start, pose_facing_down(*goal))
@@ -191,7 +205,8 @@ def test_free_moves_take_as_many_control_steps_as_robomme_s(planner, goal, fewes
 )
 @pytest.mark.parametrize("index", range(3))
 def test_first_picks_take_as_many_control_steps_as_robomme_s(task, index, primitive, fewest, most):
-    """After 40 steps containers are there and at rest."""
+    """The first 40 steps let containers appear and come to rest. Then the pick is executed, which
+    RoboMME's data take between `fewest` and `most` control steps for, and it must succeed."""
     episode = get_episode(task, "test", index)
     stage = next(stage for stage in episode.stages if stage.primitive.kind == primitive)
     world = rest(World(episode.scene, visible=False), 40)
@@ -222,6 +237,7 @@ def test_a_cube_at_the_edge_of_the_workspace_is_gripped_short_of_its_middle(plan
 
 
 def test_a_cube_beyond_the_workspace_is_a_planning_error():
+    """It is 2 cm farther than a cube at (0.171, -0.159) m, whose near edge is just in reach."""
     with pytest.raises(MotionPlanningError, match="cannot reach"):
         is_picked_up(cube("too_far", 0.191, -0.159))
 
@@ -237,11 +253,15 @@ FIVE_CUBES = (
 
 
 def test_a_cube_between_close_neighbors_is_picked():
+    """Four other cubes stand 7 cm from its middle on all sides. A cube is 4 cm wide, so 3 cm are
+    left for the fingers."""
     assert is_picked_up(*FIVE_CUBES)
 
 
 def test_open_fingers_would_not_fit_between_close_neighbors(monkeypatch):
-    """So the fingers of the picks among neighbors are half open, which is called narrow."""
+    """A check of the test that a cube with neighbors 7 cm away on all sides is picked: there the
+    fingers are half open, which is called narrow. With NARROW replaced by OPEN they hit the
+    neighbors, so the pick fails."""
     monkeypatch.setattr(primitives, "NARROW", primitives.OPEN)
 
     assert not is_picked_up(*FIVE_CUBES)

@@ -106,6 +106,9 @@ def test_the_oracle_succeeds_and_its_pictures_equal_the_stored_ones(task, index,
 
 @pytest.mark.parametrize(("task", "index"), [("PickXtimes", 2), ("PutInBox", 0)])
 def test_a_play_repeats_itself_to_the_bit_also_while_pictures_are_drawn(task, index):
+    """The oracle plays an episode twice, once with a picture after every 50 steps. Rewards, events,
+    and a hash of all actions and joint positions must be the same."""
+
     def shoot(env, _demonstration):
         if env.session.world.elapsed % 50 == 0:
             env.picture("front")
@@ -126,7 +129,8 @@ def names_moved_by(motions):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_nothing_falls_or_drifts_while_the_robot_rests(task):
-    """By more than 2 mm in 60 steps; a hidden cube may be pushed by its container."""
+    """In 60 steps no object that stays by itself may move by more than 2 mm. Left out are objects
+    with a scripted motion, and hidden cubes, which may be pushed by their containers."""
     scene = unused_scene(task, "hard").scene
     moved = names_moved_by(scene.motions)
 

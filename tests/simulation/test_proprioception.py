@@ -25,6 +25,8 @@ quaternions = st.tuples(parts, parts, parts, parts).filter(lambda q: np.linalg.n
 
 @given(quaternions)
 def test_euler_angles_are_bit_identical_to_scipy_s(quaternion):
+    """The pose has any turn, written as four numbers; SciPy's angles for it are the reference, and
+    not a bit may differ."""
     pose = sapien.Pose(q=quaternion)
 
     assert euler_angles(pose).tobytes() == angles_by_scipy(pose).tobytes()
@@ -47,7 +49,8 @@ radians = st.floats(-50.0, 50.0) | st.integers(-40, 40).map(lambda eighths: eigh
 @settings(max_examples=100)
 @given(radians, radians)
 def test_an_angle_is_continued_without_a_jump(before, now):
-    """After 3.1 rad comes 3.2 and not -3.08, which is the same angle."""
+    """After 3.1 rad comes 3.2 and not -3.08, which is the same angle: the result differs from `now`
+    by whole turns, and from `before` by at most half a turn."""
     (continued,) = unwrap_angles(np.array([before]), np.array([now]))
 
     turns = (continued - now) / (2 * np.pi)

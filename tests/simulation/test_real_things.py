@@ -44,12 +44,14 @@ def world_after_drop(x, y, z):
 
 
 def test_a_roll_of_tape_weighs_50_to_100_grams():
+    """As ordinary ones do; the mass is in kilograms."""
     tape = world_with_tape().bodies["tape"]
 
     assert 0.05 <= tape.physics.mass <= 0.1
 
 
 def test_a_roll_of_tape_can_be_gripped_around_its_outside():
+    """The roll is 55 mm wide, and the open fingers 80 mm apart."""
     world = world_with_tape()
 
     execute(world, Primitive("pick_cube", "tape"))
@@ -89,12 +91,14 @@ def test_tape_that_falls_between_the_walls_of_a_box_is_in_the_box(x, y):
 
 
 def test_a_box_is_not_moved_by_what_falls_into_it():
+    """A roll of tape falls from 12 cm and touches a wall of the box, which stays at its place."""
     world = world_after_drop(-0.02, 0.03, z=0.12)
 
     assert world.bodies["box_green"].position == pytest.approx((0.0, 0.0, 0.02))
 
 
 def test_tape_next_to_a_box_is_not_in_it():
+    """The box is 130 mm wide, with its middle at y = 0, and the tape lies 110 mm from it."""
     world = world_after_drop(0.0, 0.11, z=0.02)
 
     assert Fact("lying", "tape") in world.facts

@@ -101,6 +101,9 @@ def differences_from_stock(rendering):
 
 @pytest.mark.slow
 def test_leaving_out_what_is_out_of_sight_changes_no_pixel():
+    """A dozen moments are drawn by two cameras with SAPIEN's own shader and meshes, once with all
+    bodies and once without those out of sight. `apart` are the differences of colors, `others`
+    the pixels of the segmentation that differ."""
     culling_alone = RenderSettings(slim_shader=False, meshes="stock")
 
     apart, others = differences_from_stock(culling_alone)
@@ -111,6 +114,9 @@ def test_leaving_out_what_is_out_of_sight_changes_no_pixel():
 
 @pytest.mark.slow
 def test_faithful_drawing_differs_from_sapien_s_in_a_hundred_thousandth_of_the_pixels():
+    """A dozen moments are drawn by two cameras, in our usual way and with SAPIEN's own shader and
+    meshes. `apart` are the differences of colors, `others` the pixels of the segmentation that
+    differ; a share of 1e-5 is allowed."""
     apart, others = differences_from_stock(FAITHFUL)
 
     assert apart.any(axis=-1).mean() <= 1e-5
@@ -129,7 +135,8 @@ def test_light_drawing_differs_from_sapien_s_visibly_in_a_hundredth_of_the_pixel
 @pytest.mark.slow
 @pytest.mark.parametrize("rendering", [FAITHFUL, LIGHT], ids=["faithful", "light"])
 def test_each_way_of_drawing_gives_the_same_pixels_without_culling(rendering):
-    """Culling leaves out what is out of sight."""
+    """Culling leaves out what is out of sight, so with and without it a dozen moments of an
+    oracle's run look the same to the bit."""
     scene = get_episode("VideoPlaceButton", "test", 2).scene
     culled = DrawnScene(scene, rendering)
     whole = DrawnScene(scene, replace(rendering, culling=False))
@@ -159,6 +166,8 @@ def links_drawn(takes):
 
 
 def test_the_wrist_camera_draws_the_fingers_and_the_base_but_not_its_own_hand(links_drawn):
+    """`links_drawn` has, for each camera, the links of the robot that it draws in an episode. The
+    camera is on the hand, which is never in its view."""
     drawn = links_drawn["wrist"].keys()
 
     assert {"panda_link0", "panda_leftfinger", "panda_rightfinger"} <= drawn
@@ -166,6 +175,8 @@ def test_the_wrist_camera_draws_the_fingers_and_the_base_but_not_its_own_hand(li
 
 
 def test_the_front_camera_draws_less_than_a_fifth_of_the_base(links_drawn):
+    """Of the robot's base, link 0, the front camera sees a part alone, so triangles that are always
+    hidden from it are left out; for the wrist camera there are more."""
     front = triangle_count(links_drawn["front"]["panda_link0"])
     wrist = triangle_count(links_drawn["wrist"]["panda_link0"])
 
@@ -193,6 +204,8 @@ def test_a_camera_draws_again_only_when_something_in_its_view_has_moved(takes):
 
 
 def test_pictures_that_are_not_drawn_again_equal_those_that_are():
+    """In these 20 steps nothing moves before the front camera, which then shows its last picture
+    again. A second scene draws everything at each moment."""
     scene = get_episode("PickXtimes", "test", 2).scene
     ours = DrawnScene(scene, FAITHFUL)
     always = DrawnScene(scene, RenderSettings(culling=False))
@@ -202,6 +215,8 @@ def test_pictures_that_are_not_drawn_again_equal_those_that_are():
 
 
 def test_a_sapien_version_with_another_shader_is_refused(monkeypatch):
+    """Our shader is made from SAPIEN's by changing lines, for which its text has to be the known
+    one; here its known checksum is replaced."""
     monkeypatch.setattr(shaders, "_STOCK_SHA256", "of another version")
 
     with pytest.raises(InvalidValueError, match=r"install sapien==3\.0\.3 again"):
@@ -209,6 +224,8 @@ def test_a_sapien_version_with_another_shader_is_refused(monkeypatch):
 
 
 def test_a_damaged_shader_in_the_cache_is_rewritten(monkeypatch, tmp_path):
+    """One file of the shader is cut off, and another one deleted. The next call makes both whole
+    again, in the folder of the cache."""
     monkeypatch.setenv("ROBOIRG_CACHE", str(tmp_path))
     vertices = Path(shaders.slim_shader.__wrapped__(), "gbuffer.vert")
     text = vertices.read_text()
@@ -223,6 +240,8 @@ def test_a_damaged_shader_in_the_cache_is_rewritten(monkeypatch, tmp_path):
 
 
 def test_without_a_cache_the_shader_is_in_a_temporary_folder(monkeypatch):
+    """The renderer needs files, so with the cache switched off they are written to a temporary
+    folder."""
     monkeypatch.setenv("ROBOIRG_CACHE", "off")
 
     folder = Path(shaders.slim_shader.__wrapped__())

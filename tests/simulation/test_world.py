@@ -45,6 +45,7 @@ def test_physics_and_drawing_report_when_they_begin_and_end(monkeypatch):
 
 @pytest.mark.parametrize(("name", "kilograms"), [("cube_red", 0.064), ("button", 0.0427)])
 def test_cubes_and_buttons_weigh_what_robomme_s_do(name, kilograms):
+    """The masses were read from RoboMME's simulation, in kilograms; 0.1 g is the tolerance."""
     body = world_of("PickXtimes").bodies[name]
 
     assert body.physics.mass == pytest.approx(kilograms, abs=1e-4)
@@ -71,6 +72,8 @@ def test_in_a_world_at_rest_the_robot_is_still_and_at_home_and_cubes_lie():
 
 
 def test_containers_are_parked_high_up_for_32_steps_and_do_not_count_as_lifted():
+    """In VideoUnmask the containers come down over the cubes after 32 steps; until then they are
+    more than 5 m high. The only facts are that the robot is still and at home."""
     world = rest(world_of("VideoUnmask"), 32)
 
     for name in ("container_0", "container_1", "container_2"):
@@ -144,6 +147,8 @@ def test_the_gripper_closes_and_opens():
 
 
 def test_a_robot_with_a_closed_gripper_is_not_at_home():
+    """The arm stays in its resting position, and the gripper closes for ten steps (-1); at home it
+    is open."""
     world = world_of("PickXtimes")
 
     for _ in range(10):

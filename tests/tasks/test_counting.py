@@ -37,7 +37,8 @@ def test_a_scene_without_room_for_the_bin_is_rejected():
 
 
 def test_bin_fill_keeps_the_bin_off_the_button(monkeypatch):
-    """In the real regions the two hardly ever meet; here they would in every second draw."""
+    """In the real regions the two hardly ever meet. Here both are replaced by small ones next to
+    each other, in which they would overlap in every second draw, for 50 seeds."""
     monkeypatch.setattr(bin_fill, "BUTTON_REGION", Region(-0.15, 0.0, 0.0, 0.0))
     monkeypatch.setattr(bin_fill, "BIN_REGION", Region(-0.05, 0.0, 0.03, 0.03))
     for seed in range(50):
@@ -70,6 +71,8 @@ def test_bin_fill_has_a_goal_for_each_choice_among_the_cubes_of_the_scene():
 
 
 def test_bin_fill_wants_at_most_five_cubes():
+    """The scene has seven green cubes and no others; there is a goal for each number from one to
+    five."""
     goals = bin_fill.goals(bin_fill_scene(green=7))
 
     assert [goal["counts"] for goal in goals] == [(1,), (2,), (3,), (4,), (5,)]
@@ -79,6 +82,8 @@ TWO_RED_ONE_BLUE = Goal.of(colors=("red", "blue"), counts=(2, 1))
 
 
 def test_bin_fill_subgoals_number_the_cubes_of_each_color_separately():
+    """The goal is two red cubes and a blue one. `{at}` stands for the place of the object, which is
+    filled in later."""
     stages = bin_fill.stages(bin_fill_scene(red=2, blue=1), TWO_RED_ONE_BLUE)
 
     assert [stage.subgoal for stage in stages] == [
@@ -93,7 +98,8 @@ def test_bin_fill_subgoals_number_the_cubes_of_each_color_separately():
 
 
 def test_bin_fill_picks_in_the_order_of_the_scene_if_it_has_one():
-    """The goal names red first."""
+    """The goal names two red cubes first, then a blue one; the scene has an order of the colors,
+    and blue is first in it."""
     scene = replace(bin_fill_scene(red=2, blue=1), color_order=("blue",))
 
     stages = bin_fill.stages(scene, TWO_RED_ONE_BLUE)
@@ -128,6 +134,8 @@ def test_swing_goes_over_the_right_and_the_left_target_once_per_repeat():
 
 
 def test_swing_subgoals_number_the_repeats():
+    """The red cube is to be swung twice from the right to the left target. `{at}` stands for the
+    place of the object, which is filled in later."""
     scene, _ = scenes("SwingXtimes", "hard")[0]
 
     stages = swing_x_times.stages(scene, Goal.of(color="red", repeats=2))
@@ -147,6 +155,7 @@ def test_swing_subgoals_number_the_repeats():
 
 
 def test_stop_cube_ignores_the_difficulty():
+    """The same 150 seeds give the same scenes and goals at each difficulty."""
     assert scenes("StopCube", "easy") == scenes("StopCube", "medium") == scenes("StopCube", "hard")
 
 
@@ -174,6 +183,8 @@ def stages_of_the_third_visit():
 
 
 def test_stop_cube_hovers_waits_and_presses_in_the_middle_of_the_visit():
+    """A pass takes 120 steps, so the third visit is from step 240 to 360, with its middle at 300.
+    Waiting goes on in steps of 100 until 30 steps before that."""
     stages = stages_of_the_third_visit()
 
     assert [stage.primitive for stage in stages] == [
@@ -186,6 +197,8 @@ def test_stop_cube_hovers_waits_and_presses_in_the_middle_of_the_visit():
 
 
 def test_stop_cube_stages_end_over_the_button_then_by_time_then_with_the_cube_on_the_target():
+    """The third visit takes the steps 240 to 360, so it is time to press 30 steps before its
+    middle, at 270; before that there is a stage for each 100 steps."""
     stages = stages_of_the_third_visit()
 
     assert [stage.expects for stage in stages] == [
@@ -198,4 +211,6 @@ def test_stop_cube_stages_end_over_the_button_then_by_time_then_with_the_cube_on
 
 
 def test_stop_cube_points_at_the_target_when_it_is_time_to_press():
+    """The last stage is to press the button when the cube is on its target, which is what has to be
+    looked at, and not the button."""
     assert stages_of_the_third_visit()[-1].points_at == "target"

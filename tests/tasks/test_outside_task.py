@@ -60,6 +60,8 @@ def test_a_task_of_another_package_is_found_by_name_and_by_its_suite(task):
 
 
 def test_a_task_of_another_package_is_not_part_of_all(task):
+    """The fixture has registered the documentation's task, "PlaceAndPress". *All* are the tasks of
+    the benchmark."""
     assert OUTSIDE_TASK not in tasks.find_tasks(["all"])
 
 
@@ -81,6 +83,8 @@ def test_the_instructions_of_a_task_of_another_package_mean_its_goals(task):
 
 
 def test_planning_a_run_of_a_task_without_a_file_of_words_is_refused(task, monkeypatch):
+    """The documentation's task is registered again without the file that has its words, and what
+    was read of such files is forgotten."""
     read = scenario_file.task_scenarios.__wrapped__
     # Undone before the fixture puts the registry back.
     with monkeypatch.context() as patch:
@@ -94,6 +98,8 @@ def test_planning_a_run_of_a_task_without_a_file_of_words_is_refused(task, monke
 
 
 def test_a_failure_in_a_task_of_another_package_has_a_readable_cause(task):
+    """The documentation's task is to place a cube and then to press the button; here it is pressed
+    at the first step."""
     episode = get_episode(OUTSIDE_TASK, "test", 2)
     color = episode.goal.text("color")
 
@@ -106,6 +112,8 @@ def test_a_failure_in_a_task_of_another_package_has_a_readable_cause(task):
 @pytest.mark.sim
 @pytest.mark.parametrize("policy", ["oracle", "listener"])
 def test_built_in_policies_solve_a_task_of_another_package(task, policy):
+    """The fixture has registered the documentation's task, as if its package were installed. The
+    oracle knows the goal, and the listener understands the words."""
     env = roboirg.make(OUTSIDE_TASK, setting="contextual", episode=1, cameras=())
     assert play(env, make_policy(policy, 0))["status"] == "success"
 

@@ -44,10 +44,9 @@ def distance(first, second):
 
 
 def test_layout_number_of_swaps_and_number_of_picks_are_independent():
-    """Two values each, so eight combinations, none of them rare.
-
-    The layouts are a line, with a container in the middle, and a triangle.
-    """
+    """The layouts are a line, with a container in the middle, and a triangle. Each of the three has
+    two values, so there are eight combinations; each would be an eighth, 12.5 %, of the 150
+    scenes, and none may have less than 6 %."""
     found = Counter()
     for episode in episodes("VideoUnmaskSwap", "easy"):
         points = layout_points(np.random.default_rng(episode.seed), 3)
@@ -61,7 +60,9 @@ def test_layout_number_of_swaps_and_number_of_picks_are_independent():
 @each_swap_task
 @each_difficulty
 def test_each_swap_exchanges_a_container_with_its_nearest_neighbor(task, difficulty):
-    """Swaps begin at steps 64, 114 and 164 and take 50 steps each."""
+    """Swaps begin at steps 64, 114 and 164 and take 50 steps each, on lanes 7 cm aside; there are
+    up to three, so as many starts are compared. `places` has where the containers are, told
+    after each swap."""
     for episode in episodes(task, difficulty):
         places = {container.name: container.position for container in containers(episode)}
         plan = swaps(episode)
@@ -107,6 +108,9 @@ def subgoals_of(task):
 
 @pytest.mark.parametrize("task", ["VideoUnmask", "ButtonUnmask"])
 def test_subgoals_of_two_picks_name_the_hidden_cubes_in_the_order_of_the_goal(task):
+    """The goal has two colors. Its last three stages are to lift the container that hides the first
+    cube, to put it down, and to lift the second one; each has a text and the container at which
+    it points."""
     episode = get_episode(task, "test", 3)
     first, second = episode.goal.texts("colors")
 
@@ -129,11 +133,14 @@ def test_the_subgoals_of_a_task_with_two_buttons_begin_with_the_left_one():
 
 
 def test_the_subgoals_of_a_task_with_a_button_begin_with_its_press():
+    """Each subgoal has a text, in which `{at}` stands for a pixel, and the object at which it
+    points."""
     assert subgoals_of("ButtonUnmask")[0] == ("press the button {at}", "button")
 
 
 def test_scenes_with_fewer_than_three_containers_are_rejected():
-    """Two of the four places of containers are drawn, so two containers are placed."""
+    """Two of the four places of containers are drawn, so two containers are placed, which is too
+    few for a swap and for hiding cubes."""
     rng = np.random.default_rng(0)
     placed = unmask_swap.draw_containers_about(rng, [FOUR[0], FOUR[1]])
 

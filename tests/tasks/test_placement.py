@@ -50,6 +50,8 @@ def grid_points_in(shape, grown_by=0.0):
 @settings(max_examples=60)
 @given(footprints, footprints)
 def test_shapes_that_share_points_overlap(first, second):
+    """The shapes, circles and turned rectangles, are compared at points 1 cm apart all over the
+    table: if any point lies in both, they overlap."""
     if (grid_points_in(first) & grid_points_in(second)).any():
         assert overlap(first, second)
 
@@ -65,6 +67,7 @@ def test_shapes_far_from_sharing_points_do_not_overlap(first, second):
 @settings(max_examples=40)
 @given(footprints, footprints)
 def test_overlap_is_symmetric(first, second):
+    """Circles and rectangles of any size and turn, in either order."""
     assert overlap(first, second) == overlap(second, first)
 
 

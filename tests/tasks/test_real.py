@@ -94,6 +94,8 @@ def test_each_goal_is_equally_frequent_on_the_left_and_on_the_right(task):
 
 
 def test_the_region_on_the_right_mirrors_the_one_on_the_left():
+    """Regions are (x, y, half width, half depth), and y is positive on the robot's left. One color
+    gets the given region, and the other one the same with -y."""
     left = Region(0.1, 0.2, 0.01, 0.02)
     right = Region(0.1, -0.2, 0.01, 0.02)
 
@@ -104,6 +106,7 @@ def test_the_region_on_the_right_mirrors_the_one_on_the_left():
 
 
 def test_a_scene_without_room_for_the_tape_is_rejected():
+    """A square of 2 m takes up the whole table."""
     full = [Rectangle(0, 0, 1, 1)]
     with pytest.raises(SceneRejectedError, match="no place for tape"):
         draw_item(np.random.default_rng(0), put_in_box.TAPE_PLAN, full)
@@ -125,10 +128,14 @@ def judged_with_green_box(*steps):
 
 
 def test_the_tape_in_the_box_of_the_goal_s_color_is_a_success():
+    """The goal is the green box; each list has the facts of one step: picked up, in the air, in the
+    box."""
     assert judged_with_green_box([TAPE_PICKED], [], [IN_GREEN]).status is Status.SUCCESS
 
 
 def test_tape_dropped_beside_the_boxes_may_be_picked_up_again():
+    """The tape is to go into the green box. Each list has the facts of one step: it falls on the
+    table and is picked up again."""
     dropped = [[TAPE_PICKED], [], [Fact("lying", "tape")], [TAPE_PICKED], []]
 
     assert judged_with_green_box(*dropped).status is Status.ONGOING
@@ -136,6 +143,8 @@ def test_tape_dropped_beside_the_boxes_may_be_picked_up_again():
 
 
 def test_the_tape_has_to_go_into_the_box_of_the_goal_s_color():
+    """The goal is the green box; each list has the facts of one step, and the last one is that the
+    tape is in the purple box."""
     judge = judged_with_green_box([TAPE_PICKED], [], [IN_PURPLE])
 
     cause = "put the tape into the purple box; expected: put the tape into the green box"
@@ -143,6 +152,7 @@ def test_the_tape_has_to_go_into_the_box_of_the_goal_s_color():
 
 
 def test_tape_in_the_wrong_box_fails_before_it_was_seen_picked_up():
+    """The goal is the green box. In the first step the tape is already in the purple one."""
     assert judged_with_green_box([IN_PURPLE]).status is Status.FAILURE
 
 
@@ -177,6 +187,8 @@ def test_pick_by_count_succeeds_if_the_tape_is_left_alone_after_the_last_placeme
 
 
 def test_pick_by_count_fails_if_the_tape_is_picked_up_again_during_the_wait():
+    """The gray tape is to be placed once and left alone for WAIT_STEPS. It is picked up a step
+    before that time is over."""
     steps = [*PICK_AND_PLACE_ONCE, *waiting(WAIT_STEPS - 1), [GRAY_PICKED]]
 
     judge = judged_with_gray_tape(1, *steps)
@@ -186,7 +198,8 @@ def test_pick_by_count_fails_if_the_tape_is_picked_up_again_during_the_wait():
 
 
 def test_pick_by_count_does_not_succeed_after_fewer_placements_than_wanted():
-    """The third stage, to pick it up again, stays due."""
+    """The gray tape is to be placed twice. After one placement nothing happens for three times the
+    wait: the third stage, of index 2, to pick it up again, stays due."""
     judge = judged_with_gray_tape(2, *PICK_AND_PLACE_ONCE, *waiting(3 * WAIT_STEPS))
 
     assert (judge.status, judge.index) == (Status.ONGOING, 2)
@@ -196,6 +209,8 @@ def test_pick_by_count_does_not_succeed_after_fewer_placements_than_wanted():
     "before", [[], [[GRAY_PICKED]], PICK_AND_PLACE_ONCE], ids=["at first", "held", "placed"]
 )
 def test_pick_by_count_fails_if_the_yellow_tape_is_picked_instead_of_the_gray(before):
+    """The gray tape is to be placed once; `before` has the facts of the steps before the wrong
+    pick: none, while the gray one is held, or after it was placed."""
     judge = judged_with_gray_tape(1, *before, [Fact("picked", "tape_yellow")])
 
     assert judge.status is Status.FAILURE
@@ -203,6 +218,8 @@ def test_pick_by_count_fails_if_the_yellow_tape_is_picked_instead_of_the_gray(be
 
 
 def test_tape_dropped_beside_the_target_may_be_placed_again():
+    """The gray tape is to be placed once. It first falls beside the target; then it is picked up,
+    placed and left alone for the wait."""
     beside = [[GRAY_PICKED], [Fact("lying", "tape_gray")]]
 
     judge = judged_with_gray_tape(1, *beside, *PICK_AND_PLACE_ONCE, *waiting(WAIT_STEPS + 1))

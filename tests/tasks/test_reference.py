@@ -40,7 +40,8 @@ def scenes(task, difficulty):
 @every_task
 @every_difficulty
 def test_a_video_shows_the_facts_of_the_past_in_order_and_can_never_fail(task, difficulty):
-    """The past of a scene is what the video shows, and what a goal may refer to."""
+    """The past of a scene is what the video shows, and what a goal may refer to. The stages of the
+    video expect these facts in the same order, and forbid nothing."""
     for scene in scenes(task, difficulty):
         stages = task.demonstration(scene)
 
@@ -51,6 +52,7 @@ def test_a_video_shows_the_facts_of_the_past_in_order_and_can_never_fail(task, d
 
 @every_task
 def test_the_last_stage_of_a_video_takes_the_robot_home_and_is_not_shown(task):
+    """In the scenes of 120 seeds; all stages before the last one are shown."""
     for scene in scenes(task, "hard"):
         *shown, last = task.demonstration(scene)
 
@@ -119,6 +121,8 @@ def test_hard_place_scenes_swap_any_two_of_four_discs_while_the_robot_waits(task
 
 
 def test_place_button_has_a_goal_for_each_color_before_and_after_the_press():
+    """The scene has a red, a green and a blue cube. The video shows a placement before and one
+    after a press, to either of which a goal may refer."""
     scene, _ = drawn(VIDEO_PLACE_BUTTON, "hard")[0]
 
     goals = VIDEO_PLACE_BUTTON.goals(scene)
@@ -135,6 +139,8 @@ def test_place_button_has_a_goal_for_each_color_before_and_after_the_press():
 
 @pytest.mark.parametrize(("relation", "disc"), [("before", "target_0"), ("after", "target_1")])
 def test_place_button_moves_a_cube_to_the_disc_before_or_after_the_press(relation, disc):
+    """In this scene's video the placement before the press is on target_0, and the one after it on
+    target_1."""
     scene, _ = drawn(VIDEO_PLACE_BUTTON, "hard")[0]
 
     stages = VIDEO_PLACE_BUTTON.stages(scene, Goal.of(color="red", relation=relation))

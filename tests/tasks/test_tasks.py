@@ -58,6 +58,8 @@ def test_the_registry_holds_each_task_once_in_the_order_of_its_code():
 
 
 def test_only_tasks_with_words_for_sides_have_the_setting_spatial():
+    """The other four settings are there for every task; a task says in `spatial` whether left and
+    right name its objects."""
     for name, task in every_task().items():
         settings = plain_settings(task)
 
@@ -84,8 +86,9 @@ def test_only_tasks_with_words_for_sides_have_the_setting_spatial():
 def test_the_number_of_goals_that_can_replace_that_of_an_episode_is_stable(
     task, easy, medium, hard
 ):
-    """Control runs command another goal of the same scene, which needs
-    as many picks and is not reached on the way to the right one."""
+    """Control runs command another goal of the same scene, which needs as many picks and is not
+    reached on the way to the right one. Counted in episodes 0, 2 and 3, of which the numbers
+    were looked at once; a change would change what control runs compare."""
     numbers = [len(other_goals(get_episode(task, "test", index))) for index in (0, 2, 3)]
 
     assert numbers == [easy, medium, hard]
@@ -105,6 +108,7 @@ def test_same_seed_same_episode_other_seed_other_scene(task, difficulty):
 
 @each_task
 def test_the_goal_of_an_episode_is_one_of_several_different_goals_of_its_scene(task):
+    """In all episodes of all splits."""
     for episode in episodes(task):
         goals = get_task(task).goals(episode.scene)
         assert episode.goal in goals
@@ -113,6 +117,8 @@ def test_the_goal_of_an_episode_is_one_of_several_different_goals_of_its_scene(t
 
 @each_task
 def test_every_goal_of_a_scene_has_a_plan_of_its_own(task):
+    """A plan is the stages that reach a goal. No two goals of the first scene of each difficulty
+    may have the same, and the episode's own plan is that of its goal."""
     for difficulty in DIFFICULTIES:
         (episode,) = first_episodes(task, difficulty)
         goals = get_task(task).goals(episode.scene)
@@ -188,6 +194,8 @@ def check_apart(areas, key):
 
 @each_task
 def test_solid_things_and_targets_on_the_table_do_not_touch(task):
+    """In all episodes; the areas are those that things take up on the table, and two of them may
+    not overlap."""
     for episode in episodes(task):
         targets = disc_areas(episode.scene, "target")
         check_apart([*solid_areas(episode.scene), *targets], episode.key)
