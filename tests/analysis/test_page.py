@@ -164,6 +164,10 @@ def test_an_address_of_an_episode_opens_it_and_clears_filters_that_would_hide_it
 
 @pytest.mark.slow
 def test_arrow_keys_move_between_cells_of_the_table_and_enter_lists_a_cells_episodes(page):
+    """From the first cell of the table: right is *all tasks, direct*, two below is *PickXtimes*.
+
+    The tip tells what the cell in focus shows. Of PickXtimes in direct the page has three episodes.
+    """
     tip = page.locator("#tip")
     page.locator(".cell").first.focus()
     page.keyboard.press("ArrowRight")
@@ -414,6 +418,11 @@ def test_the_comparison_of_two_policies_opens_both_episodes_and_says_which_is_be
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_page_fits_a_telephone_and_its_texts_have_enough_contrast(open_page, page_file, scheme):
+    """In a window 400 pixels wide nothing is wider, so that the page does not scroll sideways.
+
+    `CONTRASTS` is a script that lists the texts whose contrast is below WCAG's 4.5; none may be, in
+    light and dark colors, with one episode open or a comparison of two policies.
+    """
     with open_page(page_file.as_uri(), color_scheme=scheme) as page:
         opened_first_row(
             page, policy="forgetful (privileged)", setting="contextual", form="implicit"
@@ -431,7 +440,10 @@ def test_the_page_fits_a_telephone_and_its_texts_have_enough_contrast(open_page,
 
 
 def test_the_tab_key_reaches_every_section_and_marks_where_it_is(page):
-    """What has the focus has an outline of 3 pixels; of a radio button, its label next to it."""
+    """60 times the tab key goes around the page; what has the focus has an outline of 3 pixels.
+
+    Of a radio button, which is not drawn, its label next to it has the outline.
+    """
     seen = set()
     for _ in range(60):
         page.keyboard.press("Tab")
@@ -446,7 +458,11 @@ def test_the_tab_key_reaches_every_section_and_marks_where_it_is(page):
 
 @pytest.mark.slow
 def test_a_page_of_ten_thousand_episodes_draws_no_more_than_40_at_once(open_page, tmp_path):
-    """By the page's own counters: how much is drawn, not how long it takes on this machine."""
+    """Records are repeated with other policy seeds; words are searched that many, none or all have.
+
+    The page counts in `roboirg.counters` how many records it scanned and drew: how much is drawn,
+    not how long it takes on this machine. `PAGE_SIZE` is 40.
+    """
     some = [replace(record, video=None) for record in records_of_page()]
     many = []
     for seed in range(10_000 // len(some) + 1):

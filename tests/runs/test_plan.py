@@ -44,6 +44,7 @@ from roboirg.util.csv_text import csv_lines
     ],
 )
 def test_episodes_are_given_as_a_count_a_list_ranges_or_all(text, episodes):
+    """A number alone is a count; with a comma it is a list. The split *train* has 100 episodes."""
     assert parse_episodes(text, "train", ()) == episodes
 
 
@@ -56,6 +57,7 @@ def test_a_number_that_stands_twice_in_a_list_counts_once():
     ["0", "-3", "010", "0,010", "a", "3-1", "1.5", "", "1,,b", "0-999999999", "9" * 5000],
 )
 def test_a_text_that_is_no_list_of_episodes_is_refused_in_one_short_sentence(text):
+    """*Short* is less than 200 characters, even for a number of 5,000 digits."""
     with pytest.raises(InvalidValueError) as caught:
         parse_episodes(text, "test", ())
 
@@ -366,6 +368,7 @@ def test_plain_words_come_last_in_each_scene():
     ],
 )  # fmt: skip
 def test_a_plan_with_an_impossible_option_is_refused_with_the_reason(options, sentence):
+    """Each case has one wrong option, and what the message has to say of it."""
     with pytest.raises(InvalidValueError, match=sentence):
         make_plan(["random"], **options)
 
@@ -406,6 +409,10 @@ OPTIONS_WITH_NUMBERS = st.dictionaries(
 @example({"max_steps": 10**9, "policy_seeds": 10**18 - 1, "max_cost": 1e308})
 @settings(deadline=None)
 def test_a_plan_with_any_numbers_is_refused_or_read_back_as_it_was_written(numbers):
+    """Hypothesis draws options and numbers, from negative to far too large, and what is no number.
+
+    The example is the largest that is allowed, so that at least one plan is stored and read.
+    """
     try:
         plan = make_plan("random", tasks="PickXtimes", settings="explicit", episodes=1, **numbers)
     except InvalidValueError:

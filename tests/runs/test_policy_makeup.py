@@ -108,6 +108,7 @@ def test_another_policy_of_the_same_name_is_refused_or_kept_apart(
     ],
 )
 def test_what_a_policy_is_tells_it_from_others(before, now, what):
+    """`before` and `now` are two policies; `what` names the first thing in which they differ."""
     first, *_ = read_policy(before).versions.differences(read_policy(now).versions)
     assert first.what == what
 

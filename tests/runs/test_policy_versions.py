@@ -180,7 +180,10 @@ HANDS = "hands=checkpointed:Hands"
 def test_policies_without_a_version_differ_by_class_code_and_by_planner_or_hands(
     write_policy_module, tmp_path
 ):
-    """Three policies, before and after their module changed: six versions."""
+    """Three policies of a user's module declare no version: theirs follows from their code.
+
+    Each is opened before and after a line was added to the module, which gives six versions.
+    """
     write_policy_module()
     file = tmp_path / "checkpointed.py"
     file.write_text(file.read_text() + CODE_OF_POLICIES_WITHOUT_A_VERSION)

@@ -350,7 +350,11 @@ class FullDiskContainer:
 def test_a_full_disk_costs_the_video_but_not_the_verdict(
     give_world_and_policy, monkeypatch, tmp_path, frame_number
 ):
-    """From a frame on nothing can be written."""
+    """From a frame on nothing can be written.
+
+    The container that the writer writes to is replaced by one that fails as a full disk does. The
+    episode of five steps is won all the same; it has no video, and the record says why.
+    """
     encode_frame = VideoWriter._encode
     frames = itertools.count()
 
@@ -496,9 +500,9 @@ JOB_IN_TURNS = JOB.with_options(setting="contextual", delivery="turns")
 
 @pytest.mark.parametrize("policy_class", [FakePolicy, NotesWhatItHears])
 def test_a_record_has_the_step_at_which_each_utterance_was_heard(policy_class, record_of_episode):
-    """Four of five utterances come at steps 0, 3, 6 and 6; the fifth never (None).
+    """Four of five utterances come at steps 0, 3, 6 and 6 of ten; the fifth never (None).
 
-    Whether the policy has a method hear() or not.
+    The record has them whether the policy has a method hear() or not.
     """
     world = SpeakingWorld((0, 3, 6, 6), length=10)
 
@@ -513,7 +517,11 @@ def test_a_record_has_the_step_at_which_each_utterance_was_heard(policy_class, r
 def test_a_policy_hears_the_first_utterance_in_its_reset_and_the_others_with_their_steps(
     record_of_episode,
 ):
-    """The reset also has the video, of 3 steps. Each later utterance is noted as text and step."""
+    """The policy notes what it gets: the first utterance and the length of the video, 3 steps.
+
+    Then each later utterance and its step, 3, 6 and 6; the fifth never comes. Its metadata are the
+    number of notes, 8.
+    """
     world = SpeakingWorld((0, 3, 6, 6), length=10)
     policy = NotesWhatItHears()
 
@@ -525,6 +533,7 @@ def test_a_policy_hears_the_first_utterance_in_its_reset_and_the_others_with_the
 
 
 def test_a_policy_without_a_method_hear_gets_the_first_utterance_alone(record_of_episode):
+    """It notes that and the length of the video, 3 steps; others come at steps 3 and 6."""
     world = SpeakingWorld((0, 3, 6, 6), length=10)
     policy = FakePolicy()
 
