@@ -106,6 +106,7 @@ def focused_element(page, what="innerText"):
 
 @pytest.mark.slow
 def test_each_filter_leaves_the_episodes_that_fit_and_reset_brings_all_back(page):
+    """The expected counts are counted in the records of the page; one episode ended in an error."""
     everything = len(records_of_page())
     counting = count_of_records(task="StopCube") + count_of_records(task="PickXtimes")
     assert count_shown(page) == everything
@@ -151,6 +152,7 @@ def test_an_address_of_the_page_leads_to_the_same_filters_and_page(page):
 
 @pytest.mark.slow
 def test_an_address_of_an_episode_opens_it_and_clears_filters_that_would_hide_it(page, page_file):
+    """The episode is one of VideoUnmask; the address also asks for the task StopCube."""
     row = opened_first_row(page, task="VideoUnmask")
     key = row.get_attribute("id").removeprefix("e-")
 
@@ -219,6 +221,7 @@ def test_a_click_on_a_cell_filters_the_episodes_to_those_that_it_counts(page):
 
 
 def test_a_click_on_a_part_of_a_bar_filters_the_episodes_to_those_that_failed_so(page):
+    """The second bars are of the forgetful policy; the part is its failures of grounding."""
     bars = page.locator("#bars .map").nth(1)
 
     bars.locator(".end.grounding").first.click()
@@ -246,6 +249,7 @@ def test_a_word_that_refers_back_and_what_it_refers_to_light_up_together(page):
 
 
 def test_a_word_that_refers_back_and_what_it_refers_to_have_the_same_number(page):
+    """An anaphor, such as *it*, and its antecedent, the words that named the thing first."""
     row = opened_first_row(page, task="PickXtimes", setting="contextual", form="implicit")
     anaphor = row.locator("mark.anaphor").last
     antecedent = row.locator(f"mark.antecedent[data-keys='{anaphor.get_attribute('data-keys')}']")
@@ -304,6 +308,7 @@ def test_an_episode_that_ended_in_an_error_shows_its_traceback(page):
 
 
 def test_enter_opens_and_closes_an_episode_and_an_arrow_key_moves_to_the_next(page):
+    """The focus is on the first episode of the list."""
     first = page.locator("#rows h3 button").nth(0)
     second = page.locator("#rows > li").nth(1)
     first.focus()
@@ -404,6 +409,7 @@ def test_two_policies_are_compared_on_the_page_episode_by_episode(page):
 
 
 def test_the_comparison_of_two_policies_opens_both_episodes_and_says_which_is_better(page):
+    """A click on a count of the comparison lists its episodes, and one on an episode opens both."""
     page.get_by_text("two policies", exact=True).click()
 
     page.locator(".counts tr", has_text="direct").first.locator(".count").first.click()

@@ -229,6 +229,7 @@ def test_settings_every_adds_the_harder_settings_that_all_leaves_out(word, is_to
 
 
 def test_a_setting_in_turns_is_added_to_its_usual_delivery():
+    """Three settings of one episode; `in_turns` adds a fourth job, direct in single utterances."""
     plan = make_plan(
         ["random"], tasks="StopCube", episodes="1", settings="explicit,direct,reasoning",
         in_turns="direct",
@@ -278,6 +279,10 @@ def test_settings_of_a_list_are_played_in_its_order():
     ("settings", "rest"), [("explicit,spatial,direct", "explicit,direct"), ("spatial", "all")]
 )
 def test_a_setting_in_a_list_that_a_task_lacks_is_refused_with_what_plays_the_rest(settings, rest):
+    """Of the three tasks only BinFill has the setting spatial.
+
+    `rest` is the list of settings without it, as the message gives it.
+    """
     with pytest.raises(InvalidValueError) as caught:
         make_plan(["random"], tasks="StopCube,BinFill,VideoRepick", settings=settings)
 
@@ -308,6 +313,7 @@ def test_both_forms_are_implicit_and_resolved():
 
 
 def test_policies_tasks_and_episodes_are_played_in_the_order_in_which_they_are_given():
+    """Not in the order of the alphabet or of the numbers."""
     plan = make_plan(
         ["random", "oracle"], tasks="VideoUnmask,BinFill", settings="explicit", episodes="3,0"
     )
@@ -499,6 +505,7 @@ def test_a_policy_name_that_only_resembles_a_number_is_allowed_and_read_back_fro
 
 @pytest.mark.parametrize("content", ["{", "words", "[]"])
 def test_a_broken_plan_file_in_a_run_is_reported_and_counts_as_no_plan(content, tmp_path, caplog):
+    """The message is a warning, so that the results can still be read."""
     (tmp_path / PLAN_FILE).write_text(content)
 
     assert read_plan(tmp_path) is None

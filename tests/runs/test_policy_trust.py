@@ -156,7 +156,7 @@ def test_what_a_policy_prints_is_in_the_logs_of_its_own_episodes(hostile_run):
 def test_policies_that_print_or_change_the_folder_leave_the_runs_terminal_and_folder_alone(
     tmp_path, monkeypatch, capfd
 ):
-    """Four policies print, change the folder, leak files or close their output.
+    """Four policies print, change the folder, leave a thread behind or close their output.
 
     Each does so in a process of its own.
     """
@@ -262,7 +262,7 @@ def test_a_policys_process_has_no_keys_or_salt_of_the_environment_unless_the_pla
 ):
     """The policy writes down what its environment has; the plan names HF_TOKEN alone.
 
-    TOKENIZERS_PARALLELISM is no secret, although its name begins like one.
+    TOKENIZERS_PARALLELISM is no secret, although TOKEN is in its name.
     """
     for name in ("OPENAI_API_KEY", "HF_TOKEN", "AWS_ACCESS_KEY_ID", "TOKENIZERS_PARALLELISM"):
         monkeypatch.setenv(name, "secret")
@@ -302,8 +302,8 @@ def test_an_honest_policy_plays_alike_with_a_long_path_few_files_and_a_leaking_n
 ):
     """The expected records are those of the policy alone, without a process of its own.
 
-    Here temporary files lie in a folder whose path is too long for a socket, and the policy plays
-    after one that leaves files open.
+    Here temporary files lie in a folder whose path is too long for a socket, few files may be open,
+    and the policy plays after one that leaves a thread behind.
     """
     long_folder = tmp_path / ("long" * 40)
     long_folder.mkdir()

@@ -163,6 +163,7 @@ def record_of_cut_prompt():
 
 
 def test_a_record_notes_how_many_tokens_a_cut_prompt_needed(record_of_cut_prompt):
+    """The model reads 64 tokens; its tokenizer is known, so least and most needed are equal."""
     audit = record_of_cut_prompt.prompt
 
     assert record_of_cut_prompt.prompt_verdict == "cut"
@@ -277,6 +278,7 @@ def test_of_a_tokenizer_that_is_a_pipe_the_policy_and_the_file_are_named(tmp_pat
 
 
 def test_a_dry_run_prints_the_share_of_cut_prompts_and_the_policies_without_a_limit(tmp_path):
+    """The one policy reads 64 tokens and all of its prompts are cut; the other tells no limit."""
     printed = call(
         "run", "--dry-run", "--out", tmp_path, "--tasks", "PickXtimes",
         "--policy", "system:pi0.5", "--policy", "far=openpi://localhost:1",

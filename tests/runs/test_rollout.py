@@ -188,6 +188,7 @@ def test_a_plan_may_prescribe_the_frames_of_the_video(record_of_episode):
 
 
 def test_a_policy_that_wants_other_actions_than_the_plan_prescribes_is_an_error(record_of_episode):
+    """The policy answers with joint angles; the plan asks for poses of the hand."""
     job = replace(JOB, environment=EnvironmentOptions(actions="ee_pose"))
 
     record = record_of_episode(FakeWorld(), FakePolicy(), job)
@@ -281,6 +282,7 @@ def test_metadata_of_a_policy_are_stored_as_json(record_of_episode, value, store
 def test_metadata_that_json_cannot_hold_are_an_error_that_names_their_key(
     record_of_episode, value, sentence
 ):
+    """The value stands two levels deep in what the policy says of itself."""
     policy = FakePolicy()
     policy.metadata = {"deep": {"value": value}}
 
@@ -300,6 +302,7 @@ def test_metadata_that_json_cannot_hold_are_an_error_that_names_their_key(
 def test_an_exception_in_the_world_ends_the_episode_as_an_error_of_the_environment(
     record_of_episode, trouble, cause
 ):
+    """The world raises `trouble`; the cause names it, with this file and the line."""
     world = FakeWorld()
     world.trouble = trouble
 
@@ -327,6 +330,10 @@ def test_ctrl_c_in_a_policy_stops_the_run_and_is_no_error_of_the_episode(record_
 def test_a_video_is_kept_of_all_episodes_or_of_failures_alone_as_asked(
     give_world_and_policy, tmp_path, mode, status, kept
 ):
+    """`mode` says which videos are wanted, `status` how the world of five steps ended.
+
+    A kept video has two files, the film and its title picture, and the record names the film.
+    """
     give_world_and_policy(FakeWorld(5, status), FakePolicy())
 
     record = EpisodeRunner(tmp_path, mode)(JOB)

@@ -104,6 +104,11 @@ def test_a_line_that_a_kill_cut_off_is_set_aside_and_its_episode_played_again(tm
 def test_ctrl_c_or_sigterm_ends_the_workers_and_keeps_the_records_of_ended_episodes(
     tmp_path, number, records_of_an_uninterrupted_run
 ):
+    """A run of 16 episodes in a process of its own gets a signal after at least three.
+
+    No worker stays alive, and the same command then plays the rest with the same records in the
+    end.
+    """
     child = begun_run(tmp_path)
 
     child.send_signal(number)
@@ -175,6 +180,7 @@ def test_a_run_may_be_repeated_with_more_episodes_in_its_folder(tmp_path):
 
 
 def test_what_a_repeated_run_with_fewer_episodes_leaves_out_is_kept_and_not_missing(tmp_path):
+    """Four episodes are played in two settings each (8 records), then one is asked for (2)."""
     fake_run(tmp_path, small_plan(episodes=4))
 
     fewer = fake_run(tmp_path, small_plan(episodes=1))
@@ -280,6 +286,8 @@ def test_a_negative_number_of_workers_is_refused():
     [("environment_version", 7, "environment"), ("words", OTHER_WORDS, "words")],
 )
 def test_a_record_that_a_worker_of_another_version_made_is_not_stored(tmp_path, field, value, what):
+    """The record differs in one field, as if a worker had another version of this package."""
+
     def play_elsewhere(job):
         return replace(FakePlay()(job), **{field: value})
 

@@ -509,22 +509,22 @@ def test_learning_again_reuses_files_and_refuses_those_of_another_plan(folder_of
     With the same plan but no memory a second body is made next to the first, and no file of the
     first is written again (all times of change stay).
     """
-    place, (*call, plan) = folder_of_policy
+    place, call = folder_of_policy
+    plan = call[-1]
+    here = ["--out", place]
     before = {path: path.stat().st_mtime_ns for path in place.rglob("*.*")}
-    for options, words in (
-        (["--tasks", "PickXtimes", *call[4:], plan, "--memory", "none"], "recordings with tasks"),
-        ([*call[2:-1], "--memory", "none"], "recordings with drawn 2, not 300"),
-        (
-            [*call[2:], plan_file(training=SHORT_TRAINING | {"body_epochs": 3})],
-            "was trained by another plan",
-        ),
-    ):
-        assert words in error_of_learning(*options)
 
-    other = ["--body", place / BODY, "--out", place / "new", "--tasks", "BinFill"]
-    assert "no task of this body 'BinFill'" in error_of_learning(*other, what="reader")
+    other_task = ["--tasks", "PickXtimes", *here, "--plan", plan, "--memory", "none"]
+    assert "recordings with tasks" in error_of_learning(*other_task)
+    usual_plan = ["--tasks", "ButtonUnmask", *here, "--memory", "none"]
+    assert "recordings with drawn 2, not 300" in error_of_learning(*usual_plan)
+    three_passes = plan_file(training=SHORT_TRAINING | {"body_epochs": 3})
+    more_passes = ["--tasks", "ButtonUnmask", *here, "--plan", three_passes]
+    assert "was trained by another plan" in error_of_learning(*more_passes)
+    other_reader = ["--body", place / BODY, "--out", place / "new", "--tasks", "BinFill"]
+    assert "no task of this body 'BinFill'" in error_of_learning(*other_reader, what="reader")
 
-    done = CliRunner().invoke(app, [*call, plan, "--memory", "none", "--settings", "none"])
+    done = CliRunner().invoke(app, [*call, "--memory", "none", "--settings", "none"])
     assert done.exit_code == 0, done.output
     assert (place / "none-0.body.safetensors").exists()
     assert (place / "none-0.reader.safetensors").exists()
