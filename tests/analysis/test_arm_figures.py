@@ -94,8 +94,9 @@ def figure_named(data, name):
 def test_who_follows_the_words_is_told_from_who_does_the_same_whatever_it_hears(acts, use, habit):
     """*Language use* is a difference of two rates in the arm *other-goal*.
 
-    `use` is how often the other goal is reached there, which was stated; `habit` how often the own
-    one is, which was not. Would find one arm counted as another.
+    There the instruction states the other goal of the scene. `acts` is the goal that a policy
+    reaches in each arm; `use` is how often the other goal is reached, which was stated, and `habit`
+    how often the own one is, which was not. Would find one arm counted as another.
     """
     results = results_of_policy("mine", acts)
 
@@ -122,6 +123,11 @@ def test_who_follows_the_words_is_told_from_who_does_the_same_whatever_it_hears(
 def test_words_are_worth_what_success_loses_in_silence_and_their_order_when_scrambled(
     contrast, acts, worth
 ):
+    """`acts` is the goal that a policy reaches in each arm; if told or silent, `own` is a success.
+
+    Who does what it hears wins all if told and nothing without words or in a scrambled order: both
+    are worth 1. Who does the same in every arm loses nothing.
+    """
     found = figure_named(run_data_of(results_of_policy("mine", acts)), contrast)
 
     assert found.gap.value == worth
@@ -146,7 +152,10 @@ def test_the_success_with_paraphrases_is_their_mean_less_that_with_the_instructi
 
 
 def test_an_episode_that_lacks_a_verdict_in_some_arm_is_left_out():
-    """Three scenes of two tasks are complete; scene 7 has one arm, and 8 nothing but errors."""
+    """Three scenes of two tasks were played in all arms: six episodes count.
+
+    Scene 7 was played only as told, and scene 8 ended in an error in each arm.
+    """
     results = results_of_policy("mine", DOES_WHAT_IT_HEARS, range(3))
     results.append(make_result("success", 7, policy="mine", task=TASKS[0]))
     for arm in DOES_WHAT_IT_HEARS:

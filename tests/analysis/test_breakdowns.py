@@ -111,8 +111,8 @@ def labeled_by_letters(results):
 def test_the_gap_of_a_label_is_over_the_episodes_with_that_label():
     """A letter is an episode: 1 won, 0 lost, ! an error, which counts nowhere.
 
-    Of the even episodes ("9", "zebra") explicit wins 0, 2, 4 and direct 0, 2: a gap of -1 of 6. Of
-    the odd ones ("10 b") explicit wins 1, 3, 5 and direct 1: -2 of 6.
+    Even episodes have the labels "9" and "zebra": explicit wins 0, 2, 4 and direct 0, 2, a gap of
+    -1 of 6. Odd ones have "10 b": explicit wins 1, 3, 5 and direct 1, -2 of 6.
     """
     explicit = make_results("111111000000")
     direct = make_results("111000000000!", "direct")

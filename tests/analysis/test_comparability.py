@@ -139,6 +139,7 @@ def test_a_table_without_published_rates_marks_the_best_rate_alone():
 
 
 def test_a_note_on_differences_names_no_policy_if_all_differ_alike():
+    """Two policies heard our own words (`wordings` is None), not the paper's."""
     listener = results_like_the_papers(wordings=None)
     other = results_like_the_papers(wordings=None, policy="b")
 

@@ -241,6 +241,7 @@ def test_published_rows_stand_below_a_line(figure_of_one_episode_next_to_the_pap
 def test_own_rates_that_cannot_be_compared_with_the_papers_have_a_sign(
     figure_of_one_episode_next_to_the_paper,
 ):
+    """The figure shows one own episode next to rates of the paper; the sign is explained on top."""
     figure = figure_of_one_episode_next_to_the_paper
 
     texts = [text_without_line_breaks(text) for text in drawn_texts(figure)]

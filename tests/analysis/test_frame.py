@@ -45,6 +45,7 @@ TYPES_OF_KINDS = {
 
 
 def test_each_column_of_the_results_has_the_type_it_declares(run_with_wins_losses_and_errors):
+    """A column that does not say when it is missing has a value in every row."""
     found = roboirg.results(run_with_wins_losses_and_errors)
 
     declared = {**COLUMNS, **record_columns()}
@@ -76,6 +77,7 @@ def test_the_results_have_a_row_for_each_played_episode_and_values_where_they_ap
 def test_the_column_words_counts_the_words_of_all_turns_of_an_instruction(
     run_with_wins_losses_and_errors,
 ):
+    """The sum over the run is compared with a count of the words in its records."""
     words = 0
     for record in iterate_records(run_with_wins_losses_and_errors):
         for turn in record.instruction:
@@ -164,6 +166,7 @@ def test_an_episode_played_in_two_runs_counts_in_each_under_a_name_of_its_own():
 
 
 def test_an_added_column_has_the_value_of_each_row_although_records_come_in_another_order():
+    """Two runs tried the same episode; the records are told apart by when they began."""
     won = make_result("success", 0, started_at="first")
     lost = make_result("failure", 0, started_at="second")
     frame = make_frame([("a", [won]), ("b", [lost])])
@@ -185,6 +188,7 @@ def test_added_columns_tell_equal_values_of_different_types_apart():
 
 
 def test_a_planned_policy_without_a_result_has_a_row_with_its_missing_episode():
+    """The plan has one episode of the policy *late*, and nothing was played."""
     frame = make_frame([], [make_result(policy="late").identity], run_name="mine")
 
     ((key, cell),) = cells_of(frame).items()
@@ -195,6 +199,7 @@ def test_a_planned_policy_without_a_result_has_a_row_with_its_missing_episode():
 
 
 def test_the_documentation_lists_every_column_of_the_results():
+    """As rows of a table: name, kind, meaning, and when it is missing."""
     page = (Path(__file__).parents[2] / "docs" / "own-tables.md").read_text(encoding="utf-8")
 
     for column in (*COLUMNS.values(), *record_columns().values()):

@@ -110,7 +110,11 @@ def test_the_headline_number_is_positive_if_implicit_instructions_are_won_more_o
 
 
 def test_the_headline_has_an_interval_although_all_episodes_ended_alike():
-    """Explicit wins all 20, the others none. A width of 0 would look like certainty."""
+    """Explicit wins all 20, the others none: the gap is -1.
+
+    A width of 0 would look like certainty; with so few episodes the interval reaches up to -0.8 at
+    least.
+    """
     results = [
         *make_results("1" * 20, "explicit"),
         *make_results("0" * 20, "reasoning"),
@@ -124,7 +128,10 @@ def test_the_headline_has_an_interval_although_all_episodes_ended_alike():
 
 
 def test_a_second_setting_on_the_same_episodes_does_not_narrow_the_interval():
-    """Would find settings that are counted as if their episodes were drawn independently."""
+    """In both settings 10 of the same 20 episodes are won, in explicit all.
+
+    Would find settings that are counted as if their episodes were drawn independently.
+    """
     results = results_of_20_episodes_half_won()
 
     both = headline_of(results, ("reasoning", "spatial"))
@@ -144,6 +151,7 @@ def test_a_second_setting_on_the_same_episodes_does_not_narrow_the_interval():
     ids=["no explicit results", "a setting was not played", "no setting counts"],
 )
 def test_there_is_no_headline_without_explicit_or_without_one_of_its_settings(played, settings):
+    """`played` are the settings with two episodes each, `settings` those that count."""
     results = []
     for setting in played:
         results += make_results("11", setting)
@@ -169,6 +177,7 @@ def test_every_table_has_the_headline_below_it():
 @pytest.mark.usefixtures("floors_with_two_settings_near_chance")
 @pytest.mark.parametrize("setting", ["spatial", "explicit"])
 def test_a_headline_is_called_incomplete_if_an_episode_behind_it_ended_in_an_error(setting):
+    """Episodes 0 to 19 have verdicts in all settings; number 20 is an error in one of them."""
     error = make_result("error", episode=20, setting=setting)
 
     (note,) = notes_of([*results_of_20_episodes_half_won(), error])

@@ -110,6 +110,11 @@ def test_the_parts_of_a_table_have_labels_of_their_own_and_the_notes_stand_below
     "document", ["[conference]{IEEEtran}", "{article}", "[twocolumn]{article}"]
 )
 def test_no_box_is_overfull(tmp_path, latex_of_all_tables, document):
+    """All tables are set by pdflatex, in a wide and two narrow kinds of document.
+
+    The log would name a box that is wider than its column, or an error (!). A paper of less than 10
+    kB would be empty.
+    """
     (tmp_path / "paper.tex").write_text(
         DOCUMENT % (document, latex_of_all_tables), encoding="utf-8"
     )

@@ -106,6 +106,7 @@ def focused_element(page, what="innerText"):
 
 @pytest.mark.slow
 def test_each_filter_leaves_the_episodes_that_fit_and_reset_brings_all_back(page):
+    """The expected counts are counted in the records of the page; one episode ended in an error."""
     everything = len(records_of_page())
     counting = count_of_records(task="StopCube") + count_of_records(task="PickXtimes")
     assert count_shown(page) == everything
@@ -151,6 +152,7 @@ def test_an_address_of_the_page_leads_to_the_same_filters_and_page(page):
 
 @pytest.mark.slow
 def test_an_address_of_an_episode_opens_it_and_clears_filters_that_would_hide_it(page, page_file):
+    """The episode is one of VideoUnmask; the address also asks for the task StopCube."""
     row = opened_first_row(page, task="VideoUnmask")
     key = row.get_attribute("id").removeprefix("e-")
 
@@ -164,6 +166,10 @@ def test_an_address_of_an_episode_opens_it_and_clears_filters_that_would_hide_it
 
 @pytest.mark.slow
 def test_arrow_keys_move_between_cells_of_the_table_and_enter_lists_a_cells_episodes(page):
+    """From the first cell of the table: right is *all tasks, direct*, two below is *PickXtimes*.
+
+    The tip tells what the cell in focus shows. Of PickXtimes in direct the page has three episodes.
+    """
     tip = page.locator("#tip")
     page.locator(".cell").first.focus()
     page.keyboard.press("ArrowRight")
@@ -215,6 +221,7 @@ def test_a_click_on_a_cell_filters_the_episodes_to_those_that_it_counts(page):
 
 
 def test_a_click_on_a_part_of_a_bar_filters_the_episodes_to_those_that_failed_so(page):
+    """The second bars are of the forgetful policy; the part is its failures of grounding."""
     bars = page.locator("#bars .map").nth(1)
 
     bars.locator(".end.grounding").first.click()
@@ -242,6 +249,7 @@ def test_a_word_that_refers_back_and_what_it_refers_to_light_up_together(page):
 
 
 def test_a_word_that_refers_back_and_what_it_refers_to_have_the_same_number(page):
+    """An anaphor, such as *it*, and its antecedent, the words that named the thing first."""
     row = opened_first_row(page, task="PickXtimes", setting="contextual", form="implicit")
     anaphor = row.locator("mark.anaphor").last
     antecedent = row.locator(f"mark.antecedent[data-keys='{anaphor.get_attribute('data-keys')}']")
@@ -300,6 +308,7 @@ def test_an_episode_that_ended_in_an_error_shows_its_traceback(page):
 
 
 def test_enter_opens_and_closes_an_episode_and_an_arrow_key_moves_to_the_next(page):
+    """The focus is on the first episode of the list."""
     first = page.locator("#rows h3 button").nth(0)
     second = page.locator("#rows > li").nth(1)
     first.focus()
@@ -400,6 +409,7 @@ def test_two_policies_are_compared_on_the_page_episode_by_episode(page):
 
 
 def test_the_comparison_of_two_policies_opens_both_episodes_and_says_which_is_better(page):
+    """A click on a count of the comparison lists its episodes, and one on an episode opens both."""
     page.get_by_text("two policies", exact=True).click()
 
     page.locator(".counts tr", has_text="direct").first.locator(".count").first.click()
@@ -414,6 +424,11 @@ def test_the_comparison_of_two_policies_opens_both_episodes_and_says_which_is_be
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_page_fits_a_telephone_and_its_texts_have_enough_contrast(open_page, page_file, scheme):
+    """In a window 400 pixels wide nothing is wider, so that the page does not scroll sideways.
+
+    `CONTRASTS` is a script that lists the texts whose contrast is below WCAG's 4.5; none may be, in
+    light and dark colors, with one episode open or a comparison of two policies.
+    """
     with open_page(page_file.as_uri(), color_scheme=scheme) as page:
         opened_first_row(
             page, policy="forgetful (privileged)", setting="contextual", form="implicit"
@@ -431,7 +446,10 @@ def test_the_page_fits_a_telephone_and_its_texts_have_enough_contrast(open_page,
 
 
 def test_the_tab_key_reaches_every_section_and_marks_where_it_is(page):
-    """What has the focus has an outline of 3 pixels; of a radio button, its label next to it."""
+    """60 times the tab key goes around the page; what has the focus has an outline of 3 pixels.
+
+    Of a radio button, which is not drawn, its label next to it has the outline.
+    """
     seen = set()
     for _ in range(60):
         page.keyboard.press("Tab")
@@ -446,7 +464,11 @@ def test_the_tab_key_reaches_every_section_and_marks_where_it_is(page):
 
 @pytest.mark.slow
 def test_a_page_of_ten_thousand_episodes_draws_no_more_than_40_at_once(open_page, tmp_path):
-    """By the page's own counters: how much is drawn, not how long it takes on this machine."""
+    """Records are repeated with other policy seeds; words are searched that many, none or all have.
+
+    The page counts in `roboirg.counters` how many records it scanned and drew: how much is drawn,
+    not how long it takes on this machine. `PAGE_SIZE` is 40.
+    """
     some = [replace(record, video=None) for record in records_of_page()]
     many = []
     for seed in range(10_000 // len(some) + 1):

@@ -204,6 +204,7 @@ def test_a_long_name_is_folded_in_a_terminal_and_whole_in_a_file(width):
 
 
 def test_a_task_of_which_nothing_was_played_has_no_column_in_the_terminal():
+    """Two episodes of PickXtimes were played; the terminal is wide enough for all columns."""
     console = Console(file=io.StringIO(), width=400)
     explicit = make_results("10", policy="a", task="PickXtimes")
     direct = make_results("10", "direct", policy="a", task="PickXtimes")
@@ -229,6 +230,7 @@ def test_csv_has_a_line_for_each_rate_with_the_counts_behind_it():
 
 
 def test_a_task_that_the_paper_lacks_has_a_table_of_its_own():
+    """One episode of the task *Outside* is won in both settings: 100, as in explicit (→0)."""
     explicit = make_results("1", policy="a", task="Outside")
     direct = make_results("1", "direct", policy="a", task="Outside")
 

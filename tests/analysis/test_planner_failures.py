@@ -44,9 +44,11 @@ def failed_record_of_a_planner():
 def test_a_planners_failure_is_named_by_the_wrong_act_or_else_by_its_last_wrong_subgoal(
     failed_record_of_a_planner, verdicts, attribution, named
 ):
-    """Subgoals are the orders that a planner gave; those before the last one were corrected.
+    """Subgoals are the orders of a planner, each judged by a verdict; the episode failed.
 
-    If all were right, the hands that carried them out failed.
+    A wrong thing that was taken names the failure even if all subgoals were right; an act of
+    unclear meaning or none names nothing, and then the last wrong verdict does: those before it
+    were corrected. If all were right, the hands that carried them out failed.
     """
     subgoals = tuple(
         SubgoalRecord(step=5, text="pick it up", verdict=verdict) for verdict in verdicts
@@ -78,9 +80,10 @@ def test_a_failure_of_a_policy_that_is_no_planner_has_no_such_name(failed_record
 def test_an_episode_without_an_end_is_named_by_what_became_of_the_last_subgoal(
     failed_record_of_a_planner, ended, why, steps_since, named
 ):
-    """The episode ran into the step limit, so many steps after the last subgoal was given.
+    """The episode ran into the step limit, `steps_since` after the last subgoal was given.
 
-    Replies that could not be read before it, here two, do not matter.
+    A planner that names nothing more for over `IDLE_STEPS` steps after its subgoal was done stopped
+    early. The two replies that could not be read before it do not matter.
     """
     limit = failed_record_of_a_planner.environment.max_steps
     subgoal = SubgoalRecord(

@@ -237,6 +237,7 @@ def test_the_note_of_a_cell_says_if_there_are_too_few_episodes_for_an_interval()
 
 
 def test_the_sentence_of_a_comparison_says_if_there_are_too_few_episodes_for_an_interval():
+    """One episode, won by the listener and lost by the other policy."""
     listener = frame_of(make_results("1"))
     other = frame_of(make_results("0", policy="other"))
 

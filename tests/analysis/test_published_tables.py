@@ -172,6 +172,7 @@ def test_the_paper_has_rates_for_exactly_the_tasks_that_have_a_setting_here():
 
 
 def test_notes_below_published_tables_give_the_half_width_of_the_interval_of_a_cell():
+    """The paper gives the number of trials of a cell; the width is that of a rate of one half."""
     for table, (first, *_) in NOTES.items():
         half_of_trials = math.prod(TRIALS[table]) // 2
         low, high = interval_of_values([[0.0, 1.0] * half_of_trials])

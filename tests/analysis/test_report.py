@@ -435,6 +435,10 @@ def filmed_run(tmp_path):
 
 
 def test_videos_that_fit_are_stored_in_the_page(filmed_run, monkeypatch):
+    """Two files of four bytes, a film and its picture, and a page that may hold eight.
+
+    The second episode has lost its film, for which there was no room.
+    """
     monkeypatch.setattr(report, "MAX_EMBEDDED_BYTES", 8)
 
     page = Page(write_report(filmed_run).read_text())
@@ -459,6 +463,7 @@ def test_a_page_may_be_asked_to_store_no_videos(filmed_run):
 def test_videos_that_do_not_fit_are_linked_from_where_the_page_is(
     filmed_run, monkeypatch, options, folder
 ):
+    """Two files of four bytes, a film and its picture, and a page that may hold seven."""
     monkeypatch.setattr(report, "MAX_EMBEDDED_BYTES", 7)
     if "out" in options:
         options = {"out": filmed_run.folder / options["out"]}
@@ -499,6 +504,7 @@ def two_runs(tmp_path):
 
 
 def test_a_page_of_two_runs_compares_each_policy_with_itself(two_runs):
+    """Two policies in each run: 0 and 1 are of the first, 2 and 3 of the second run."""
     ours, theirs = two_runs
 
     page = Page(write_report(ours, against=theirs).read_text())

@@ -11,80 +11,94 @@ from roboirg.analysis.tables.rewriter_table import NO_SHARE, make_rewriter_table
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.by_name.finding import read_policy
 
-SERVED = "openpi://localhost:8000"
-ALONE = read_policy(SERVED, "alone")
-RULES = read_policy(f"resolve:surface?policy={SERVED}", "rules")
-OTHER = read_policy("resolve:surface?policy=mme-vla://localhost:8000", "other")
+POLICY = read_policy("openpi://localhost:8000", "alone")
+POLICY_BEHIND_REWRITER = read_policy("resolve:surface?policy=openpi://localhost:8000", "rules")
+ANOTHER_POLICY_BEHIND_REWRITER = read_policy(
+    "resolve:surface?policy=mme-vla://localhost:8000", "other"
+)
 
 
-def results(ref, outcomes, setting, task="PickXtimes"):
-    """One result of a policy a letter: 1 for a success, 0 for a failure."""
-    made = make_results(outcomes, setting, policy=ref.name, task=task)
-    return [replace(result, ref=ref) for result in made]
+def results_of(policy, setting, *, won, played=20, task="PickXtimes"):
+    """Return results of a policy that wins the first so many of the episodes that it plays."""
+    outcomes = "1" * won + "0" * (played - won)
+    made = make_results(outcomes, setting, policy=policy.name, task=task)
+    return [replace(result, ref=policy) for result in made]
 
 
-def rows_of(*made):
-    table = make_rewriter_table(RunData(frame_of(*made)))
-    return [(row.group, row.name, list(row.cells)) for row in table.rows]
+def row_of(*results):
+    """Return the one row of the table, a cell by the name of its column."""
+    (row,) = make_rewriter_table(RunData(frame_of(*results))).rows
+    assert (row.group, row.name) == ("direct", "rules")
+    columns = ("episodes", "alone", "rewritten", "explicit", "gap closed", "interval")
+    return dict(zip(columns, row.cells, strict=True))
 
 
 def test_half_of_a_gap_is_closed_if_half_of_the_lost_episodes_are_won_back():
-    """The policy alone wins 20 % of direct, behind a rewriter 60 %, and 100 % of explicit.
+    """A policy wins 4 of 20 direct instructions alone, 12 behind a rewriter, and all explicit ones.
 
-    Cells: episodes, these three rates, and the share of the gap that is closed, 40 of 80 points.
+    These are 20 %, 60 % and 100 %. The gap is 80 points; the rewriter closes 40 of them, 50 %.
     """
-    found = rows_of(
-        results(ALONE, "1" * 20, "explicit"),
-        results(ALONE, "1" * 4 + "0" * 16, "direct"),
-        results(RULES, "1" * 12 + "0" * 8, "direct"),
+    row = row_of(
+        results_of(POLICY, "explicit", won=20),
+        results_of(POLICY, "direct", won=4),
+        results_of(POLICY_BEHIND_REWRITER, "direct", won=12),
     )
 
-    ((setting, policy, cells),) = found
-    assert (setting, policy) == ("direct", "rules")
-    assert cells[:5] == ["20", "20", "60", "100", "50"]
+    assert row["alone"] == "20"
+    assert row["rewritten"] == "60"
+    assert row["gap closed"] == "50"
 
 
 def test_only_episodes_count_that_all_three_have():
-    """18 of 20 and of 30; of them the policy alone wins none, and behind a rewriter all."""
-    found = rows_of(
-        results(ALONE, "1" * 20, "explicit"),
-        results(ALONE, "0" * 18, "direct"),
-        results(RULES, "1" * 30, "direct"),
+    """The 18 episodes played alone are also among the 20 explicit and the 30 rewritten ones.
+
+    Of these 18 the policy alone wins none and behind a rewriter all: the whole gap is closed.
+    """
+    row = row_of(
+        results_of(POLICY, "explicit", won=20),
+        results_of(POLICY, "direct", won=0, played=18),
+        results_of(POLICY_BEHIND_REWRITER, "direct", won=30, played=30),
     )
 
-    assert found[0][2][:5] == ["18", "0", "100", "100", "100"]
+    assert row["episodes"] == "18"
+    assert row["gap closed"] == "100"
 
 
 def test_rates_are_means_over_the_tasks_that_all_three_have():
-    """Behind a rewriter 100 % of PickXtimes and 0 % of BinFill; StopCube was not played alone."""
-    found = rows_of(
-        results(ALONE, "1" * 20, "explicit"),
-        results(ALONE, "0" * 20, "direct"),
-        results(RULES, "1" * 20, "direct"),
-        results(ALONE, "1" * 10, "explicit", "BinFill"),
-        results(ALONE, "0" * 10, "direct", "BinFill"),
-        results(RULES, "0" * 10, "direct", "BinFill"),
-        results(RULES, "0" * 10, "direct", "StopCube"),
+    """Behind a rewriter 100 % of PickXtimes and 0 % of BinFill are won: 50 %, a task like another.
+
+    By episodes it would be 20 of 30. StopCube does not count: it was not played alone.
+    """
+    row = row_of(
+        results_of(POLICY, "explicit", won=20),
+        results_of(POLICY, "direct", won=0),
+        results_of(POLICY_BEHIND_REWRITER, "direct", won=20),
+        results_of(POLICY, "explicit", won=10, played=10, task="BinFill"),
+        results_of(POLICY, "direct", won=0, played=10, task="BinFill"),
+        results_of(POLICY_BEHIND_REWRITER, "direct", won=0, played=10, task="BinFill"),
+        results_of(POLICY_BEHIND_REWRITER, "direct", won=0, played=10, task="StopCube"),
     )
 
-    assert found[0][2][:5] == ["30", "0", "50", "100", "50"]
+    assert row["rewritten"] == "50"
+    assert row["episodes"] == "30"
 
 
 def test_without_a_clear_gap_there_is_no_share():
-    """95 % against 100 % of 20 episodes could be chance."""
-    found = rows_of(
-        results(ALONE, "1" * 20, "explicit"),
-        results(ALONE, "1" * 19 + "0", "direct"),
-        results(RULES, "1" * 20, "direct"),
+    """19 of 20 against 20 of 20 episodes could be chance, so there may be no gap to close."""
+    row = row_of(
+        results_of(POLICY, "explicit", won=20),
+        results_of(POLICY, "direct", won=19),
+        results_of(POLICY_BEHIND_REWRITER, "direct", won=20),
     )
 
-    assert found[0][2] == ["20", "95", "100", "100", NO_SHARE, "–"]
+    assert (row["gap closed"], row["interval"]) == (NO_SHARE, "–")
 
 
 def test_a_rewriter_is_compared_with_its_own_policy_alone():
+    """Here a rewriter stands before a policy on another server, which was not played alone."""
     with pytest.raises(InvalidValueError, match="alone and behind a rewriter"):
-        rows_of(
-            results(ALONE, "1" * 20, "explicit"),
-            results(ALONE, "0" * 20, "direct"),
-            results(OTHER, "1" * 20, "direct"),
+        row_of(
+            results_of(POLICY, "explicit", won=20),
+            results_of(POLICY, "direct", won=0),
+            results_of(ANOTHER_POLICY_BEHIND_REWRITER, "direct", won=20),
         )

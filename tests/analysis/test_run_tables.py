@@ -108,7 +108,10 @@ FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL = frame_of(
     ],
 )
 def test_other_tables_are_as_stored(snapshot, name, kind):
-    """Would find numbers of one row, column, form or outcome in place of another."""
+    """Results of two policies and three tasks that put another number into each cell of a table.
+
+    Would find numbers of one row, column, form or outcome in place of another.
+    """
     data = RunData(FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL)
 
     table = diagnostic_tables()[name].make(data)
@@ -158,8 +161,9 @@ def test_success_and_three_kinds_of_failure_add_up_to_100_and_their_changes_to_0
 ):
     """A letter is how an episode ended: s success, g grounding, x execution, u or - undecided.
 
-    Rates are percentages of success, grounding, execution and undecided. Changes are over the same
-    episodes: in the third case, errors (!) leave eight of ten.
+    Rates are the percentages of s, g, x and undecided in direct: in the first case 5, 3, 1 and 1 of
+    ten. Changes are those less the ones of explicit (8, 1, 1 and 0 of ten), over the same episodes:
+    in the third case, errors (!) leave eight of ten.
     """
     data = RunData(
         frame_of(results_that_ended(explicit, "explicit"), results_that_ended(direct, "direct"))
@@ -184,13 +188,14 @@ def test_a_failure_whose_name_this_version_does_not_know_counts_as_not_attribute
 
 
 def test_the_breakdown_by_difficulty_is_as_stored(snapshot):
+    """The results put another number into each cell, so an exchange of two would be seen."""
     table = make_breakdown_table(BREAKDOWNS["difficulty"], FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL)
 
     assert get_format("markdown").draw(table) == snapshot
 
 
 def test_the_first_ten_failures_are_listed_and_the_others_counted():
-    """Of 13 failures, in episodes 0 to 12."""
+    """Of 13 failures, in episodes 0 to 12; above them other lines stand, a summary of rates."""
     lines = printed(frame_of(play("0000000000000", cause="late"))).splitlines()
 
     assert [line.split()[1] for line in lines[-11:-1]] == [
@@ -263,6 +268,7 @@ def test_each_split_step_limit_and_robot_has_a_table_of_its_own():
 
 @pytest.mark.parametrize("order", [["listener", "random"], ["random", "listener"]])
 def test_tables_of_policies_stand_in_the_order_of_the_plan_and_the_legend_below_the_last(order):
+    """`order` is the plan's; one of the two policies is privileged, which the legend explains."""
     results = [*play("1"), *play("1", policy="random", privileged=True)]
     planned = [make_result(policy=name).identity for name in order]
 
@@ -283,6 +289,7 @@ def test_a_suite_that_was_played_in_part_is_marked_in_the_table_of_forms():
 
 
 def test_results_have_what_the_calls_of_models_cost_and_none_where_it_is_unknown():
+    """The first episode reports all but its output tokens, the second nothing."""
     asked = make_result(usage={"calls": 3.0, "input_tokens": 1200.0, "cost_usd": 0.25})
     frame = frame_of([asked, make_result(episode=1)])
 

@@ -226,6 +226,7 @@ def test_objects_and_classes_that_no_other_process_can_import_stay_in_this_one(m
 
 
 def test_evaluate_takes_the_options_of_a_plan():
+    """Episode 2, two seeds, two lists of stages and a step limit arrive in the plan as given."""
     plan = python_run.python_plan(
         "oracle", tasks=["PickXtimes"], settings="contextual", episodes=[2],
         policy_seeds=(7, 42), stages=[(1, 5), (1, 2, 5)], max_steps=600, wordings=None,

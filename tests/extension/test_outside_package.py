@@ -136,6 +136,7 @@ def roboirg(python_with_the_packages, tmp_path_factory):
 def test_commands_list_the_task_setting_and_protocol_of_an_installed_package(
     roboirg, names_of_additions
 ):
+    """The package adds one of each; its setting is for a task of the benchmark (`WITH_SETTING`)."""
     task, setting, protocol = names_of_additions
     listed = {line.split()[0]: line for line in roboirg("tasks").splitlines()}
     assert "explicit" in listed[task]
@@ -147,6 +148,7 @@ def test_commands_list_the_task_setting_and_protocol_of_an_installed_package(
 def test_an_episode_of_the_packages_task_and_setting_is_played_and_shown(
     roboirg, names_of_additions
 ):
+    """The listener plays the package's task, and PickXtimes with the package's setting."""
     task, setting, *_ = names_of_additions
     roboirg(
         "run", "--policy", "listener", "--tasks", f"{task},{WITH_SETTING}", "--settings", "all",
@@ -181,6 +183,7 @@ def test_the_package_of_the_page_adds_a_task_a_setting_a_kind_a_command_and_a_pl
 def test_an_installed_package_does_not_change_the_benchmarks_own_episodes_and_words(
     python_with_the_packages, names_of_additions
 ):
+    """A script compares both with the stored ones, in an environment with the package installed."""
     _, added, _ = names_of_additions
     script = CHECK_EPISODES_AND_WORDS.format(
         language=str(ROOT / "tests" / "language"), added=(added, "lab")

@@ -127,7 +127,10 @@ def good_log_except(**changes):
     ],
 )
 def test_a_file_that_is_no_valid_action_log_is_refused(tmp_path, content):
-    """Of four actions."""
+    """Each content differs in one point from a good log of four actions of 8 numbers.
+
+    In the good log the policy was called at actions 0 and 2.
+    """
     path = action_path(tmp_path, "0" * 64)
     path.parent.mkdir(parents=True)
     path.write_bytes(content)

@@ -85,6 +85,10 @@ def test_all_ways_to_print_end_in_the_log_and_not_on_the_terminal(tmp_path):
 
 
 def test_a_log_that_would_be_too_long_keeps_its_begin_and_its_end(tmp_path):
+    """A program prints 30,000 lines between its first and last words; the limit is 10,000 bytes.
+
+    The middle is replaced by one note.
+    """
     assert finished_program(PROGRAM_THAT_PRINTS_TOO_MUCH, tmp_path / "a.txt").returncode == 0
 
     text = (tmp_path / "a.txt").read_text()
@@ -95,6 +99,7 @@ def test_a_log_that_would_be_too_long_keeps_its_begin_and_its_end(tmp_path):
 
 
 def test_the_last_words_of_a_killed_process_are_in_its_log(tmp_path):
+    """The program prints one line and kills itself, so nothing could be written at its end."""
     done = finished_program(PROGRAM_THAT_IS_KILLED, tmp_path / "a.txt")
 
     assert done.returncode == -signal.SIGKILL
@@ -102,6 +107,7 @@ def test_the_last_words_of_a_killed_process_are_in_its_log(tmp_path):
 
 
 def test_a_policy_that_closes_its_output_does_not_silence_what_comes_after_it(tmp_path):
+    """Within the episode *hello* goes to the log; *after* is printed when the episode has ended."""
     done = finished_program(PROGRAM_THAT_CLOSES_ITS_OUTPUT, tmp_path / "a.txt")
     assert (done.returncode, done.stdout) == (0, b"after\n")
     assert (tmp_path / "a.txt").read_text() == "hello\n"

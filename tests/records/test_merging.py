@@ -33,6 +33,7 @@ def test_merging_two_parts_of_a_run_gives_the_whole_without_duplicates(tmp_path)
 
 
 def test_merging_again_into_the_same_folder_adds_nothing(tmp_path):
+    """The part has eight records, which are all there already."""
     part = fill(tmp_path / "a", *played_records())
     merge_runs([part], tmp_path / "out")
 

@@ -31,6 +31,7 @@ def damage_the_third(lines):
 
 
 def test_a_damaged_line_loses_only_its_episode_and_is_reported(tmp_path, caplog):
+    """Of eight records, the third line is damaged; the seven others are read."""
     run_with_lines(tmp_path, damage_the_third)
 
     with RecordStore(tmp_path) as store:
@@ -69,6 +70,7 @@ def test_a_last_line_that_was_cut_off_is_reported(tmp_path, caplog):
 
 
 def test_the_next_run_repairs_a_last_line_that_was_cut_off(tmp_path):
+    """Reading a run whose last line is unfinished is refused, until a run has gone on there."""
     run_with_lines(tmp_path, cut_the_last)
     with pytest.raises(StoreError, match="ends in an unfinished line"):
         StoredRun(tmp_path, read_summary).file.refuse_damage()

@@ -94,7 +94,10 @@ POLICY_ERROR = {"outcome": "error", "error": "policy"}
 
 
 def test_an_error_before_a_policy_declares_its_version_gets_that_of_its_verdicts(tmp_path):
-    """Else its row has no mark of the error, and a row of unknown version stands next to it."""
+    """The first episode was won with version 7; the second ended before its version was known.
+
+    Else its row has no mark of the error, and a row of unknown version stands next to it.
+    """
     won = with_version(eight_records()[0], "7")
     raised = replace(with_version(eight_records()[1], UNKNOWN_VERSION), **POLICY_ERROR)
     fill(tmp_path, won, raised)
@@ -105,6 +108,7 @@ def test_an_error_before_a_policy_declares_its_version_gets_that_of_its_verdicts
 
 
 def test_an_error_of_another_policy_of_the_same_name_stays_of_unknown_version(tmp_path):
+    """The two policies have another `makeup`, so version 7 of one says nothing of the other."""
     won = with_version(eight_records()[0], "7")
     another = replace_field(won.ref, version=UNKNOWN_VERSION, makeup=(("policy", "another"),))
     fill(tmp_path, won, replace(eight_records()[1], ref=another, **POLICY_ERROR))
@@ -115,6 +119,7 @@ def test_an_error_of_another_policy_of_the_same_name_stays_of_unknown_version(tm
 
 
 def test_unfinished_lines_of_several_crashes_are_all_kept_in_a_file_of_their_own(tmp_path):
+    """Twice a record is cut off by a crash, and the store is opened again."""
     for torn in (b'{"policy": "a', b'{"policy": "b'):
         with (tmp_path / RECORDS_FILE).open("ab") as file:
             file.write(torn)
@@ -124,6 +129,7 @@ def test_unfinished_lines_of_several_crashes_are_all_kept_in_a_file_of_their_own
 
 
 def test_a_second_run_in_the_same_folder_is_refused_with_the_process_of_the_first(tmp_path):
+    """Once the first store is closed, another may open the folder."""
     first = RecordStore(tmp_path)
 
     with pytest.raises(StoreError, match=rf"being written by .*process {os.getpid()}\)"):
@@ -150,6 +156,7 @@ def test_a_lock_that_a_killed_run_left_refuses_nobody(tmp_path):
 def test_a_file_system_without_locks_is_reported_with_the_advice_to_use_a_local_disk(
     tmp_path, take
 ):
+    """Three places take a lock; the call for it is replaced by one that fails with ENOLCK."""
     with (
         patch("fcntl.flock", side_effect=OSError(errno.ENOLCK, "No locks available")),
         pytest.raises(RoboIRGError, match=r"Cannot lock .*lock \(No locks .* local disk\.$"),
@@ -180,6 +187,7 @@ def test_records_of_a_newer_format_are_refused_and_stay_as_they_are(tmp_path):
     ],
 )
 def test_a_line_that_is_no_record_is_reported_with_its_number(tmp_path, read, line, sentence):
+    """A file of one line: a record whose policy is a number, or a list."""
     (tmp_path / RECORDS_FILE).write_bytes(line + b"\n")
 
     with pytest.raises(StoreError, match=sentence):
@@ -193,6 +201,7 @@ def test_a_line_that_is_no_record_is_reported_with_its_number(tmp_path, read, li
     ids=["steps", "duration", "cost", "step limit"],
 )  # fmt: skip
 def test_a_record_with_a_number_that_could_not_be_read_back_is_not_written(tmp_path, fields):
+    """Beyond 64 bits, no number, or infinite."""
     record = replace(eight_records()[0], **fields)
 
     with RecordStore(tmp_path) as store, pytest.raises(StoreError, match=r"is not a record"):
@@ -202,6 +211,7 @@ def test_a_record_with_a_number_that_could_not_be_read_back_is_not_written(tmp_p
 
 
 def test_of_two_records_of_an_episode_the_newer_is_read(tmp_path):
+    """The newer one of the first episode stands last in the file, with 1234 steps."""
     first, *others = eight_records()
     newer = replace(first, steps=1234)
 
@@ -235,7 +245,10 @@ def limit_file_sizes():
 def test_a_full_disk_ends_the_run_in_one_sentence_and_loses_no_earlier_record(
     tmp_path, limit_file_sizes
 ):
-    """The kernel takes a part of the fourth record and refuses the rest."""
+    """Files may have the size of three records and 100 bytes, as on a full disk.
+
+    The kernel takes a part of the fourth record and refuses the rest. That part is removed again.
+    """
     three_records = fill(tmp_path / "whole", *eight_records()[:3]) / RECORDS_FILE
     folder = tmp_path / "run"
     limit_file_sizes(three_records.stat().st_size + 100)
@@ -256,6 +269,7 @@ def test_a_full_disk_ends_the_run_in_one_sentence_and_loses_no_earlier_record(
 )
 @pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "videos/a.jpg"])
 def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path, name, begin):
+    """Each name is one that a run writes to; here it links to a file of somebody else."""
     victim = tmp_path / "victim"
     victim.write_text("mine")
     link = tmp_path / "run" / name
@@ -295,6 +309,7 @@ def test_a_run_does_not_start_where_a_pipe_would_block_it(tmp_path, name):
 
 
 def test_a_plan_may_be_a_hard_link_as_it_is_replaced(tmp_path):
+    """Writing the plan makes a new file of that name; the other name keeps the old content."""
     victim = tmp_path / "victim"
     victim.write_text("{}")
     (tmp_path / "run").mkdir()

@@ -78,6 +78,7 @@ def test_unknown_arms_and_none_at_all_are_refused(arms, error, words):
 
 
 def test_a_dry_run_prints_how_many_episodes_lack_an_arm(tmp_path):
+    """Scenes of VideoRepick have no second goal, which the arm other-goal would state."""
     printed = call(
         "run", "--policy", "oracle", "--tasks", "VideoRepick", "--arms", "told,other-goal",
         "--episodes", "2", "--settings", "direct", "--out", tmp_path / "x", "--dry-run",

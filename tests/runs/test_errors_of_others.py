@@ -85,6 +85,7 @@ def test_an_error_of_a_users_planner_or_hands_is_recorded_with_file_and_line(
 def test_an_error_in_a_process_of_its_own_is_recorded_with_file_and_line(
     record_after_raise_in, hook, spec
 ):
+    """The policy raises ValueError in one of its methods (`hook`), on line 12 of throwing.py."""
     record = record_after_raise_in(hook, spec, process="own")
 
     assert record.cause.endswith(f": ValueError: from {hook} (throwing.py, line 12)")
@@ -144,6 +145,7 @@ def add_command(monkeypatch):
 def test_a_command_of_another_package_that_raises_prints_one_sentence(
     add_command, monkeypatch, capsys
 ):
+    """The command *theirs* is that of throwing.py, which raises ValueError on line 12."""
     add_command("theirs", "throwing:command")
     monkeypatch.setattr(sys, "argv", ["roboirg", "theirs"])
 

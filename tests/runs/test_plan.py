@@ -44,6 +44,7 @@ from roboirg.util.csv_text import csv_lines
     ],
 )
 def test_episodes_are_given_as_a_count_a_list_ranges_or_all(text, episodes):
+    """A number alone is a count; with a comma it is a list. The split *train* has 100 episodes."""
     assert parse_episodes(text, "train", ()) == episodes
 
 
@@ -56,6 +57,7 @@ def test_a_number_that_stands_twice_in_a_list_counts_once():
     ["0", "-3", "010", "0,010", "a", "3-1", "1.5", "", "1,,b", "0-999999999", "9" * 5000],
 )
 def test_a_text_that_is_no_list_of_episodes_is_refused_in_one_short_sentence(text):
+    """*Short* is less than 200 characters, even for a number of 5,000 digits."""
     with pytest.raises(InvalidValueError) as caught:
         parse_episodes(text, "test", ())
 
@@ -227,6 +229,7 @@ def test_settings_every_adds_the_harder_settings_that_all_leaves_out(word, is_to
 
 
 def test_a_setting_in_turns_is_added_to_its_usual_delivery():
+    """Three settings of one episode; `in_turns` adds a fourth job, direct in single utterances."""
     plan = make_plan(
         ["random"], tasks="StopCube", episodes="1", settings="explicit,direct,reasoning",
         in_turns="direct",
@@ -276,6 +279,10 @@ def test_settings_of_a_list_are_played_in_its_order():
     ("settings", "rest"), [("explicit,spatial,direct", "explicit,direct"), ("spatial", "all")]
 )
 def test_a_setting_in_a_list_that_a_task_lacks_is_refused_with_what_plays_the_rest(settings, rest):
+    """Of the three tasks only BinFill has the setting spatial.
+
+    `rest` is the list of settings without it, as the message gives it.
+    """
     with pytest.raises(InvalidValueError) as caught:
         make_plan(["random"], tasks="StopCube,BinFill,VideoRepick", settings=settings)
 
@@ -306,6 +313,7 @@ def test_both_forms_are_implicit_and_resolved():
 
 
 def test_policies_tasks_and_episodes_are_played_in_the_order_in_which_they_are_given():
+    """Not in the order of the alphabet or of the numbers."""
     plan = make_plan(
         ["random", "oracle"], tasks="VideoUnmask,BinFill", settings="explicit", episodes="3,0"
     )
@@ -366,6 +374,7 @@ def test_plain_words_come_last_in_each_scene():
     ],
 )  # fmt: skip
 def test_a_plan_with_an_impossible_option_is_refused_with_the_reason(options, sentence):
+    """Each case has one wrong option, and what the message has to say of it."""
     with pytest.raises(InvalidValueError, match=sentence):
         make_plan(["random"], **options)
 
@@ -406,6 +415,10 @@ OPTIONS_WITH_NUMBERS = st.dictionaries(
 @example({"max_steps": 10**9, "policy_seeds": 10**18 - 1, "max_cost": 1e308})
 @settings(deadline=None)
 def test_a_plan_with_any_numbers_is_refused_or_read_back_as_it_was_written(numbers):
+    """Hypothesis draws options and numbers, from negative to far too large, and what is no number.
+
+    The example is the largest that is allowed, so that at least one plan is stored and read.
+    """
     try:
         plan = make_plan("random", tasks="PickXtimes", settings="explicit", episodes=1, **numbers)
     except InvalidValueError:
@@ -492,6 +505,7 @@ def test_a_policy_name_that_only_resembles_a_number_is_allowed_and_read_back_fro
 
 @pytest.mark.parametrize("content", ["{", "words", "[]"])
 def test_a_broken_plan_file_in_a_run_is_reported_and_counts_as_no_plan(content, tmp_path, caplog):
+    """The message is a warning, so that the results can still be read."""
     (tmp_path / PLAN_FILE).write_text(content)
 
     assert read_plan(tmp_path) is None

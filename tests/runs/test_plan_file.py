@@ -37,6 +37,7 @@ def test_every_other_named_plan_can_be_played(name):
 
 
 def test_the_plan_challenge_plays_ten_explicit_episodes_a_task_with_1500_steps():
+    """*challenge* is a plan file that the package has."""
     plan = make_plan(["random"], **read_plan_file("challenge"))
 
     assert (plan.split, plan.environment.max_steps) == ("test", 1500)
@@ -73,6 +74,7 @@ def test_the_plan_paper_context_plays_three_tasks_with_each_set_of_utterance_sta
 
 
 def test_the_standard_protocol_plays_every_task_in_fifty_episodes():
+    """*standard* is a plan file that the package has, the recommended protocol."""
     plan = make_plan(["random"], **read_plan_file("standard"))
 
     assert plan.tasks == tuple(all_tasks())
@@ -82,6 +84,7 @@ def test_the_standard_protocol_plays_every_task_in_fifty_episodes():
 
 
 def test_the_standard_protocol_has_every_setting_and_direct_in_turns():
+    """Four of its fifty episodes are made: in turns, only direct is told, in each task."""
     jobs = make_plan(["random"], **read_plan_file("standard") | {"episodes": "4"}).jobs()
 
     in_turns = {(job.task, job.setting) for job in jobs if job.options.delivery == "turns"}
@@ -162,6 +165,7 @@ def test_a_value_that_yaml_reads_otherwise_than_it_looks_is_refused_with_its_lin
 
 
 def test_an_option_on_the_command_line_replaces_that_of_the_plan_file(tmp_path):
+    """The file says 100 steps and light meshes, the command line 200 steps."""
     path = path_of_plan_file(tmp_path, "environment: {max_steps: 100, meshes: light}")
 
     plan = run_commands._plan(path, {"policies": ["random"], "max_steps": "200"}, ())

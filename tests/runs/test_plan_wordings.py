@@ -56,6 +56,7 @@ def test_each_episode_in_words_of_a_file_has_their_digest_and_the_path(wording_f
 
 
 def test_episodes_in_other_words_are_other_episodes_and_the_file_may_be_moved(wording_file):
+    """An episode is known by its key, which has the digest of the words and not the path."""
     job, *_ = plan_in_words_of(wording_file).jobs()
 
     in_our_words = job.with_options(wordings=None)
@@ -72,6 +73,7 @@ def test_episodes_in_the_benchmarks_words_have_neither_a_digest_nor_a_path():
 
 
 def test_a_stored_plan_is_read_although_its_file_of_words_is_gone(wording_file, tmp_path):
+    """The plan has the digest of the words; only playing an episode needs the file."""
     plan = plan_in_words_of(wording_file)
     write_plan(plan, tmp_path)
 
@@ -97,6 +99,7 @@ def test_a_worker_reads_the_file_of_words(wording_file, monkeypatch):
 
 
 def test_a_worker_refuses_a_file_of_words_that_has_changed(wording_file, monkeypatch):
+    """A worker has not read the file yet (`_OPEN` is empty), and finds other words in it."""
     job, *_ = plan_in_words_of(wording_file).jobs()
 
     monkeypatch.setattr(wording_store, "_OPEN", {})

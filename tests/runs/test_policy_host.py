@@ -117,12 +117,13 @@ def relayed(call):
     ids=["nested", "empty", "not contiguous", "large", "text"],
 )
 def test_values_of_every_kind_arrive_unchanged_over_two_sockets(value):
-    """Between the world's process and the policy's stands a third: two sockets."""
+    """Between the world's process and the policy's stands a third, so a value is sent twice."""
     found = relayed(relayed(Call("act", value=value))).value
     np.testing.assert_equal(found, value)
 
 
 def test_a_policy_may_write_into_an_array_that_it_gets():
+    """The array arrives as a copy that can be changed, not as a view of the bytes received."""
     found = relayed(Call("act", value=np.zeros(2))).value
 
     found[0] = 7.0
@@ -140,7 +141,11 @@ def test_objects_are_not_sent_to_the_process_of_a_policy(value):
 def test_a_policy_in_its_own_process_gets_the_instruction_the_video_and_later_utterances(
     begun_policy,
 ):
-    """It tells in its metadata what it got, in which numbers of NumPy become plain ones."""
+    """The policy notes what it gets in its metadata; numbers of NumPy arrive there as plain ones.
+
+    Its video has 30 pictures whose pixels are all 1, so that the sum is their number. Usage that is
+    no finite number is left out; to close twice does no harm.
+    """
     policy = begun_policy(
         "notes_what_it_gets",
         """
@@ -175,6 +180,11 @@ class It:
 
 
 def test_a_policy_in_its_own_process_answers_to_an_observation_and_cannot_change_it(begun_policy):
+    """The policy blackens its picture and answers with the mean of the picture in the history.
+
+    All pixels are 9, so the answer is 9; the world's own picture is still 9, as the policy has a
+    copy.
+    """
     policy = begun_policy(
         "writes_into_pictures",
         """
@@ -284,9 +294,11 @@ def records_without_a_host(tmp_path_factory):
 def test_records_are_the_same_whatever_the_number_of_workers_or_the_size_of_batches(
     tmp_path, monkeypatch, records_without_a_host, workers, batch
 ):
-    """Some episodes of `Picky` raise: what fails for one of a batch costs only that one.
+    """The expected records are those of policies in the world's own process, one episode at a time.
 
-    BatchedDice and Picky note how many episodes they were asked about at once.
+    Some episodes of `Picky` raise: what fails for one of a batch costs only that one. BatchedDice
+    and Picky note how many episodes they were asked about at once: no more than a batch or the
+    workers; of three workers two can wait while one is asked about.
     """
     monkeypatch.setenv("ROBOIRG_TEST_SIZES", str(tmp_path / "sizes"))
     plan = changed(fake_world_plan("Dice", batch=batch), policies=THREE_POLICIES)
@@ -320,6 +332,7 @@ def test_all_worlds_share_one_object_of_a_batched_policy(host_pool_of_test):
 def test_a_privileged_policy_runs_in_the_worlds_process_and_reads_its_secret(
     tmp_path, write_policy
 ):
+    """A policy with a method attach() gets the world itself, which is in no other process."""
     spec = write_policy(
         "insider",
         """
@@ -344,6 +357,7 @@ class It:
 
 
 def test_worlds_share_one_process_of_a_policy_on_each_device(write_policy):
+    """Four worlds and two devices, 0 and 3: the policy tells its device and process."""
     spec = write_policy(
         "located",
         """
@@ -393,6 +407,7 @@ def test_a_policy_whose_import_takes_too_long_is_refused(write_policy):
 
 
 def test_version_and_needs_of_a_policy_are_read_without_importing_it_here(write_policy):
+    """The module `versioned` is imported in another process, which tells what it found."""
     spec = write_policy(
         "versioned",
         """
@@ -441,6 +456,7 @@ class It(hostile_policies.Hostile):
 def test_a_policy_that_cannot_be_loaded_is_reported_before_the_run(
     text, error, words, write_policy
 ):
+    """The module of the policy has this text; checking the plan already reports what is wrong."""
     plan = fake_world_plan(write_policy("broken", text), 1)
 
     with pytest.raises(error, match=words):
@@ -488,6 +504,10 @@ def test_a_crash_of_a_policys_process_is_an_error_only_for_the_episode_that_caus
 
 
 def test_after_a_crash_a_policy_gets_a_new_process(host_pool_of_test, write_policy):
+    """A policy that was told to die ends its process with exit code 7 when it is asked to act.
+
+    The next episode gets a new process and an answer of one action.
+    """
     ref = read_policy(write_policy("fragile", CODE_OF_A_POLICY_THAT_DIES_IF_TOLD))
     bad = HostedPolicy(host_pool_of_test.connect(), ref, 0)
     bad.reset("die", {})
@@ -537,6 +557,8 @@ def test_an_episode_whose_policy_process_cannot_be_started_is_lost(host_pool_of_
 def test_an_interrupt_while_a_picture_is_drawn_stops_the_world_and_not_the_policys_process(
     host_pool_of_test,
 ):
+    """Ctrl-C comes while the policy waits for a picture of the video; later it still answers."""
+
     class InterruptedVideo(dict[str, Any]):
         def __getitem__(self, field):
             raise KeyboardInterrupt
@@ -553,6 +575,7 @@ def test_an_interrupt_while_a_picture_is_drawn_stops_the_world_and_not_the_polic
 def test_a_policys_process_serves_other_worlds_after_one_died_in_the_middle_of_a_message(
     host_pool_of_test,
 ):
+    """A message begins with its length in 8 bytes, here 1000; only 14 bytes follow."""
     ref = read_policy("hosting_fakes:Dice")
     line = host_pool_of_test.connect()
     HostedPolicy(line, ref, 0)
@@ -623,6 +646,7 @@ class It(hostile_policies.Hostile):
 
 
 def test_a_process_that_is_starting_is_not_ended_as_frozen():
+    """After 0.01 s it cannot have answered yet."""
     starting = PolicyChild(os.environ)
 
     starting.check(0.01)
@@ -632,6 +656,11 @@ def test_a_process_that_is_starting_is_not_ended_as_frozen():
 
 
 def test_a_process_that_waits_for_a_picture_is_not_ended_as_frozen(host_pool_of_test, begun_policy):
+    """The policy adds up the pixels of a video, whose pictures are drawn when it reads them.
+
+    While one is drawn, the process is checked as if it had been silent for 10 s. It goes on: all of
+    2 * 4 * 4 * 3 pixels are 1.
+    """
     text = """
 class It(hostile_policies.Hostile):
     def reset(self, instruction, demonstration):
@@ -728,6 +757,10 @@ class It(hostile_policies.Hostile):
 
 
 def test_a_message_that_arrives_byte_by_byte_is_ended_at_the_time_limit_of_a_call(begun_policy):
+    """The policy announces 1000 bytes and sends one every 0.1 s; the call may take 0.5 s.
+
+    Would find a limit that begins anew with each byte.
+    """
     text = """
 class It(hostile_policies.Hostile):
     def reset(self, instruction, demonstration):

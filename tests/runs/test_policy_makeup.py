@@ -108,6 +108,7 @@ def test_another_policy_of_the_same_name_is_refused_or_kept_apart(
     ],
 )
 def test_what_a_policy_is_tells_it_from_others(before, now, what):
+    """`before` and `now` are two policies; `what` names the first thing in which they differ."""
     first, *_ = read_policy(before).versions.differences(read_policy(now).versions)
     assert first.what == what
 
@@ -178,6 +179,7 @@ def test_a_policy_typed_in_another_way_goes_on_in_its_run_and_is_merged_without_
 
 
 def test_a_checkpoint_folder_with_other_weights_is_another_policy(tmp_path):
+    """The configuration and the path stay the same."""
     (tmp_path / "config.json").write_text("{}")
 
     (tmp_path / "model.safetensors").write_text("weights")
@@ -189,6 +191,7 @@ def test_a_checkpoint_folder_with_other_weights_is_another_policy(tmp_path):
 
 
 def test_a_machine_of_a_cluster_with_another_checkpoint_at_the_path_is_refused(tmp_path):
+    """`versions` are those of the machine that starts the run; the agent checks them on its own."""
     file = tmp_path / "config.json"
     file.write_text("{}")
     versions = MachineVersions((read_policy(f"lerobot://{tmp_path}"),))
@@ -232,6 +235,11 @@ def test_the_order_of_options_and_the_place_of_a_file_make_no_other_policy(tmp_p
 
 
 def test_objects_of_two_classes_are_two_policies_even_if_they_declare_one_version():
+    """Two objects of one class are the same policy, one of a subclass is another.
+
+    So is one that is wrapped to know the state of the simulator.
+    """
+
     class Mine(RandomPolicy):
         version = "7"
 

@@ -98,6 +98,10 @@ def test_a_policy_that_cheats_in_vain_fails_as_any_policy(hostile_run, name):
 def test_an_honest_policy_has_the_same_outcomes_after_a_hostile_one_as_alone(
     hostile_run, tmp_path, name
 ):
+    """Each hostile policy was followed by an honest one in the same run (the name with +1).
+
+    Its outcomes are those that it has alone, and no output of the hostile one is in its log.
+    """
     folder, records = hostile_run
     plan = fake_world_plan("Dice", 2, policy_process="shared")
     alone = InProcess().run(deque(plan.jobs()), fake_world_runner(plan, tmp_path))
@@ -152,6 +156,10 @@ def test_what_a_policy_prints_is_in_the_logs_of_its_own_episodes(hostile_run):
 def test_policies_that_print_or_change_the_folder_leave_the_runs_terminal_and_folder_alone(
     tmp_path, monkeypatch, capfd
 ):
+    """Four policies print, change the folder, leave a thread behind or close their output.
+
+    Each does so in a process of its own.
+    """
     monkeypatch.chdir(tmp_path)
 
     records_of_each_policy(tmp_path / "run", ("Printer", "Wanderer", "Leaker", "Closer"))
@@ -180,6 +188,10 @@ def test_forged_replies_are_errors_of_their_episode(tmp_path, monkeypatch):
 def test_a_policy_that_leaves_processes_or_asks_much_fails_as_any_and_its_processes_end(
     tmp_path, monkeypatch, name
 ):
+    """Each process that the policy begins leaves a file named by its number in `notes`.
+
+    Within a minute after the run none of them is alive.
+    """
     notes = tmp_path / "notes"
     notes.mkdir()
     monkeypatch.setenv("HOSTILE_NOTES", str(notes))
@@ -248,6 +260,10 @@ class It:
 def test_a_policys_process_has_no_keys_or_salt_of_the_environment_unless_the_plan_names_them(
     tmp_path, monkeypatch
 ):
+    """The policy writes down what its environment has; the plan names HF_TOKEN alone.
+
+    TOKENIZERS_PARALLELISM is no secret, although TOKEN is in its name.
+    """
     for name in ("OPENAI_API_KEY", "HF_TOKEN", "AWS_ACCESS_KEY_ID", "TOKENIZERS_PARALLELISM"):
         monkeypatch.setenv(name, "secret")
     monkeypatch.setenv(SALT_VARIABLE, "a very secret salt")
@@ -284,6 +300,11 @@ def few_open_files():
 def test_an_honest_policy_plays_alike_with_a_long_path_few_files_and_a_leaking_neighbor(
     tmp_path, monkeypatch
 ):
+    """The expected records are those of the policy alone, without a process of its own.
+
+    Here temporary files lie in a folder whose path is too long for a socket, few files may be open,
+    and the policy plays after one that leaves a thread behind.
+    """
     long_folder = tmp_path / ("long" * 40)
     long_folder.mkdir()
     monkeypatch.setenv("TMPDIR", str(long_folder))

@@ -102,6 +102,7 @@ def test_a_run_does_not_go_on_with_another_checkpoint_of_its_policy(
 def test_a_run_does_not_go_on_with_a_policy_whose_version_cannot_be_read(
     write_policy_module, tmp_path
 ):
+    """The policy played an episode with version 7.0; now it raises an error in its reset."""
     write_policy_module(**NUMBER_BEHIND_TEXT)
     play_one_episode(tmp_path)
 
@@ -123,6 +124,7 @@ def test_a_version_that_is_neither_text_nor_number_is_refused(part, value):
 def test_a_policy_whose_version_differs_from_process_to_process_gets_no_verdict(
     write_policy_module, tmp_path
 ):
+    """The policy takes the number of its process for its version."""
     write_policy_module(made="self.version = os.getpid()")
     play_one_episode(tmp_path)
 
@@ -180,7 +182,10 @@ HANDS = "hands=checkpointed:Hands"
 def test_policies_without_a_version_differ_by_class_code_and_by_planner_or_hands(
     write_policy_module, tmp_path
 ):
-    """Three policies, before and after their module changed: six versions."""
+    """Three policies of a user's module declare no version: theirs follows from their code.
+
+    Each is opened before and after a line was added to the module, which gives six versions.
+    """
     write_policy_module()
     file = tmp_path / "checkpointed.py"
     file.write_text(file.read_text() + CODE_OF_POLICIES_WITHOUT_A_VERSION)

@@ -43,9 +43,10 @@ def seeds_of(episodes, task, split):
 
 
 def test_each_salt_draws_episodes_of_its_own_that_are_in_no_public_split():
-    """A salt is a secret text from which the scenes' seeds of a private split follow.
+    """Two salts, all tasks, four episodes each: no seed is drawn twice, and none is a public one.
 
-    No public seed is as large: 10,000,000 + 100 for each of a million episodes.
+    A salt is a secret text from which the seeds of a private split follow. Public seeds are below
+    10,000,000 + 100 * 1,000,000, far less than 2^40.
     """
     seeds = []
     for salt in (SALT, OTHER):
@@ -59,6 +60,7 @@ def test_each_salt_draws_episodes_of_its_own_that_are_in_no_public_split():
 
 
 def test_a_salt_draws_the_same_episodes_again_after_another_was_used():
+    """A salt is a secret text, from which the seeds of the scenes follow, here of four episodes."""
     split = use_salt(SALT)
     seeds = seeds_of(4, "PickXtimes", split)
     use_salt(OTHER)
@@ -74,6 +76,7 @@ def test_a_private_split_has_as_many_episodes_as_the_random_one():
 
 
 def test_the_name_and_episodes_of_a_salt_never_change():
+    """Stored values: whoever has a salt can verify a run that was made with it before."""
     assert use_salt("pinned-salt-0123") == "random@9be1761e24b2"
     seeds = seeds_of(2, "PickXtimes", "random@9be1761e24b2")
     assert seeds == [343211101013922, 319322239144157]
@@ -109,6 +112,7 @@ def test_a_private_episode_takes_the_first_seed_for_which_a_scene_can_be_made():
 
 @pytest.mark.parametrize("salt", ["", OTHER])
 def test_a_private_split_is_refused_without_its_salt_or_with_another(monkeypatch, salt):
+    """So are its episodes and a plan of them; the messages name the variable and the split."""
     split = use_salt(SALT)
 
     monkeypatch.setenv(SALT_VARIABLE, salt)

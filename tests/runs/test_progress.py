@@ -35,7 +35,7 @@ def printed_report(records, *, terminal):
 
 
 def test_a_terminal_sees_pace_time_left_and_score_in_80_columns():
-    """Of direct one of two was a success, of explicit both."""
+    """Two of six episodes were stored; of the four played, direct wins one of two, explicit both"""
     text = printed_report(FOUR_RECORDS, terminal=True)
 
     last = text[text.rindex("episodes") :]
@@ -46,6 +46,10 @@ def test_a_terminal_sees_pace_time_left_and_score_in_80_columns():
 
 
 def test_outside_a_terminal_each_episode_is_reported_in_one_plain_line():
+    """Two of six episodes were stored before, so the first that is played is number 3.
+
+    No line has a code that controls a terminal (escape).
+    """
     lines = printed_report(FOUR_RECORDS, terminal=False).splitlines()
 
     assert lines[0] == "2 of 6 episodes already stored."
@@ -70,7 +74,11 @@ def lines_of_six_episodes(workers):
 
 
 def test_the_time_left_is_estimated_from_the_fifth_episode_of_a_run_on():
-    """One worker has 35 and then 34 episodes left to play."""
+    """Of 44 episodes 4 are stored; each of the next takes 100 s, played by one worker.
+
+    After the fifth 35 are left, 3,500 s or 0:58:20, after the sixth 34. Before, nothing is
+    estimated.
+    """
     lines = lines_of_six_episodes(1)
 
     assert all(line.endswith("(-:--:-- left)") for line in lines[:4])
@@ -78,12 +86,15 @@ def test_the_time_left_is_estimated_from_the_fifth_episode_of_a_run_on():
 
 
 def test_of_several_workers_the_rest_takes_as_many_rounds_as_each_has_to_play():
-    """Eight workers play 35 episodes in five rounds, of which the last plays three."""
+    """Eight workers play 35 episodes in five rounds of 100 s, of which the last plays three."""
     assert lines_of_six_episodes(8)[4].endswith("(0:08:20 left)")
 
 
 def test_if_nobody_knows_how_many_workers_there_are_the_pace_goes_on(monkeypatch):
-    """An episode of 100 s ended every 50 s, so two were played side by side: 18 rounds."""
+    """An episode of 100 s ended every 50 s, so two were played side by side: 35 take 18 rounds.
+
+    The clock is replaced by one that goes on by 50 s each time that it is asked.
+    """
     clock = itertools.count(0, 50)
     monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=clock.__next__))
 

@@ -126,6 +126,7 @@ def test_each_episode_is_counted_by_its_own_words_and_its_policys_limit():
     ],
 )
 def test_a_share_of_cut_prompts_is_a_range_if_some_are_unknown(counts, text):
+    """1 of 4 is cut, 25 %; if one more may be, it is 25 to 50 %."""
     assert share_text(Counter(counts)) == text
 
 
@@ -142,7 +143,10 @@ def test_utterances_of_the_same_step_are_sent_as_one_message(utterances, steps, 
 
 
 def test_an_instruction_too_long_as_one_prompt_fits_if_it_comes_in_turns():
-    """Each message may have 64 tokens."""
+    """The model reads 64 tokens; the instruction has more, but each of its messages has fewer.
+
+    *cut* is a prompt of which the model loses the end, *heard* one that it reads whole.
+    """
     _, at_once = audit_job(job_with(**LONG_INSTRUCTION), LIMIT_OF_64_TOKENS)
     audit, in_turns = audit_job(job_with(**LONG_INSTRUCTION, delivery="turns"), LIMIT_OF_64_TOKENS)
 
@@ -159,6 +163,7 @@ def record_of_cut_prompt():
 
 
 def test_a_record_notes_how_many_tokens_a_cut_prompt_needed(record_of_cut_prompt):
+    """The model reads 64 tokens; its tokenizer is known, so least and most needed are equal."""
     audit = record_of_cut_prompt.prompt
 
     assert record_of_cut_prompt.prompt_verdict == "cut"
@@ -223,6 +228,11 @@ SERVER_WITH_64_TOKENS = read_policy("openpi://localhost:1?prompt_tokens=64&conne
 
 
 def test_long_prompts_refuse_ends_an_episode_before_it_costs_anything(tmp_path):
+    """The instruction has more than the 64 tokens that the model on the server reads.
+
+    The episode ends as an error before the world is made (no time for `env_reset`) and before the
+    server is asked: nobody listens there, which would be another error.
+    """
     job = job_with(**LONG_INSTRUCTION, ref=SERVER_WITH_64_TOKENS)
 
     record = EpisodeRunner(tmp_path, refuse_long=True)(job)
@@ -268,6 +278,7 @@ def test_of_a_tokenizer_that_is_a_pipe_the_policy_and_the_file_are_named(tmp_pat
 
 
 def test_a_dry_run_prints_the_share_of_cut_prompts_and_the_policies_without_a_limit(tmp_path):
+    """The one policy reads 64 tokens and all of its prompts are cut; the other tells no limit."""
     printed = call(
         "run", "--dry-run", "--out", tmp_path, "--tasks", "PickXtimes",
         "--policy", "system:pi0.5", "--policy", "far=openpi://localhost:1",

@@ -56,7 +56,12 @@ def cluster():
 def test_a_cluster_that_loses_a_machine_half_way_gives_the_same_records_as_one_process(
     cluster, tmp_path, records_of_one_process
 ):
-    """Three machines; the episodes from number 2 on wait for a gate that opens after the loss."""
+    """Of three machines one is taken away while each has an episode in hand.
+
+    The episodes from number 2 on wait for a gate, the file `gate`, which opens after the loss. The
+    lost episode is tried again (three tries are allowed), so there are more lines than records; the
+    records equal those of a run in one process.
+    """
     doomed = cluster.add_node(num_cpus=1)
     cluster.add_node(num_cpus=1)
     ray.init(address=cluster.address, log_to_driver=False)

@@ -130,6 +130,10 @@ def test_a_worker_or_machine_that_freezes_is_ended_and_its_episode_played_elsewh
 
 
 def test_a_run_waits_for_a_free_machine_and_uses_one_that_joins_later(tmp_path, monkeypatch):
+    """A cluster starts without a CPU; after the first warning a machine with one joins it.
+
+    Warnings come after two seconds here. In the end all 16 episodes are stored.
+    """
     from ray.cluster_utils import Cluster
 
     nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
@@ -195,6 +199,11 @@ def test_a_variable_for_workers_that_is_not_set_here_is_refused(cluster, tmp_pat
 def test_a_run_that_loses_the_head_of_its_cluster_ends_in_one_sentence_and_keeps_its_records(
     cluster, tmp_path, monkeypatch
 ):
+    """After four records the process that controls the cluster is killed; later episodes wait.
+
+    The run notices within 5 seconds here and says that the same command goes on. Each line of the
+    file is a record that can be read, at least the four.
+    """
     monkeypatch.setattr(ray_head, "HEAD_LOST_S", 5.0)
     gcs = cluster.head_node.all_processes["gcs_server"][0].process.pid
 

@@ -35,6 +35,12 @@ class KeepsWords:
 
 @pytest.mark.sim
 def test_a_users_policy_behind_a_rewriter_has_a_process_of_its_own_and_hears_the_explicit_command():
+    """The job asks in the setting *direct*, but a rewriter states the explicit command instead.
+
+    The user's policy notes in its metadata what it heard and in which process. The version is
+    *built-in* for the rewriter and *v7* for the policy; only a rewriter that knows the declared
+    meaning makes the pair privileged.
+    """
     job = Job(
         policy=SPEC,
         ref=open_policy(read_policy(SPEC)),

@@ -188,6 +188,7 @@ def test_a_plan_may_prescribe_the_frames_of_the_video(record_of_episode):
 
 
 def test_a_policy_that_wants_other_actions_than_the_plan_prescribes_is_an_error(record_of_episode):
+    """The policy answers with joint angles; the plan asks for poses of the hand."""
     job = replace(JOB, environment=EnvironmentOptions(actions="ee_pose"))
 
     record = record_of_episode(FakeWorld(), FakePolicy(), job)
@@ -281,6 +282,7 @@ def test_metadata_of_a_policy_are_stored_as_json(record_of_episode, value, store
 def test_metadata_that_json_cannot_hold_are_an_error_that_names_their_key(
     record_of_episode, value, sentence
 ):
+    """The value stands two levels deep in what the policy says of itself."""
     policy = FakePolicy()
     policy.metadata = {"deep": {"value": value}}
 
@@ -300,6 +302,7 @@ def test_metadata_that_json_cannot_hold_are_an_error_that_names_their_key(
 def test_an_exception_in_the_world_ends_the_episode_as_an_error_of_the_environment(
     record_of_episode, trouble, cause
 ):
+    """The world raises `trouble`; the cause names it, with this file and the line."""
     world = FakeWorld()
     world.trouble = trouble
 
@@ -327,6 +330,10 @@ def test_ctrl_c_in_a_policy_stops_the_run_and_is_no_error_of_the_episode(record_
 def test_a_video_is_kept_of_all_episodes_or_of_failures_alone_as_asked(
     give_world_and_policy, tmp_path, mode, status, kept
 ):
+    """`mode` says which videos are wanted, `status` how the world of five steps ended.
+
+    A kept video has two files, the film and its title picture, and the record names the film.
+    """
     give_world_and_policy(FakeWorld(5, status), FakePolicy())
 
     record = EpisodeRunner(tmp_path, mode)(JOB)
@@ -350,7 +357,11 @@ class FullDiskContainer:
 def test_a_full_disk_costs_the_video_but_not_the_verdict(
     give_world_and_policy, monkeypatch, tmp_path, frame_number
 ):
-    """From a frame on nothing can be written."""
+    """From a frame on nothing can be written.
+
+    The container that the writer writes to is replaced by one that fails as a full disk does. The
+    episode of five steps is won all the same; it has no video, and the record says why.
+    """
     encode_frame = VideoWriter._encode
     frames = itertools.count()
 
@@ -496,9 +507,9 @@ JOB_IN_TURNS = JOB.with_options(setting="contextual", delivery="turns")
 
 @pytest.mark.parametrize("policy_class", [FakePolicy, NotesWhatItHears])
 def test_a_record_has_the_step_at_which_each_utterance_was_heard(policy_class, record_of_episode):
-    """Four of five utterances come at steps 0, 3, 6 and 6; the fifth never (None).
+    """Four of five utterances come at steps 0, 3, 6 and 6 of ten; the fifth never (None).
 
-    Whether the policy has a method hear() or not.
+    The record has them whether the policy has a method hear() or not.
     """
     world = SpeakingWorld((0, 3, 6, 6), length=10)
 
@@ -513,7 +524,11 @@ def test_a_record_has_the_step_at_which_each_utterance_was_heard(policy_class, r
 def test_a_policy_hears_the_first_utterance_in_its_reset_and_the_others_with_their_steps(
     record_of_episode,
 ):
-    """The reset also has the video, of 3 steps. Each later utterance is noted as text and step."""
+    """The policy notes what it gets: the first utterance and the length of the video, 3 steps.
+
+    Then each later utterance and its step, 3, 6 and 6; the fifth never comes. Its metadata are the
+    number of notes, 8.
+    """
     world = SpeakingWorld((0, 3, 6, 6), length=10)
     policy = NotesWhatItHears()
 
@@ -525,6 +540,7 @@ def test_a_policy_hears_the_first_utterance_in_its_reset_and_the_others_with_the
 
 
 def test_a_policy_without_a_method_hear_gets_the_first_utterance_alone(record_of_episode):
+    """It notes that and the length of the video, 3 steps; others come at steps 3 and 6."""
     world = SpeakingWorld((0, 3, 6, 6), length=10)
     policy = FakePolicy()
 

@@ -75,6 +75,7 @@ def records_of_an_uninterrupted_run(tmp_path_factory):
 def test_a_killed_run_goes_on_with_the_same_command_and_has_the_same_records_in_the_end(
     tmp_path, records_of_an_uninterrupted_run
 ):
+    """A run of 16 episodes is killed after at least three; the same command plays the rest."""
     child = begun_run(tmp_path, workers=2)
     child.send_signal(signal.SIGKILL)
     child.wait()
@@ -103,6 +104,11 @@ def test_a_line_that_a_kill_cut_off_is_set_aside_and_its_episode_played_again(tm
 def test_ctrl_c_or_sigterm_ends_the_workers_and_keeps_the_records_of_ended_episodes(
     tmp_path, number, records_of_an_uninterrupted_run
 ):
+    """A run of 16 episodes in a process of its own gets a signal after at least three.
+
+    No worker stays alive, and the same command then plays the rest with the same records in the
+    end.
+    """
     child = begun_run(tmp_path)
 
     child.send_signal(number)
@@ -174,6 +180,7 @@ def test_a_run_may_be_repeated_with_more_episodes_in_its_folder(tmp_path):
 
 
 def test_what_a_repeated_run_with_fewer_episodes_leaves_out_is_kept_and_not_missing(tmp_path):
+    """Four episodes are played in two settings each (8 records), then one is asked for (2)."""
     fake_run(tmp_path, small_plan(episodes=4))
 
     fewer = fake_run(tmp_path, small_plan(episodes=1))
@@ -206,6 +213,11 @@ def test_what_a_repeated_run_with_fewer_episodes_leaves_out_is_kept_and_not_miss
 def test_a_run_does_not_go_on_in_a_folder_with_results_of_other_scenes_words_or_versions(
     tmp_path, name, value, sentence
 ):
+    """The folder holds two records; in the second one field differs from what would be played now.
+
+    The first fits and ended in an error, so that all have to be compared. Nothing is played, and no
+    plan is written.
+    """
     played, fine = map(FakePlay(), small_plan(1).jobs())
     is_policy = name == "policy_version"
     record = with_version(played, "old") if is_policy else replace(played, **{name: value})
@@ -220,6 +232,7 @@ def test_a_run_does_not_go_on_in_a_folder_with_results_of_other_scenes_words_or_
 
 
 def test_a_line_that_was_cut_off_is_reported_before_an_episode_is_played(tmp_path):
+    """The cut line has 22 bytes. One warning comes first, then the progress of two episodes."""
     (tmp_path / RECORDS_FILE).write_bytes(b'{"policy":"random","ta')
     reporter = mock.Mock(spec=Reporter)
 
@@ -273,6 +286,8 @@ def test_a_negative_number_of_workers_is_refused():
     [("environment_version", 7, "environment"), ("words", OTHER_WORDS, "words")],
 )
 def test_a_record_that_a_worker_of_another_version_made_is_not_stored(tmp_path, field, value, what):
+    """The record differs in one field, as if a worker had another version of this package."""
+
     def play_elsewhere(job):
         return replace(FakePlay()(job), **{field: value})
 

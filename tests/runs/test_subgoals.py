@@ -20,7 +20,6 @@ from roboirg.records.record import Job, SubgoalRecord
 from roboirg.records.record_codec import StoreError, encode, read_record
 from roboirg.runs.play.rollout import EpisodeRunner
 
-SUBGOALS_TABLE = ("tables", "--which", "subgoals", "--format", "markdown")
 JOB = Job(
     policy="random",
     ref=read_policy("random"),
@@ -40,6 +39,10 @@ THREE_SUBGOALS = (
 )  # fmt: skip
 
 
+def printed_subgoals_table(run):
+    return call("tables", "--which", "subgoals", "--format", "markdown", run)
+
+
 @pytest.mark.parametrize("subgoal", [3, b"pick", ["pick"], "x" * 301, "a\nb", "\x1b[2J", "\ud800"])
 def test_a_subgoal_that_is_no_short_printable_text_is_refused(subgoal):
     with pytest.raises(InvalidValueError, match="The policy's subgoal"):
@@ -55,12 +58,14 @@ def test_a_policy_may_name_no_subgoal_or_one_of_up_to_300_characters(fields, sub
 
 
 def test_subgoals_are_read_back_from_a_record():
+    """Three subgoals: one of a wrong thing with a point, one that was right, one not understood."""
     record = make_record(JOB, "failure", "no", subgoals=THREE_SUBGOALS)
 
     assert read_record(encode(record), Path("r"), 1).subgoals == THREE_SUBGOALS
 
 
 def test_a_record_with_a_subgoal_of_more_than_300_characters_is_refused():
+    """Such a record can be written, but is not read again; the message names the field `text`."""
     long = replace(THREE_SUBGOALS[0], text="x" * 301)
     record = make_record(JOB, "failure", "no", subgoals=(long,))
 
@@ -77,34 +82,39 @@ def test_the_page_shows_which_subgoals_were_wrong_or_unreadable():
 
 
 def test_the_table_counts_which_subgoals_were_right_wrong_or_unreadable(tmp_path):
-    """Of three one was right, one named a wrong thing, and one could not be understood.
+    """Of three subgoals one was right, one named a wrong thing, one could not be understood.
 
-    Then the means of two episodes: (3 + 1) / 2 calls, 6.5 / 2 seconds until the answer, 2.25 / 2
-    seconds of waiting.
+    These are the first, second and last of the counts. Then the means of two episodes: (3 + 1) / 2
+    = 2 calls, 6.5 / 2 = 3.25 seconds until the answer, 2.25 / 2 = 1.12 seconds of waiting.
     """
     spent = {"calls": 3.0, "answered_s": 6.5, "waited_s": 2.25}
     record = make_record(JOB, "failure", "no", subgoals=THREE_SUBGOALS, usage=spent)
     other = make_record(replace(JOB, episode=1), "failure", "no", usage={"calls": 1.0})
 
-    printed = call(*SUBGOALS_TABLE, fill(tmp_path, record, other))
+    printed = printed_subgoals_table(fill(tmp_path, record, other))
 
     counts = "| 3 | 1 (33 %) | 1 (33 %) | 0 (0 %) | 0 (0 %) | 1 (33 %) |"
     assert f"{counts} 2 | 3.25 | 1.12 |" in printed
 
 
 def test_the_table_has_unknown_costs_where_a_service_did_not_report_all_of_them(tmp_path):
-    """It did in direct; in contextual one of two episodes lacks output tokens and costs."""
+    """In direct the one episode tells its calls, tokens and US$; they are printed in this order.
+
+    In contextual one of two lacks output tokens and costs: these means are unknown, but that of the
+    input tokens is (8 + 4) / 2 = 6.
+    """
     known = {"calls": 1.0, "input_tokens": 8.0, "output_tokens": 2.0, "cost_usd": 0.5}
     partly = {"calls": 1.0, "input_tokens": 4.0}
-    for setting, episode, usage in (
-        ("direct", 0, known),
-        ("contextual", 0, known),
-        ("contextual", 1, partly),
+    direct = replace(JOB, options=InstructionOptions("direct"))
+    contextual = replace(JOB, options=InstructionOptions("contextual"))
+    for job, usage in (
+        (direct, known),
+        (contextual, known),
+        (replace(contextual, episode=1), partly),
     ):
-        job = replace(JOB, episode=episode, options=InstructionOptions(setting))
         fill(tmp_path, make_record(job, "failure", "no", subgoals=THREE_SUBGOALS, usage=usage))
 
-    printed = call(*SUBGOALS_TABLE, tmp_path)
+    printed = printed_subgoals_table(tmp_path)
 
     assert "| 1 | 8 | 2 | 0.5 |" in printed
     assert "| 1 | 6 | unknown | unknown |" in printed

@@ -148,6 +148,7 @@ def test_waiting_in_a_queue_does_not_count_for_the_time_limit_of_a_call(clock):
 
 
 def test_waiting_for_a_reply_counts_for_the_time_limit_of_a_call(clock):
+    """The limit is 10 s; the clock, which the fixture replaces, goes on by 10.1 s."""
     board = watchdog.Watchdog()
     board.write("policy's reset()", 10.0)
     board.write_wait(Wait("the reply of a server", is_queue=False, since=clock.now))
@@ -158,6 +159,10 @@ def test_waiting_for_a_reply_counts_for_the_time_limit_of_a_call(clock):
 
 
 def test_waiting_in_a_queue_does_not_count_for_the_time_of_an_episode(clock):
+    """The clock of the watchdog goes on by 1000 s while the episode waits for a free server.
+
+    These are taken off the time of the worker, whose own clock stands still here: less than 0.
+    """
     worker = object.__new__(Worker)
     worker.watchdog = watchdog.Watchdog()
     worker.child = SimpleNamespace(send=str)
@@ -170,6 +175,7 @@ def test_waiting_in_a_queue_does_not_count_for_the_time_of_an_episode(clock):
 
 
 def test_the_next_episode_of_a_worker_begins_with_no_time_in_a_queue(clock):
+    """The episode before waited 1000 s for a free server."""
     worker = object.__new__(Worker)
     worker.watchdog = watchdog.Watchdog()
     worker.child = SimpleNamespace(send=str)
@@ -203,6 +209,7 @@ def test_drawing_has_a_time_limit_of_its_own_120_s():
 
 
 def test_a_record_has_the_time_in_a_queue_apart_from_the_time_of_the_call():
+    """A call waits 0.3 s in a queue; earlier calls waited 5 s."""
     timings = {"policy_queue": 5.0}  # of earlier calls
     guard = CallGuard(timings, None)
 
@@ -216,6 +223,7 @@ def test_a_record_has_the_time_in_a_queue_apart_from_the_time_of_the_call():
 
 
 def test_a_worker_whose_episode_takes_too_long_is_killed():
+    """It sleeps for an hour: within a limit of an hour it goes on, beyond one of 0 s it dies."""
     worker = Worker(sleeps_for_an_hour, small_plan(1).jobs()[0])
     assert worker.poll(episode_timeout_s=3600) is None
 

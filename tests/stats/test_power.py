@@ -29,7 +29,9 @@ def test_the_chance_to_find_a_gap_in_six_episodes_is_the_one_computed_by_hand(
 ):
     """Of six episodes all must differ to one side (p = 2 / 2^6 = 1/32); five can never do (1/16).
 
-    `discordance` is the share of episodes that differ at all.
+    `discordance` is the share of episodes that differ at all. With a gap of 0.5 and discordance 1,
+    an episode goes to one side with 3/4 and to the other with 1/4; with discordance 0.5 all go to
+    one side, if they differ.
     """
     assert mcnemar_power(episodes, gap, discordance) == pytest.approx(power)
 
@@ -59,7 +61,10 @@ def test_the_computed_power_is_the_share_of_simulated_studies_that_find_the_gap(
 def test_the_number_of_episodes_given_for_a_gap_finds_it_in_80_percent_and_half_does_not(
     share, discordance
 ):
-    """If even the most episodes do not find it, no number is given."""
+    """For any gap: the power is 0.8 or more with the number that is given, less with half of it.
+
+    If none is given, even `MAX_EPISODES` do not find the gap.
+    """
     gap = share * discordance
 
     needed = episodes_needed(gap, discordance)
@@ -84,9 +89,11 @@ def test_the_smallest_gap_that_50_episodes_can_find_is_exact_to_a_thousandth():
 
 
 def test_five_episodes_find_no_gap():
+    """If all five go to one side, p is still 2 / 2^5 = 0.0625, above 0.05."""
     assert smallest_gap(5, discordance=0.5) is None
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.0001])
 def test_no_number_of_episodes_finds_a_gap_of_nearly_0(gap):
+    """30 % of episodes differ; a gap of 0.01 points takes more than the most episodes."""
     assert episodes_needed(gap, discordance=0.3) is None

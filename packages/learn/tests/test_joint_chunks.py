@@ -90,7 +90,11 @@ VIDEO_OF_TEN_STEPS = {
 
 @pytest.mark.sim
 def test_an_unreachable_waypoint_becomes_eight_steps_of_waiting():
-    """It is two meters away; to wait is to stay at the joint angles with the gripper open."""
+    """The waypoint is two meters away in each direction, where the arm cannot reach.
+
+    To wait is to stay at the home joint angles with the gripper open (1), for the eight steps of a
+    chunk.
+    """
     far = np.array([[2.0, 2.0, 2.0, np.pi, 0.0, 0.0, 0.0]])
     chunks = JointChunks(PolicyWithFixedWaypoints([far]))
     chunks.reset("wait", VIDEO_OF_TEN_STEPS)
@@ -101,7 +105,11 @@ def test_an_unreachable_waypoint_becomes_eight_steps_of_waiting():
 @pytest.mark.sim
 @pytest.mark.parametrize("drawn", [np.arange(10), np.arange(0, 10, 8)], ids=["all", "every 8th"])
 def test_every_eighth_frame_of_a_video_is_passed_on(drawn):
-    """With the pose of the tool at each of its ten steps."""
+    """Of ten steps these are frames 0 and 8, whether all were drawn or only every eighth.
+
+    A frame is its number here. The pose of the tool (position and rotation, 6 numbers) is passed on
+    for each of the ten steps.
+    """
     policy = PolicyWithFixedWaypoints([])
 
     JointChunks(policy).reset("wait", {**VIDEO_OF_TEN_STEPS, "front_rgb": drawn})

@@ -37,6 +37,7 @@ def test_learned_policies_without_pytorch_fail_with_the_command_to_install_it(mo
 
 
 def test_learning_without_pytorch_fails_with_the_command_to_install_it(monkeypatch, tmp_path):
+    """None in the place of the module makes its import fail, as if it were not installed."""
     monkeypatch.setitem(sys.modules, "torch", None)
 
     done = CliRunner().invoke(app, ["learn", "listener", "--out", str(tmp_path / "new")])
@@ -201,6 +202,7 @@ def trained_listener(torch, tmp_path_factory):
 def test_a_trained_listener_understands_stopcube_also_after_loading(
     trained_listener, ordinal, visit
 ):
+    """It was trained on StopCube; the ordinal, such as *second*, names the visit to stop at."""
     from roboirg_learn.listener.learned_model import load_model
 
     model, path = trained_listener
@@ -244,6 +246,7 @@ def test_training_sentences_by_place_cover_several_goals_of_a_scene(torch):
 
 
 def test_training_on_a_task_that_no_sentence_speaks_of_is_refused(torch, monkeypatch):
+    """The training sentences are replaced by a single one, which is of VideoUnmask."""
     from roboirg_learn.listener import reader_training
     from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.listener.reader_training import check_reader
@@ -257,6 +260,10 @@ def test_training_on_a_task_that_no_sentence_speaks_of_is_refused(torch, monkeyp
 
 @pytest.mark.sim
 def test_a_trained_listener_plays_an_episode_with_the_oracle_s_hands(trained_listener):
+    """It understands the episode's own goal and answers with actions of eight numbers.
+
+    It is privileged, as the hands know the state of the simulator.
+    """
     import roboirg
 
     _, path = trained_listener
@@ -403,6 +410,7 @@ def test_the_study_writes_every_listener_its_answers_and_tables(short_study):
 
 @pytest.mark.sim
 def test_a_study_trains_again_only_the_listener_that_is_lost(short_study):
+    """One listener of the study is deleted; running it again writes this one and its answers."""
     folder, run = short_study
     times = {path: path.stat().st_mtime_ns for path in folder.glob("*-?.*")}
     text = (folder / "study.md").read_text()

@@ -51,6 +51,7 @@ SHIPPED = PolicyFiles(
     ],
 )
 def test_a_wrong_name_of_a_learned_policy_is_refused_with_the_reason(spec, words):
+    """A policy is named by a scheme, a file and options, as in ``trained:BODY?reader=FILE``."""
     pytest.importorskip("torch")
     with pytest.raises(InvalidValueError, match=words):
         make_policy(spec, 0)
@@ -58,6 +59,7 @@ def test_a_wrong_name_of_a_learned_policy_is_refused_with_the_reason(spec, words
 
 @pytest.mark.sim
 def test_the_waypoint_expert_solves_an_episode():
+    """The expert knows the goal and moves by waypoints; policies learn from its recordings."""
     env = make(get_episode("PickXtimes", "train", 0), actions="waypoint", cameras=())
     assert play(env, WaypointExpert())["status"] == "success"
 
@@ -79,16 +81,24 @@ def test_the_expert_succeeds_although_its_motion_is_disturbed(recorded):
 
 @pytest.mark.sim
 def test_recorded_waypoints_at_an_object_are_exact_though_the_motion_was_disturbed(recorded):
-    """Those of the expert: within 2 cm of the object's place."""
-    for decision in decisions_of(recorded):
-        if decision.move.at_object:
-            x, y, *_ = recorded.things[decision.look, decision.object_number]
-            action = recorded.actions[recorded.looks.tolist().index(decision.look)]
-            assert np.hypot(action[0] - x, action[1] - y) < 0.02, decision
+    """`recorded` is an episode of the expert, in which the arm was pushed off its way.
+
+    Of all waypoints that go to an object, x and y lie within 2 cm of the object's place at that
+    look: what is learned is where the expert wanted to go, not where it was pushed.
+    """
+    looks = recorded.looks.tolist()
+    at_objects = [decision for decision in decisions_of(recorded) if decision.move.at_object]
+
+    assert at_objects
+    for decision in at_objects:
+        x, y, *_ = recorded.things[decision.look, decision.object_number]
+        action = recorded.actions[looks.index(decision.look)]
+        assert np.hypot(action[0] - x, action[1] - y) < 0.02, decision
 
 
 @pytest.mark.sim
 def test_recorded_grasps_are_of_the_containers_over_the_goal_s_cubes(recorded):
+    """The goal names colors of cubes, each hidden by a container; a move that aligns is a grasp."""
     episode = get_episode("ButtonUnmask", "random", 0)
 
     grasped = set()
@@ -124,7 +134,12 @@ def recording_with_actions(actions, looks):
 
 
 def test_a_repeated_waypoint_is_labeled_with_the_gripper_command_that_follows():
-    """Actions are x, y, z, roll, pitch, yaw and gripper; -1 closes it."""
+    """The hand goes above, down, down again, closes, and goes up: five looks, 0 to 4.
+
+    Waypoints are x, y, z, roll, pitch, yaw and gripper (-1 closes). Going down, down again and
+    closing have the same place: the two that go down are labeled with the closing that follows,
+    which is no decision of its own. So four are left.
+    """
     down = [0, 0, 0.02, 0, 0, 0, 0]
     close = [0, 0, 0.02, 0, 0, 0, -1]
     above = [0, 0, 0.15, 0, 0, 0, 0]
@@ -136,7 +151,11 @@ def test_a_repeated_waypoint_is_labeled_with_the_gripper_command_that_follows():
 
 
 def test_passes_of_a_moving_cube_over_its_target_are_counted_at_each_look():
-    """It moves along x, back and forth, with the target at 0."""
+    """The cube moves along x: -3, -1, 2, 1, -1, with the target at 0.
+
+    It passes between the second and third look, and back between the last two. Without a moving
+    cube nothing is counted.
+    """
     recorded = recording_with_actions([np.zeros(7)], [4])
     assert (passes_so_far(recorded) == NO_LABEL).all()
     things = np.zeros((5, 2, 4))
@@ -215,9 +234,11 @@ def trainer(recorded, out):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_moved_and_mirrored_pictures_keep_their_labels(seed):
-    """The one white pixel of the picture is the labeled object, turned by 0.2 rad.
+    """A picture is moved and perhaps mirrored at random; its label has to follow.
 
-    It stands on the left, so that a mirrored picture has it on the right.
+    The one white pixel is the labeled object, turned by 0.2 rad. It stands on the left, column 50
+    of 256, so that a mirrored picture has it on the right, beyond 128, with the turn reversed. The
+    middle of a pixel is half a pixel from its corner.
     """
     pytest.importorskip("torch")
     from roboirg_learn.policy.object_detector import LabeledPicture, augmented
@@ -237,6 +258,7 @@ def test_moved_and_mirrored_pictures_keep_their_labels(seed):
 
 @pytest.mark.sim
 def test_a_recording_notes_how_many_stages_are_done(recorded):
+    """It begins with none, never falls, and ends with all stages or all but the last."""
     stages = len(get_episode("ButtonUnmask", "random", 0).stages)
 
     assert recorded.done[0] == 0
@@ -259,6 +281,7 @@ def test_a_recording_notes_which_objects_are_visible(recorded):
 
 @pytest.mark.sim
 def test_a_recording_is_read_as_it_was_written(recorded, tmp_path):
+    """A file that is cut off after 100 bytes is refused, with what to do."""
     path = tmp_path / "one.npz"
     save_recording(recorded, path)
     for name, value in load_recording(path)._asdict().items():
@@ -453,6 +476,11 @@ def folder_of_policy(tmp_path_factory):
 def test_the_command_learn_makes_a_policy_that_plays_from_pictures_alone(
     folder_of_policy, tmp_path
 ):
+    """The fixture holds the folder of a policy that `learn policy` trained in two short passes.
+
+    It is not privileged, runs in a process of its own, and plays one episode in two settings
+    without an error. The curve has a line for each pass.
+    """
     spec = PolicyFiles(folder_of_policy[0] / BODY, folder_of_policy[0] / READER).spec
     assert (read_policy(spec).is_privileged, read_policy(spec).is_hosted) == (False, True)
     assert read_policy(spec).needs.trained_tasks == ("ButtonUnmask",)
@@ -476,22 +504,27 @@ def test_the_command_learn_makes_a_policy_that_plays_from_pictures_alone(
 @pytest.mark.sim
 @pytest.mark.slow
 def test_learning_again_reuses_files_and_refuses_those_of_another_plan(folder_of_policy):
-    place, (*call, plan) = folder_of_policy
+    """A folder that was learned in is given again: with other tasks, plan or passes it is refused.
+
+    With the same plan but no memory a second body is made next to the first, and no file of the
+    first is written again (all times of change stay).
+    """
+    place, call = folder_of_policy
+    plan = call[-1]
+    here = ["--out", place]
     before = {path: path.stat().st_mtime_ns for path in place.rglob("*.*")}
-    for options, words in (
-        (["--tasks", "PickXtimes", *call[4:], plan, "--memory", "none"], "recordings with tasks"),
-        ([*call[2:-1], "--memory", "none"], "recordings with drawn 2, not 300"),
-        (
-            [*call[2:], plan_file(training=SHORT_TRAINING | {"body_epochs": 3})],
-            "was trained by another plan",
-        ),
-    ):
-        assert words in error_of_learning(*options)
 
-    other = ["--body", place / BODY, "--out", place / "new", "--tasks", "BinFill"]
-    assert "no task of this body 'BinFill'" in error_of_learning(*other, what="reader")
+    other_task = ["--tasks", "PickXtimes", *here, "--plan", plan, "--memory", "none"]
+    assert "recordings with tasks" in error_of_learning(*other_task)
+    usual_plan = ["--tasks", "ButtonUnmask", *here, "--memory", "none"]
+    assert "recordings with drawn 2, not 300" in error_of_learning(*usual_plan)
+    three_passes = plan_file(training=SHORT_TRAINING | {"body_epochs": 3})
+    more_passes = ["--tasks", "ButtonUnmask", *here, "--plan", three_passes]
+    assert "was trained by another plan" in error_of_learning(*more_passes)
+    other_reader = ["--body", place / BODY, "--out", place / "new", "--tasks", "BinFill"]
+    assert "no task of this body 'BinFill'" in error_of_learning(*other_reader, what="reader")
 
-    done = CliRunner().invoke(app, [*call, plan, "--memory", "none", "--settings", "none"])
+    done = CliRunner().invoke(app, [*call, "--memory", "none", "--settings", "none"])
     assert done.exit_code == 0, done.output
     assert (place / "none-0.body.safetensors").exists()
     assert (place / "none-0.reader.safetensors").exists()
@@ -569,6 +602,7 @@ def test_the_command_printed_after_training_is_a_valid_run(capsys):
 def test_wrong_options_for_training_a_reader_are_refused_before_anything_is_written(
     options, words, tmp_path
 ):
+    """The options replace good ones; the message names the wrong one, and nothing is written."""
     given = ["--body", SHIPPED.body, "--out", tmp_path / "a", *options]
     assert words in error_of_learning(*given, what="reader")
     assert not list(tmp_path.iterdir())
@@ -620,6 +654,7 @@ def test_a_reader_trained_for_other_objects_or_goals_is_refused_by_a_body(
 
 
 def test_a_reader_trained_for_the_objects_and_goals_of_a_body_fits_it(shipped_body, tmp_path):
+    """The same objects, tasks and parts of goals in the same order."""
     goals = shipped_body.goals
 
     policy = policy_with_reader(

@@ -34,6 +34,7 @@ MEMORIES = sorted(set(body_net.MEMORIES) - {HANDS, *PLANNERS})
 
 
 def batch_of(seed, decisions=(3, 7)):
+    """Return one drawn episode of twelve looks, with decisions at some of them."""
     rng = np.random.default_rng(seed)
     shape = (1, LOOKS, THINGS)
 
@@ -74,7 +75,11 @@ def gives_same_answers(first, other):
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
 def test_decisions_do_not_depend_on_later_looks(memory):
-    """A look is what the policy sees at a moment; decisions are made at looks 3 and 7."""
+    """A policy decides at looks 3 and 7 of twelve; from look 8 on the pictures are exchanged.
+
+    A look is what the policy sees at a moment. Both decisions lie before the change, so each kind
+    of memory has to answer as before: a policy cannot see the future.
+    """
     body = body_of(memory)
     batch = batch_of(1)
     assert gives_same_answers(body(batch), body(with_changed_looks(batch, slice(8, None))))
@@ -94,21 +99,29 @@ def first_looks_of(batch, looks, things):
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
 def test_memory_carried_from_look_to_look_equals_reading_all_looks_at_once(memory):
-    """A policy reads one look more each time; training reads all. Objects 3 and 4 appear late."""
+    """An answer with what was carried from earlier looks equals one that reads all looks anew.
+
+    A policy reads one look more each time, training reads all. The episode is read up to 1, 4, 5,
+    again 5 and 12 looks; objects 3 and 4 are first seen at the fifth, so there are three objects
+    before.
+    """
     body = body_of(memory)
     batch = batch_of(1)
     batch.visible[:, :4, 3:], batch.confirmed[:, :4, 3:] = False, False
 
-    cache = MemoryCache()
+    carried = MemoryCache()
 
-    for looks, things in ((1, 3), (4, 3), (5, THINGS), (5, THINGS), (LOOKS, THINGS)):
+    for looks, things in ((1, 3), (4, 3), (5, 5), (5, 5), (12, 5)):
         part = first_looks_of(batch, looks, things)
-        assert gives_same_answers(body(part, cache), body(part))
+        assert gives_same_answers(body(part, carried), body(part)), looks
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
 def test_only_a_body_with_memory_depends_on_earlier_looks(memory):
-    """The decision is made at look 7."""
+    """The decision is made at look 7: its own picture changes the answer of each kind.
+
+    Other pictures at looks 0 to 6 change it as well, unless the kind of memory is *none*.
+    """
     body = body_of(memory)
     batch = batch_of(1, (7,))
 
@@ -175,7 +188,11 @@ def fast_numbers(seed, tokens=3, size=2):
 
 
 def test_reading_fast_weights_gives_the_value_computed_by_hand():
-    """With W = 2, b = (0, 1) and k = (3, 4): z = (6, 9) and rms(z) = sqrt(58.5)."""
+    """Weights W = 2 I and biases b = (0, 1), read with the key k = (3, 4), give k + z / rms(z).
+
+    z = W k + b = (6, 9), rms(z) = sqrt((36 + 81) / 2) = sqrt(58.5); the scale and shift of the norm
+    are 0 here, which leaves z / rms(z) as it is.
+    """
     fast = FastWeights(2 * torch.eye(2)[None, None], torch.tensor([[[[0.0, 1.0]]]]))
     norm = FastNorm(torch.zeros(1, 1, 2), torch.zeros(1, 1, 2))
 
@@ -186,6 +203,11 @@ def test_reading_fast_weights_gives_the_value_computed_by_hand():
 
 @pytest.mark.parametrize("seed", range(2))
 def test_an_update_of_fast_weights_follows_the_gradient_of_its_loss(seed):
+    """One update is one step of gradient descent, here computed by PyTorch's automatic gradient.
+
+    The loss of three tokens is rate / 2 * |norm(W k + b) - (v - k)|², with drawn numbers; keys k,
+    values v.
+    """
     fast, norm, keys, values, rates = fast_numbers(seed)
     weights, biases = (weights.clone().requires_grad_() for weights in fast)
     error = norm(keys @ weights + biases) - (values - keys)
@@ -198,6 +220,10 @@ def test_an_update_of_fast_weights_follows_the_gradient_of_its_loss(seed):
 
 
 def test_an_update_of_fast_weights_is_limited_and_zero_for_a_rate_of_zero():
+    """An update changes the weights by a norm of at most `MOST_CHANGE`, and with rate 0 by nothing.
+
+    Keys and rates a hundred times as large would change them by far more.
+    """
     fast, norm, keys, values, rates = fast_numbers(0)
     far = fast.updated(keys * 100, values, rates * 100, norm)
     assert torch.allclose((far.weights - fast.weights).norm(), torch.tensor(MOST_CHANGE))
@@ -207,14 +233,19 @@ def test_an_update_of_fast_weights_is_limited_and_zero_for_a_rate_of_zero():
     assert torch.equal(still.biases, fast.biases)
 
 
-def test_up_to_32_frames_are_all_kept_and_of_more_32_evenly_spaced():
-    few = even_frames(torch.tensor([[5, 31]]))[0]
-    assert few[0].tolist() == [0, 1, 2, 3, 4, 5] + [-1] * 26
-    assert few[1].tolist() == list(range(32))
+def frames_kept_at(look):
+    """Return the numbers of the frames that are kept at a look; -1 fills the 32 places up."""
+    return even_frames(torch.tensor([[look]]))[0, 0].tolist()
 
-    many = even_frames(torch.tensor([[32, 620]]))[0]
-    assert many[0].tolist() == [round(look * 32 / 31) for look in range(32)]
-    assert many[1].tolist() == [20 * look for look in range(32)]
+
+def test_up_to_32_frames_are_all_kept_and_of_more_32_evenly_spaced():
+    """Looks count from 0: at look 5 there are six frames, at 31 as many as there are places.
+
+    At look 620 the 32 frames from 0 to 620 are 620 / 31 = 20 apart.
+    """
+    assert frames_kept_at(5) == [0, 1, 2, 3, 4, 5] + [-1] * 26
+    assert frames_kept_at(31) == list(range(32))
+    assert frames_kept_at(620) == list(range(0, 621, 20))
 
 
 @pytest.fixture
@@ -234,13 +265,17 @@ def are_equal(first, other):
 
 
 def test_modulation_changes_the_answer_of_a_body(modulated_and_plain):
+    """Two bodies have the same weights, but one is modulated by sampled frames; answers differ."""
     modulated, plain = modulated_and_plain
 
     assert not are_equal(modulated(batch_of(1)), plain(batch_of(1)))
 
 
 def test_modulation_with_zero_weights_equals_a_body_without_memory(modulated_and_plain):
-    """With scale and shift zero."""
+    """With weights 0 the frames scale by 1 and shift by 0, so nothing of them is left.
+
+    The two bodies share all weights but those of the memory.
+    """
     modulated, plain = modulated_and_plain
     for layer in modulated.memory.layers:
         torch.nn.init.zeros_(layer.scale_shift.weight)
@@ -249,14 +284,21 @@ def test_modulation_with_zero_weights_equals_a_body_without_memory(modulated_and
 
 
 def test_fast_weights_change_the_robot_s_token_and_no_object_s():
+    """The first layer gets a token for the robot and one for each object; they are compared.
+
+    The hook notes what the layer gets with two histories before look 7. The memory (ttt) is added
+    to the robot's token alone, so that only this one differs, by more than rounding (1e-4).
+    """
     body = body_of("ttt")
     batch = batch_of(1, (7,))
-    given = []
-    body.encoder.layers[0].linear1.register_forward_hook(lambda _, one, __: given.append(one[0]))
-    for history in (batch, with_changed_looks(batch, slice(0, 7))):
-        body(history)
+    tokens = []
+    body.encoder.layers[0].linear1.register_forward_hook(
+        lambda layer, inputs, output: tokens.append(inputs[0])
+    )
+    body(batch)
+    body(with_changed_looks(batch, slice(0, 7)))
 
-    robot, *things = (given[0] - given[1]).abs().amax(-1)[0]
+    change_of_robot, *changes_of_objects = (tokens[0] - tokens[1]).abs().amax(-1)[0]
 
-    assert robot > 1e-4
-    assert max(things) == 0
+    assert change_of_robot > 1e-4
+    assert max(changes_of_objects) == 0

@@ -43,6 +43,11 @@ def landmark_of(name, view=0):
 
 
 def test_the_table_plane_is_fitted_from_points_in_picture_and_world():
+    """From 30 points of a known projection the same projection is found again.
+
+    The matrix converts a place in the picture to one on the table; the corners of the found plane
+    are the outermost of its points.
+    """
     rng = np.random.default_rng(0)
     matrix = np.array([[0.9, -0.2, 0.1], [0.1, -1.1, 0.4], [0.3, 0.2, 1.0]])
     places = rng.random((30, 2))
@@ -55,15 +60,6 @@ def test_the_table_plane_is_fitted_from_points_in_picture_and_world():
     assert found.corners.max(axis=0) == pytest.approx(positions.max(axis=0))
 
 
-THREE_CUBES_AND_A_BUTTON = [
-    ("cube red", 0.0, 0.2),
-    ("cube blue", 0.1, 0.0),
-    ("cube red", 0.05, -0.3),
-    ("button", -0.2, 0.25),
-]
-"""Class, x and y in meters: the robot looks along x, and its left is at larger y."""
-
-
 @pytest.mark.parametrize(
     ("landmark", "ranks"),
     [
@@ -74,26 +70,42 @@ THREE_CUBES_AND_A_BUTTON = [
     ids=["from the left", "from the near end", "from the robot"],
 )
 def test_cubes_are_ranked_among_cubes_whatever_their_color(landmark, ranks):
-    """A rank is counted from either end: ([0], [2]) is the first of three and the third last."""
-    scene = scene_of(THREE_CUBES_AND_A_BUTTON)
+    """Of three cubes, each given by color, x and y in meters, the ranks are counted from both ends.
 
-    assert [ranks_of(scene, number, landmark) for number in range(3)] == ranks
+    The robot stands at 0 and looks along x; its left is at larger y. ([0], [2]) is the first of
+    three and the third last, counted from 0.
+    """
+    scene = scene_of([("cube red", 0.0, 0.2), ("cube blue", 0.1, 0.0), ("cube red", 0.05, -0.3)])
+
+    assert [ranks_of(scene, cube, landmark) for cube in range(3)] == ranks
 
 
 def test_the_only_button_is_the_first_and_the_last_of_its_kind():
-    scene = scene_of(THREE_CUBES_AND_A_BUTTON)
+    """Next to two cubes stands one button; ranks are counted among things of one kind, from 0."""
+    scene = scene_of([("cube red", 0.0, 0.2), ("cube red", 0.05, -0.3), ("button", -0.2, 0.25)])
+    button = 2
 
-    assert ranks_of(scene, 3, LEFT) == ([0], [0])
+    assert ranks_of(scene, button, LEFT) == ([0], [0])
 
 
 def test_cubes_are_ranked_by_their_distance_to_a_button_or_to_another_cube():
-    """From the blue cube the two others are ranked, and it is not."""
-    scene = scene_of(THREE_CUBES_AND_A_BUTTON)
+    """Each thing is given by kind, x and y in meters, with the robot's left at larger y.
 
-    assert ranks_of(scene, 0, landmark_of("button")) == ([0], [2])
-    assert ranks_of(scene, 2, landmark_of("button")) == ([2], [0])
-    assert ranks_of(scene, 0, landmark_of("cube blue")) == ([0], [1])
-    assert ranks_of(scene, 1, landmark_of("cube blue")) == ([], [])
+    The button stands at the left, so that the left cube is the nearest (rank 0) and the right one
+    the farthest (0 from the end). From the blue cube the two others are ranked, and it is not.
+    """
+    left_cube, blue_cube, right_cube = range(3)
+    scene = scene_of([
+        ("cube red", 0.0, 0.2),
+        ("cube blue", 0.1, 0.0),
+        ("cube red", 0.05, -0.3),
+        ("button", -0.2, 0.25),
+    ])  # fmt: skip
+
+    assert ranks_of(scene, left_cube, landmark_of("button")) == ([0], [2])
+    assert ranks_of(scene, right_cube, landmark_of("button")) == ([2], [0])
+    assert ranks_of(scene, left_cube, landmark_of("cube blue")) == ([0], [1])
+    assert ranks_of(scene, blue_cube, landmark_of("cube blue")) == ([], [])
 
 
 TWO_CUBES_THEN_THREE_CONTAINERS = (
@@ -112,6 +124,7 @@ def test_containers_are_ranked_by_their_distance_to_cubes_of_an_earlier_picture(
 
 
 def test_each_object_of_a_scene_belongs_to_the_picture_that_shows_it():
+    """The first picture shows two cubes, the second three containers."""
     scene = scene_of(*TWO_CUBES_THEN_THREE_CONTAINERS)
 
     assert scene.looks == 2
@@ -119,6 +132,7 @@ def test_each_object_of_a_scene_belongs_to_the_picture_that_shows_it():
 
 
 def test_a_scene_without_looks_has_no_objects_and_no_relations():
+    """A cube is taken out of a scene; relations to landmarks keep their number of columns."""
     unseen = without_objects(scene_of([("cube red", 0.0, 0.0)]))
     assert unseen.looks == 0
     assert all(len(part) == 0 for part in unseen[:4])

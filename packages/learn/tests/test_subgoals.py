@@ -35,7 +35,11 @@ OBJECTS = ObjectClasses(
 
 @pytest.mark.parametrize("task", sorted(all_tasks()))
 def test_every_subgoal_of_a_task_is_encoded_with_its_motion(task):
-    """Learned hands read a subgoal as numbers, one of which marks the motion."""
+    """Learned hands read a subgoal as numbers, one of which marks the motion, such as *pick*.
+
+    The subgoals are those of ten training episodes of the task. The motion is that of its stage;
+    *press below* has no number of its own.
+    """
     for number in range(10):
         for stage in get_episode(task, "train", number).stages:
             subgoal = SubgoalTemplate(stage.subgoal).at(np.array([100.0, 90.0]))
@@ -47,7 +51,10 @@ def test_every_subgoal_of_a_task_is_encoded_with_its_motion(task):
 
 
 def test_a_point_in_a_subgoal_is_encoded_as_the_place_on_the_table():
-    """The last three numbers say whether there is a point, and where it is, in meters."""
+    """The last three numbers: 1, as there is a point, and its x and y on the table in meters.
+
+    A point is a whole pixel, which is exact to 4 mm.
+    """
     place = np.array([-0.05, 0.11, 0.02])
     subgoal = SubgoalTemplate("pick up the red cube {at}").at(points_of(place))
 
@@ -57,6 +64,7 @@ def test_a_point_in_a_subgoal_is_encoded_as_the_place_on_the_table():
 
 
 def test_a_subgoal_without_a_point_is_encoded_without_a_place():
+    """The third number from the end says whether there is a point."""
     assert encode_request("pick up the red cube", OBJECTS)[-3] == 0
 
 
@@ -174,7 +182,11 @@ def test_a_planner_with_key_frames_is_not_told_what_it_named_before():
     ids=["neighbors", "one between two groups"],
 )
 def test_neighboring_key_frames_are_merged_into_their_middle_one(chosen, kept):
-    """Looks are as far apart as the merge rule's gap; of an even group the later middle counts."""
+    """Looks 5, 6, 7 are neighbors: only the middle one, 6, is kept; 40 stands alone and is kept.
+
+    Of an even group the later middle counts: 21 of 20 and 21, and 22 of 20 to 23, which are one
+    group once 22 was chosen too. After these come the recent looks, which are not compared.
+    """
     history = KeyframeHistory(3)
     for looks in chosen:
         history.choose(looks)
@@ -185,6 +197,7 @@ def test_neighboring_key_frames_are_merged_into_their_middle_one(chosen, kept):
 
 
 def test_at_most_a_fixed_number_of_key_frames_is_kept():
+    """50 looks, none next to another, are chosen after a video of 50 looks; not all are kept."""
     history = KeyframeHistory(3)
     history.choose(range(100, 200, 2))
 
@@ -194,6 +207,7 @@ def test_at_most_a_fixed_number_of_key_frames_is_kept():
 
 
 def test_a_planner_with_key_frames_sees_the_recent_looks_too():
+    """Look 6 was chosen for good; now, at look 60, the recent looks follow it."""
     history = KeyframeHistory(3)
     history.choose([6])
 

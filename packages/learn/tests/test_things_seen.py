@@ -25,7 +25,11 @@ def look_at(classes, spots):
 @pytest.mark.parametrize("place", [(0.0, 0.0), (0.1, 0.2), (-0.25, -0.1)])
 @pytest.mark.parametrize("number", [0, 1, 2], ids=OBJECTS.names)
 def test_a_point_in_the_picture_is_converted_to_its_place_on_the_table(number, place):
-    """Things have different heights, from 5 mm to 2 cm."""
+    """A point of the picture is converted back to the place (x, y) from which it was projected.
+
+    Things have different heights, here 1 cm, 2 cm and 5 mm, which the conversion has to know: the
+    camera looks at them from the side.
+    """
     point = points_of(np.array([[*place, OBJECTS.heights[number]]]))
 
     (found,) = OBJECTS.table_positions(np.array([number]), point)
@@ -69,6 +73,7 @@ def tracks_of_a_cube_out_of_sight():
 
 
 def test_an_object_out_of_sight_keeps_its_place(tracks_of_a_cube_out_of_sight):
+    """A cube, number 0, was seen once at (0, 0.1) and then no more; a target, number 1, is."""
     assert tracks_of_a_cube_out_of_sight.visible[:2].tolist() == [False, True]
     np.testing.assert_allclose(tracks_of_a_cube_out_of_sight.positions[0], (0.0, 0.1))
 
@@ -97,24 +102,37 @@ def test_objects_beyond_the_maximum_number_of_tracks_get_none():
     [(0, 30, 30), (0, 80, -10), (200, 30, 210), (-10, 44, -46)],
 )
 def test_a_grasp_takes_the_side_that_needs_the_shortest_turn(tool_yaw, cube_yaw, grasp_yaw):
-    """In degrees: a cube can be gripped at four angles, so that 45 degrees are the longest turn."""
-    move = Move(True, 0.0, 0.0, 0.02, "align", -1.0)
-    tool = np.array([0.3, 0.3, 0.15, math.pi, 0.0, math.radians(tool_yaw), 0.04])
-    yaw_code = np.array(
-        [math.cos(math.radians(4 * cube_yaw)), math.sin(math.radians(4 * cube_yaw))]
-    )
+    """A cube looks the same after 90 degrees, so it can be gripped at four angles (degrees here).
 
-    x, y, z, _, _, yaw, gripper = waypoint(move, tool, np.array([0.1, -0.1]), yaw_code)
+    The grasp takes the angle next to the yaw of the tool: for a cube at 80 it is -10 with the tool
+    at 0, for one at 30 it is 30 + 180 with the tool at 200. The yaw is given as cosine and sine of
+    four times the angle.
+
+    A tool is x, y, z (m), roll, pitch, yaw and opening; a waypoint likewise, with the gripper
+    command last.
+    """
+    grasp = Move(at_object=True, x=0.0, y=0.0, z=0.02, turn="align", gripper=-1.0)
+    tool = np.array([0.3, 0.3, 0.15, math.pi, 0.0, math.radians(tool_yaw), 0.04])
+    angle = math.radians(4 * cube_yaw)
+    yaw_code = np.array([math.cos(angle), math.sin(angle)])
+
+    x, y, z, _, _, yaw, gripper = waypoint(grasp, tool, np.array([0.1, -0.1]), yaw_code)
 
     assert (x, y, z, gripper) == (0.1, -0.1, 0.02, -1.0)
     assert math.degrees(yaw) == pytest.approx(grasp_yaw)
 
 
 def test_a_move_relative_to_the_tool_keeps_the_tool_s_yaw():
-    move = Move(False, -0.1, 0.0, 0.2, "keep", 0.0)
-    tool = np.array([0.3, 0.2, 0.15, math.pi, 0.0, 1.0, 0.04])
+    """From x = 0.3 m, y = 0.2 m the tool goes back by 0.1 m in x, to a height of 0.2 m.
 
-    found = waypoint(move, tool, np.zeros(2), np.array([1.0, 0.0]))
+    Its yaw stays 1 rad; no object matters, and gripper command 0 leaves the hand as it is.
+    """
+    back = Move(at_object=False, x=-0.1, y=0.0, z=0.2, turn="keep", gripper=0.0)
+    tool = np.array([0.3, 0.2, 0.15, math.pi, 0.0, 1.0, 0.04])
+    unused_place = np.zeros(2)
+    unused_yaw_code = np.array([1.0, 0.0])
+
+    found = waypoint(back, tool, unused_place, unused_yaw_code)
 
     np.testing.assert_allclose(found, [0.2, 0.2, 0.2, math.pi, 0.0, 1.0, 0.0])
 
