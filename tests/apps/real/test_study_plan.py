@@ -228,7 +228,7 @@ def test_csv_says_what_the_plan_says(snapshot):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_the_drawing_has_the_robot_s_left_on_the_left(task, snapshot):
-    """The snapshot has the drawing of a scene as SVG, seen from behind the robot."""
+    """The snapshot has the drawing of a scene as SVG."""
     (trial,) = make_study(("a",), tasks=(task,), settings=("direct",), trials=1).trials
     assert draw_svg(trial.episode.scene) == snapshot
 
