@@ -125,8 +125,8 @@ def ensembling(folder, tmp_path):
 def test_actions_are_those_of_lerobot_s_loop(folder, kind, at_a_time, monkeypatch, request):
     """A policy executes the same actions in our loop and in lerobot-eval's, over 40 steps.
 
-    `at_a_time` is how many each answer has: ACT's chunks of 8; diffusion's 7 and 1, as its queue is
-    shorter; otherwise one. Noise is drawn from the same seed in both, and the arm moves, so that
+    `at_a_time` is how many each answer has: ACT's chunks of 8; diffusion's 7 and 1 in turn;
+    otherwise one. Noise is drawn from the same seed in both, and the arm moves, so that
     equal actions say something.
     """
     place = folder / "outputs" / kind / LAST if at_a_time else request.getfixturevalue(kind)
