@@ -63,9 +63,11 @@ def all_commands_and_kinds():
 def test_without_the_package_that_learns_only_its_commands_and_kinds_are_gone(
     all_commands_and_kinds,
 ):
-    """The package is hidden from a process, which prints what is left.
+    """The package roboirg_learn is hidden from a process, which prints what is left.
 
-    No other kind of policies comes from an entry point.
+    `PRINT_COMMANDS` leaves out entry points of the package that its variable `left_out` names; that
+    line is replaced here. Only the package's four commands and two kinds of policies are lost; no
+    other kind comes from an entry point, so none is left.
     """
     all_commands, all_kinds = all_commands_and_kinds
     program = PRINT_COMMANDS.replace('left_out = ""', "left_out = 'roboirg_learn'", 1)
@@ -84,6 +86,11 @@ def test_without_the_package_that_learns_only_its_commands_and_kinds_are_gone(
 def test_without_the_folder_of_an_application_the_program_runs_and_lacks_only_its_commands(
     application, all_commands_and_kinds, tmp_path
 ):
+    """A copy of the program without an application's folder prints its commands and plays.
+
+    What may be lost are the commands that only this application adds, and it has some if and only
+    if it has a file of commands; all kinds of policies are still there.
+    """
     all_commands, all_kinds = all_commands_and_kinds
     shutil.copytree(layout.PACKAGE, tmp_path / "roboirg")
     shutil.rmtree(tmp_path / "roboirg" / "apps" / application)

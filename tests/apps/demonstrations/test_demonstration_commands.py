@@ -16,7 +16,7 @@ from roboirg.tasks.splits.splits import get_episode
 
 
 def within(**choices):
-    """Return words with a plan that has these choices of an export; what is typed goes before."""
+    """Return words that name a plan with these choices of an export."""
     return "--plan", plan_file(tasks="StopCube", episodes=9, demonstrations=choices)
 
 
@@ -48,6 +48,11 @@ def roboirg(monkeypatch, capsys):
 def test_a_dry_run_says_how_big_it_gets_and_writes_nothing(
     roboirg, tmp_path, monkeypatch, choices, size
 ):
+    """`FEW` asks for two episodes of one task in two settings: 2 trajectories, 4 episodes.
+
+    Three variations make three times as many; a policy of one's own hears the words, so it has a
+    trajectory for each setting. The policy is a class in the current folder.
+    """
     own = "from roboirg.policies.builtin.random_policy import RandomPolicy as Own\n"
     (tmp_path / "policy_lying_here.py").write_text(own)
     monkeypatch.chdir(tmp_path)
@@ -66,6 +71,10 @@ def test_an_export_without_a_folder_is_refused(roboirg):
 
 
 def test_an_export_tells_its_progress_and_its_end(roboirg, tmp_path, synthetic):
+    """One of two synthetic episodes fails; the other one is written in two settings.
+
+    The second call finds the complete export and is refused.
+    """
     root = tmp_path / "data"
     words = ("export", "demonstrations", *FEW, "--workers", "0", "--out", root)
     code, out, err = roboirg(*words)
@@ -85,6 +94,7 @@ def test_an_export_tells_its_progress_and_its_end(roboirg, tmp_path, synthetic):
     ("format", "frames"), [("lerobot-v3", "left out"), ("robomme-hdf5", "come before the policy")]
 )
 def test_robomme_s_format_has_the_video(roboirg, tmp_path, synthetic, format, frames):  # noqa: A002
+    """The card says what becomes of the frames of the video: LeRobot's formats leave them out."""
     root = tmp_path / "data"
     words = (*FEW, "--tasks", "VideoUnmask", "--format", format, "--workers", "0", "--out", root)
 
@@ -106,6 +116,11 @@ def test_robomme_s_format_has_the_video(roboirg, tmp_path, synthetic, format, fr
     ],
 )
 def test_recordings_speak_the_words_for_training(roboirg, tmp_path, synthetic, more, pool, warns):
+    """`pool` has the wordings of all instructions; `warns` is what the command warns of.
+
+    By default words are those of train in any split. To record test episodes, or words of test, is
+    warned of, as a policy would have seen what is held out.
+    """
     root = tmp_path / "data"
     words = ("--tasks", "PickXtimes", "--episodes", "1", "--settings", "all", "--workers", "0")
     code, _, err = roboirg("export", "demonstrations", *words, *more, "--out", root)
@@ -136,6 +151,7 @@ def test_recordings_speak_the_words_for_training(roboirg, tmp_path, synthetic, m
     ],
 )
 def test_bad_input_is_one_sentence(roboirg, tmp_path, words, message):
+    """Each has one mistake in a command or plan; the exit code is 2 and one line is printed."""
     code, out, err = roboirg("export", "demonstrations", *FEW, *words, "--out", tmp_path / "data")
     assert (code, out) == (2, "")
     assert message in err
@@ -144,6 +160,12 @@ def test_bad_input_is_one_sentence(roboirg, tmp_path, words, message):
 
 @pytest.mark.usefixtures("in_this_process")
 def test_a_replay_prints_what_deviates(roboirg, export, monkeypatch):
+    """Of four trajectories, one fails in the replay, one differs by 0.25 and one has no end state.
+
+    Replays are made up: 0.0 for episode 0, a failure with 0.5 for 2, 0.25 for 3, and NaN for 4,
+    whose dataset does not say how it ended. So three agree in the verdict, and one of them also in
+    the final state.
+    """
     root = export(tasks=("PickXtimes",), episodes=(0, 2, 3, 4))
 
     def replay(recorded):

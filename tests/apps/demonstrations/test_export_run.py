@@ -41,7 +41,11 @@ def contents(root):
 
 @pytest.mark.slow
 def test_a_killed_export_continues_without_a_broken_file(tmp_path, synthetic):
-    """Killed again and again, each time a few files later."""
+    """The export is killed after 2, 5, 8 ... written files, each time started again, until it ends.
+
+    Whenever it can be read, all is in order, and the end is what an export without a kill gives.
+    `last > 10` says that there were kills at several places.
+    """
     whole = tmp_path / "whole"
     out = tmp_path / "killed"
     export_run.run_export(killed_export.PLAN, whole, 0, quiet)
@@ -63,7 +67,10 @@ def test_a_killed_export_continues_without_a_broken_file(tmp_path, synthetic):
 def test_a_stopped_export_goes_on_and_records_each_trajectory_once(
     tmp_path, synthetic, make_plan, monkeypatch
 ):
-    """It is stopped after three of six trajectories."""
+    """It is stopped after three of six trajectories (two tasks of three episodes).
+
+    `played` has what was recorded before and after the stop: all six, none twice.
+    """
     out = tmp_path / "data"
     played = []
 
@@ -89,7 +96,10 @@ def test_a_stopped_export_goes_on_and_records_each_trajectory_once(
 def test_progress_counts_recorded_trajectories_with_their_size_and_written_episodes(
     tmp_path, synthetic, make_plan
 ):
-    """Sizes are of all trajectories up to then, so they grow."""
+    """Of six trajectories four succeed, so four are written at the end.
+
+    Sizes are of all trajectories up to then, so they grow.
+    """
     progress = []
     export_run.run_export(make_plan(), tmp_path, 0, lambda *now: progress.append(now))
 
@@ -99,6 +109,10 @@ def test_progress_counts_recorded_trajectories_with_their_size_and_written_episo
 
 
 def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, monkeypatch):
+    """The second export, in another format and setting, must record nothing: it can't.
+
+    `record_trajectory` is None by then. Two tasks with two successes each are four episodes.
+    """
     kept = tmp_path / "kept"
     export_run.run_export(make_plan(), tmp_path / "v3", 0, quiet, kept)
     monkeypatch.setattr(export_run, "record_trajectory", None)
@@ -122,7 +136,11 @@ def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, m
 def test_kept_trajectories_of_other_outcomes_or_words_are_not_taken(
     tmp_path, synthetic, make_plan, changes, recorded
 ):
-    """The oracle's trajectories of six episodes are kept."""
+    """The oracle's trajectories of six episodes are kept, without pictures of the two failures.
+
+    The same plan takes all. A listener hears the words, so its 6 are new: two tasks in explicit,
+    and in direct in two forms. With failures asked for, those two are recorded again.
+    """
     kept = tmp_path / "kept"
     export_run.run_export(make_plan(), tmp_path / "first", 0, quiet, kept)
 
@@ -134,6 +152,7 @@ def test_kept_trajectories_of_other_outcomes_or_words_are_not_taken(
 def test_kept_trajectories_of_another_world_are_not_taken(
     tmp_path, synthetic, make_plan, monkeypatch
 ):
+    """The second export finds trajectories of an older version, so it records all six again."""
     kept = tmp_path / "kept"
     export_run.run_export(make_plan(), tmp_path / "first", 0, quiet, kept)
     monkeypatch.setattr(export_run, "ENVIRONMENT_VERSION", ENVIRONMENT_VERSION + 1)
@@ -141,31 +160,33 @@ def test_kept_trajectories_of_another_world_are_not_taken(
     assert export_run.run_export(make_plan(), tmp_path / "second", 0, quiet, kept).recorded == 6
 
 
-OTHER_EPISODES = {
-    "task": "StopCube", "split": "val", "number": 1, "variation": 1, "policy": "forgetful",
-}  # fmt: skip
-OTHER_RECORDINGS = {
-    "coding": "lossless-video", "video": True, "depth": True, "cameras": ("wrist",), "size": 64,
-    "actions": "waypoint", "disturbed": True,
-}  # fmt: skip
-OTHER_WORDS = {
-    "setting": "direct", "form": "resolved", "stages": (1, 5), "frame": "camera",
-    "distractor": "competing", "distractors": 3, "wordings": "train", "delivery": "turns",
-}  # fmt: skip
-
-
 def test_a_trajectorys_name_has_all_that_it_depends_on(make_plan):
-    """A field that the name lacked would give the trajectory of another plan."""
+    """Each field of a job in turn gets another value: each job has another name.
+
+    A field that the name lacked would give the trajectory of another plan. The first assertions say
+    that no field of recordings and of words was forgotten above.
+    """
+    other_episodes = {
+        "task": "StopCube", "split": "val", "number": 1, "variation": 1, "policy": "forgetful",
+    }  # fmt: skip
+    other_recordings = {
+        "coding": "lossless-video", "video": True, "depth": True, "cameras": ("wrist",), "size": 64,
+        "actions": "waypoint", "disturbed": True,
+    }  # fmt: skip
+    other_words = {
+        "setting": "direct", "form": "resolved", "stages": (1, 5), "frame": "camera",
+        "distractor": "competing", "distractors": 3, "wordings": "train", "delivery": "turns",
+    }  # fmt: skip
     ((job, _), *_) = recording_jobs(make_plan(policy="listener"))
-    assert set(OTHER_RECORDINGS) == set(job.spec._fields)
-    assert set(OTHER_WORDS) == set(OPTION_NAMES)
+    assert set(other_recordings) == set(job.spec._fields)
+    assert set(other_words) == set(OPTION_NAMES)
 
     jobs = [job]
-    for name, value in OTHER_EPISODES.items():
+    for name, value in other_episodes.items():
         jobs.append(replace(job, **{name: value}))
-    for name, value in OTHER_RECORDINGS.items():
+    for name, value in other_recordings.items():
         jobs.append(replace(job, spec=job.spec._replace(**{name: value})))
-    for name, value in OTHER_WORDS.items():
+    for name, value in other_words.items():
         if name != "distractors":  # without a kind of distractors their number says nothing
             jobs.append(replace(job, options=replace(job.options, **{name: value})))
 
@@ -174,7 +195,7 @@ def test_a_trajectorys_name_has_all_that_it_depends_on(make_plan):
 
 @pytest.mark.parametrize("name", ["language_label", "ENVIRONMENT_VERSION", "TRAJECTORY_VERSION"])
 def test_a_stopped_export_of_another_version_is_another_one(make_plan, monkeypatch, name):
-    """The label names the words of each task."""
+    """The label names the words of each task; each of the three is replaced by "another"."""
     before = make_plan().fingerprint()
 
     other = "another"
@@ -191,7 +212,7 @@ def test_a_stopped_export_of_another_version_is_another_one(make_plan, monkeypat
     ids=["by default", "on request"],
 )
 def test_failures_are_exported_only_on_request(export, options, statuses):
-    """Of three episodes of two tasks each second one fails."""
+    """Of three episodes of two tasks the second of each fails, so four of six succeed."""
     assert [recorded.status for recorded in read_dataset(export(**options))] == statuses
 
 
@@ -205,6 +226,7 @@ def test_the_mean_of_next_success_is_the_share_of_steps_that_end_in_success(expo
 
 
 def test_variations_are_trajectories_of_their_own(export):
+    """Episodes 0 and 2 succeed; variation n of each is n steps longer, as synthetic ones are."""
     found = list(read_dataset(export(tasks=("PickXtimes",), variations=3, disturbed=True)))
     assert [(recorded.name, len(recorded.actions)) for recorded in found] == [
         (f"PickXtimes/train/{episode}/{variation}", synthetic_trajectories.STEPS + variation)
@@ -214,7 +236,10 @@ def test_variations_are_trajectories_of_their_own(export):
 
 
 def test_a_policy_is_recorded_in_every_setting(export):
-    """The oracle once for all: it does not hear the words."""
+    """A listener hears the words, so there is a trajectory for each of two settings.
+
+    The oracle does not hear them, and is recorded once for all.
+    """
     root = export(tasks=("PickXtimes",), policy="listener", episodes=(0,))
 
     assert [recorded.name for recorded in read_dataset(root)] == [
@@ -232,6 +257,9 @@ def disturbed_export(export):
 
 
 def test_the_action_of_a_disturbed_frame_is_what_should_have_been_done(disturbed_export):
+    """In the synthetic episode what was executed is 1.0 less than what was meant, in each
+    number.
+    """
     (executed,) = read_dataset(disturbed_export)
 
     table = parquet.read_table(disturbed_export / "data/chunk-000/file-000.parquet")
@@ -248,6 +276,7 @@ def test_disturbed_episodes_are_marked_on_the_card_and_in_the_table(disturbed_ex
 
 
 def test_a_complete_export_is_not_overwritten(export, make_plan):
+    """The folder holds an export that is complete; the same plan is refused there."""
     root = export()
     with pytest.raises(InvalidValueError, match="complete export already"):
         export_run.run_export(make_plan(), root, 0, quiet)
@@ -263,6 +292,10 @@ def test_a_folder_of_something_else_is_not_written_to(tmp_path, make_plan):
 
 
 def test_a_stopped_export_does_not_go_on_with_other_options(tmp_path, make_plan, monkeypatch):
+    """The first export stops at its first recording, as `record_trajectory` is None.
+
+    The second one, of one setting instead of two, finds what it began.
+    """
     monkeypatch.setattr(export_run, "record_trajectory", None)
     with pytest.raises(TypeError):
         export_run.run_export(make_plan(), tmp_path, 0, quiet)
@@ -324,11 +357,16 @@ def test_the_card_of_version_2_1_has_a_configuration_that_trains(export):
     [(("implicit", "resolved"), 1 + 2 + 2), (("resolved",), 3)],
 )
 def test_an_explicit_instruction_is_its_own_resolved_form(make_plan, forms, instructions):
+    """Of three settings in two forms, direct and spatial have two texts, explicit one: five.
+
+    Each of six trajectories (two tasks of three episodes) has so many.
+    """
     plan = make_plan(forms=forms, settings=("explicit", "direct", "spatial"))
     assert [len(said) for _, said in recording_jobs(plan)] == [instructions] * 6
 
 
 def test_an_export_without_pictures_has_no_columns_of_them(export):
+    """Two tasks with two successful episodes each are four trajectories to read."""
     root = export(pictures="none", video=True)
 
     info = json.loads((root / "meta/info.json").read_text())

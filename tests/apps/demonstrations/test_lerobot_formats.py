@@ -17,11 +17,7 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import scaled_square
 
 WRIST = "observation.images.wrist"
-COLUMNS = {
-    "lerobot-v3": ("observation.state", "action", "observation.images.front", WRIST),
-    "lerobot-v2.1": ("state", "actions", "image", "wrist_image"),
-}
-"""By version: the state, the action, and the pictures of the cameras."""
+VERSIONS = ("lerobot-v3", "lerobot-v2.1")
 
 
 def read_json(path):
@@ -78,10 +74,15 @@ def recorded_arrays(task, video=0):
     return synthetic.arrays_of(episode, video + 1 + synthetic.STEPS, video, has_depth=False)
 
 
-@pytest.mark.parametrize("version", COLUMNS)
-def test_a_frame_has_the_state_before_its_action(export, version):
-    """A row of a recording has the action that led to it, so a frame has that of the next row."""
-    state, action, *_ = COLUMNS[version]
+@pytest.mark.parametrize(
+    ("version", "state", "action"),
+    [("lerobot-v3", "observation.state", "action"), ("lerobot-v2.1", "state", "actions")],
+)
+def test_a_frame_has_the_state_before_its_action(export, version, state, action):
+    """`VERSIONS` has the names of the columns in a version: state, action, and two cameras'
+    pictures. A row of a recording has the action that led to it, so a frame has that of the next
+    row. The state is seven joints and one finger. Frames are 1/20 s apart.
+    """
     recorded = recorded_arrays("PickXtimes")
 
     _, frames = next(episodes_of(export(format=version)))
@@ -94,9 +95,19 @@ def test_a_frame_has_the_state_before_its_action(export, version):
         assert frame["timestamp"] == pytest.approx(time / 20, abs=1e-6)
 
 
-@pytest.mark.parametrize("version", COLUMNS)
-def test_a_frame_has_the_pictures_of_both_cameras(export, version):
-    *_, front, wrist = COLUMNS[version]
+@pytest.mark.parametrize(
+    ("version", "front", "wrist"),
+    [
+        ("lerobot-v3", "observation.images.front", "observation.images.wrist"),
+        ("lerobot-v2.1", "image", "wrist_image"),
+    ],
+)
+def test_a_frame_has_the_pictures_of_both_cameras(export, version, front, wrist):
+    """Each version has its own names for the columns of the front's and the wrist's pictures.
+
+    The synthetic picture of a camera follows from the episode's seed and the row, which is the
+    frame's time step.
+    """
     seed = get_episode("PickXtimes", "train", 0).seed
 
     _, frames = next(episodes_of(export(format=version)))
@@ -106,9 +117,12 @@ def test_a_frame_has_the_pictures_of_both_cameras(export, version):
         assert np.array_equal(decoded(frame[wrist]), synthetic.picture("wrist", seed, time))
 
 
-@pytest.mark.parametrize("version", COLUMNS)
+@pytest.mark.parametrize("version", VERSIONS)
 def test_all_frames_are_numbered_and_counted(export, version):
-    """Two tasks in two settings, of which two of three episodes succeed: eight."""
+    """Two tasks in two settings, of which two of three episodes succeed, are eight episodes.
+
+    Frames are numbered from 0 in each episode, and through all of them; 20 are a second.
+    """
     root = export(format=version)
 
     numbers = []
@@ -121,8 +135,11 @@ def test_all_frames_are_numbered_and_counted(export, version):
     assert (info["fps"], info["total_episodes"], info["total_frames"]) == (20, 8, len(numbers))
 
 
-@pytest.mark.parametrize("version", COLUMNS)
+@pytest.mark.parametrize("version", VERSIONS)
 def test_every_frame_has_the_words_of_its_episode(export, version):
+    """The instruction of the episode in its setting is in three places, and in each frame by
+    number. `facts` is the table of what was recorded; a dataset's "task" is its text.
+    """
     root = export(format=version)
     texts = texts_of(root)
     facts = pd.read_parquet(root / "meta/demonstrations.parquet").set_index("episode_index")
@@ -138,7 +155,10 @@ def test_every_frame_has_the_words_of_its_episode(export, version):
 
 
 def test_version_3_has_pose_actions_and_subgoals(export):
-    """Of a task without a video."""
+    """Of a task without a video. Row `time + 1` of a recording has the action that led to it.
+
+    So the frame at `time` has the action and subgoal of that row.
+    """
     recorded = recorded_arrays("PickXtimes")
 
     _, frames = next(episodes_of(export()))
@@ -151,13 +171,14 @@ def test_version_3_has_pose_actions_and_subgoals(export):
 
 @pytest.mark.parametrize("column", ["next.done", "next.success", "next.reward"])
 def test_version_3_rewards_the_last_of_seven_steps(column, export):
+    """A synthetic episode has seven steps, of which the last one succeeds."""
     _, frames = next(episodes_of(export()))
 
     assert [frame[column] for frame in frames] == [0, 0, 0, 0, 0, 0, 1]
 
 
 def test_version_3_names_all_columns_and_all_episodes(export):
-    """All eight episodes are for training."""
+    """Two tasks, two settings and two successes are eight episodes, all of them for training."""
     root = export()
 
     info = read_json(root / "meta/info.json")
@@ -176,6 +197,7 @@ def all_frames(root):
 
 
 def test_version_3_has_statistics_of_each_episode_and_where_it_lies(export):
+    """Episodes lie one after the other: each begins where the one before it ends."""
     begin = 0
     for row, frames in episodes_of(export()):
         states = np.array([frame["observation.state"] for frame in frames])
@@ -186,6 +208,7 @@ def test_version_3_has_statistics_of_each_episode_and_where_it_lies(export):
 
 @pytest.mark.parametrize("name", ["observation.state", "action", "index", "next.success"])
 def test_version_3_has_statistics_of_all_frames(export, name):
+    """NumPy computes the same from all frames of the export, read one after the other."""
     root = export()
 
     stats = read_json(root / "meta/stats.json")[name]
@@ -200,6 +223,7 @@ def test_version_3_has_statistics_of_all_frames(export, name):
 
 
 def test_version_3_has_statistics_of_pictures_between_0_and_1(export):
+    """The mean of a color is that of all pixels, divided by 255."""
     root = export()
 
     stats = read_json(root / "meta/stats.json")
@@ -211,6 +235,10 @@ def test_version_3_has_statistics_of_pictures_between_0_and_1(export):
 
 
 def test_version_3_stores_pictures_of_two_settings_once(export):
+    """Two settings have other words and the same pictures, which take nearly all of the room.
+
+    Stored twice they would take 2 times as much as of one setting; 1.3 leaves room for the rest.
+    """
     both = data_bytes(export())
     single = data_bytes(export("one", settings=("explicit",)))
 
@@ -232,6 +260,7 @@ def small_wrist_export(export, request):
 
 
 def test_one_camera_in_small_pictures_is_described_as_such(small_wrist_export):
+    """Two tasks with two successful episodes each, in one setting: pictures of four episodes."""
     info = read_json(small_wrist_export / "meta/info.json")
     stats = read_json(small_wrist_export / "meta/stats.json")
 
@@ -242,7 +271,7 @@ def test_one_camera_in_small_pictures_is_described_as_such(small_wrist_export):
 
 
 def test_small_pictures_are_scaled(small_wrist_export):
-    """Of the first episode, the picture at step 3, from its table or its film."""
+    """The picture at step 3 of the first episode, from its film or, if there is none, its table."""
     seed = get_episode("PickXtimes", "train", 0).seed
 
     films = sorted(small_wrist_export.rglob("*.mp4"))
@@ -264,6 +293,7 @@ def export_with_video(export):
 
 
 def test_the_video_comes_before_the_policys_turn_and_is_marked(export_with_video):
+    """Four frames of video, then those of the policy; frame 3 has the action that led to row 4."""
     recorded = recorded_arrays("VideoUnmask", video=4)
 
     _, frames = next(episodes_of(export_with_video))
@@ -273,6 +303,10 @@ def test_the_video_comes_before_the_policys_turn_and_is_marked(export_with_video
 
 
 def test_a_film_of_an_episode_shows_the_video_too(export_with_video):
+    """Its length is that of all frames at 20 a second, from 0 on.
+
+    The synthetic picture of a frame follows from the episode's seed and the frame's number.
+    """
     seed = get_episode("VideoUnmask", "train", 0).seed
     key = f"videos/{WRIST}"
 
@@ -309,13 +343,13 @@ def test_version_2_1_describes_its_columns_in_each_file(export):
 
 
 def test_version_2_1_says_where_the_gripper_is_in_the_state(export):
-    """After the seven joints."""
+    """The state is seven joints and then the gripper, so it is value 7, up to but without 8."""
     modality = read_json(export(format="lerobot-v2.1") / "meta/modality.json")
 
     assert modality["state"]["gripper"] == {"start": 7, "end": 8, "original_key": "state"}
 
 
-@pytest.mark.parametrize("version", COLUMNS)
+@pytest.mark.parametrize("version", VERSIONS)
 def test_each_trajectory_is_read_back_once(export, version):
     """Also where two settings give it different words. Episode 1 of each task fails."""
     found = read_dataset(export(format=version, video=True))
@@ -325,10 +359,13 @@ def test_each_trajectory_is_read_back_once(export, version):
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("version", [*COLUMNS, "robomme-hdf5"])
+@pytest.mark.parametrize("version", [*VERSIONS, "robomme-hdf5"])
 @pytest.mark.parametrize(("task", "video"), [("PickXtimes", 0), ("VideoUnmask", 4)])
 def test_actions_and_states_are_read_back_without_the_video(export, version, task, video):
-    """The first row after the video is the state at reset; its action was not taken."""
+    """A recording has `video` rows of video, the state at reset, then a row for each action.
+
+    So actions begin at row `video + 1`; the action of the row at reset was not taken.
+    """
     recorded = recorded_arrays(task, video)
 
     found, _ = read_dataset(export(format=version, video=True, tasks=(task,)))
@@ -338,9 +375,9 @@ def test_actions_and_states_are_read_back_without_the_video(export, version, tas
     assert np.array_equal(found.states[:, :7], recorded["joint_positions"][video + 1 :])
 
 
-@pytest.mark.parametrize("version", COLUMNS)
+@pytest.mark.parametrize("version", VERSIONS)
 def test_the_last_state_is_read_back_with_the_gripper(export, version):
-    """RoboMME's format has no last state."""
+    """After seven joints a state has the two fingers. RoboMME's format has no last state."""
     found, *_ = read_dataset(export(format=version))
 
     assert np.array_equal(found.final_state[7:], recorded_arrays("PickXtimes")["gripper"][-1])

@@ -39,7 +39,10 @@ class Impatient:
 
 
 def test_a_policy_that_gives_up_has_its_trajectory_as_a_failure(tmp_path):
-    """It gives up after 13 steps, and is closed."""
+    """`Impatient` moves for 13 steps, then raises an error, whose words are the cause.
+
+    It is closed, which sets its `rows` to "closed".
+    """
     policy = Impatient()
     episode = get_episode("PickXtimes", "train", 0)
 
@@ -52,7 +55,10 @@ def test_a_policy_that_gives_up_has_its_trajectory_as_a_failure(tmp_path):
 
 
 def test_recorded_pictures_and_states_are_those_of_the_same_actions_in_a_new_world(tmp_path):
-    """Bit for bit, at reset and after each of 13 steps."""
+    """Bit for bit, at reset (row 0) and after each of 13 steps.
+
+    Row 0 has no action that was taken, hence `actions[1:]`. Depth is compared, too.
+    """
     path = tmp_path / "one.zip"
     episode = get_episode("PickXtimes", "train", 0)
     record_trajectory(episode, Impatient(), path, RecordingSpec(depth=True), only_successes=False)
@@ -73,7 +79,10 @@ def test_recorded_pictures_and_states_are_those_of_the_same_actions_in_a_new_wor
 
 
 def test_the_recorded_video_is_that_of_the_environment(tmp_path):
-    """Of every ninth picture of the front camera, and all actions."""
+    """All pictures are recorded; the environment shows every ninth, so its number n is row 9 * n.
+
+    Actions are those of the video's steps, as 32-bit floats.
+    """
     path = tmp_path / "one.zip"
     episode = get_episode("VideoUnmask", "train", 0)
     spec = RecordingSpec(video=True, cameras=("front",))
@@ -102,7 +111,10 @@ def disturbed(tmp_path, make_plan, request):
 
 
 def test_a_disturbed_expert_is_labeled_by_what_it_meant_and_replays_exactly(disturbed):
-    """Some of what it did differs from what it meant."""
+    """Labels differ from what was executed in some steps but not in all (by more than 1e-6).
+
+    The replay executes what was executed, so it ends with the same verdict and no difference.
+    """
     (recorded,) = read_dataset(disturbed)
     table = parquet.read_table(disturbed / "data/chunk-000/file-000.parquet")
     labels = np.array(table["action"].to_pylist())
@@ -116,7 +128,10 @@ def test_a_disturbed_expert_is_labeled_by_what_it_meant_and_replays_exactly(dist
 
 
 def test_the_replay_of_changed_actions_does_not_agree(tmp_path, make_plan):
-    """The second half of them is moved by 0.2 rad."""
+    """The seven joints' targets of the second half are moved by 0.2 rad, so the task fails.
+
+    The states then differ by more than 0.01 rad.
+    """
     plan = make_plan(
         tasks=("VideoUnmask",), split="random", episodes=(3,), settings=("explicit",),
         pictures="none",

@@ -39,6 +39,10 @@ def time_steps(file, name):
 
 
 def test_time_steps_have_robommes_fields(export):
+    """`SHAPES` has the type and shape of each field of a time step; the first one is looked at.
+
+    A choice of action is always empty JSON here.
+    """
     root = export(format="robomme-hdf5", video=True, settings=("explicit",))
 
     with h5py.File(root / "record_dataset_VideoUnmask.h5", "r") as file:
@@ -49,7 +53,7 @@ def test_time_steps_have_robommes_fields(export):
 
 
 def test_an_episode_has_its_seed_goal_difficulty_and_camera(export):
-    """Episode 1 fails, and is not there."""
+    """Synthetic episodes 0 and 2 of three succeed; episode 1 fails and is not there."""
     episode = get_episode("VideoUnmask", "train", 0)
     root = export(format="robomme-hdf5", video=True, settings=("explicit",))
 
@@ -64,7 +68,11 @@ def test_an_episode_has_its_seed_goal_difficulty_and_camera(export):
 
 @pytest.mark.parametrize(("task", "video"), [("PickXtimes", 0), ("VideoUnmask", 4)])
 def test_a_builder_reads_what_was_recorded(export, task, video):
-    """The policy's first observation, which follows the way home, is no time step."""
+    """Episode 2 has `video` rows of video, the state at reset, and a row for each policy step.
+
+    The row at reset, `row != video`, is no time step. Fingers open to 0.04 m each; below 0.03 m
+    RoboMME's format calls the gripper closed, as it holds something.
+    """
     episode = get_episode(task, "train", 2)
     rows = video + 1 + synthetic.STEPS
     recorded = synthetic.arrays_of(episode, rows, video, has_depth=True)
@@ -84,7 +92,11 @@ def test_a_builder_reads_what_was_recorded(export, task, video):
 
 
 def test_a_boundary_is_where_the_video_ends_or_another_subgoal_begins(export):
-    """Four rows of video and seven of the policy; the subgoal changes after six of the twelve."""
+    """Four time steps of video and seven of the policy, made of twelve rows without that at reset.
+
+    Boundaries are the first step, the policy's first (4), and step 5: the subgoal changes at row 6
+    of the twelve, of which row 4, at reset, is no step.
+    """
     root = export(format="robomme-hdf5", video=True, settings=("explicit",))
 
     with h5py.File(root / "record_dataset_VideoUnmask.h5", "r") as file:
@@ -97,7 +109,10 @@ def test_a_boundary_is_where_the_video_ends_or_another_subgoal_begins(export):
 
 
 def test_each_setting_has_a_file_with_its_own_words_and_shared_time_steps(export):
-    """A file of its own would be larger than 200 kB."""
+    """Each file links to the time steps of one shared file: it is below 200 kB, with them larger.
+
+    The goal, which is the instruction, differs between the two settings.
+    """
     root = export(format="robomme-hdf5", video=True)
 
     goals = set()

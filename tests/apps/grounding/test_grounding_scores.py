@@ -57,6 +57,11 @@ def item_of(task, setting="direct"):
 
 @pytest.mark.parametrize("kind", QUESTION_KINDS)
 def test_the_oracle_is_always_right(kind):
+    """The floor `oracle` gives each item's stored answer, so its rate is 1 in every setting.
+
+    The items are of eight episodes of five tasks. A rate that is corrected for chance is 1 at most,
+    and that is reached, too.
+    """
     score, rows = rows_of(floor_answers("oracle", items()), kind)
 
     assert score.unparsed == score.missing == 0
@@ -67,7 +72,10 @@ def test_the_oracle_is_always_right(kind):
 
 @pytest.mark.parametrize("kind", ["slots", "choice"])
 def test_random_answers_are_at_chance(kind):
-    """Within three points, over three thousand answers."""
+    """Random answers are right as often as `guess_chance` says of their items.
+
+    Over 3,000 answers a rate has a standard error of at most 0.0091, so 0.03 is more than three.
+    """
     known = {item.id: item for item in items()}
     right = []
     chances = []
@@ -91,6 +99,11 @@ MASK = 64 / 256**2
     [(1, True, MASK), (2, True, MASK**2), (2, False, 2 * MASK**2)],
 )
 def test_random_pixels_hit_as_often_as_masks_are_large(points, in_order, chance):
+    """A mask covers 8 × 8 of 256 × 256 pixels: a random pixel lies in it with chance `MASK`.
+
+    Points are independent, so the chances of two multiply; without an order two points fit their
+    two masks in two ways.
+    """
     item = item_of("StopCube")
     item = replace(item, points=item.points[:points], points_in_order=in_order)
 
@@ -108,7 +121,10 @@ def test_random_pixels_hit_as_often_as_masks_are_large(points, in_order, chance)
     ],
 )
 def test_a_choice_is_read_by_its_letter(reply, understood):
-    """There are three choices."""
+    """The item has three choices, A to C: D is no answer, and neither is a reply without one.
+
+    The letter that is given as the answer counts, not the "A" of "A cube".
+    """
     item = next(item for item in items() if len(item.choices) == 3)
 
     verdict = judge_reply(item, "choice", reply)
@@ -119,6 +135,10 @@ def test_a_choice_is_read_by_its_letter(reply, understood):
 
 @pytest.mark.parametrize("form", ["{letter}. {choice}", "The answer is {letter}: {choice}"])
 def test_the_words_of_no_choice_cast_doubt_on_its_letter(form):
+    """A reply may repeat the choice after its letter: the letter alone is understood.
+
+    Each choice of each item is tried; its own words must not be read as another letter.
+    """
     for item in items():
         for letter, choice in zip("ABCD", item.choices, strict=False):
             reply = form.format(letter=letter, choice=choice)
@@ -127,6 +147,10 @@ def test_the_words_of_no_choice_cast_doubt_on_its_letter(form):
 
 @pytest.mark.parametrize("kind", QUESTION_KINDS)
 def test_thoughts_in_an_answer_are_not_scored(kind):
+    """Thoughts name two goals and the letter D; the right answer comes after `</think>`.
+
+    With the answer the reply is right, and with the thoughts alone nothing is understood.
+    """
     item = item_of("PickXtimes")
     thoughts = f"<think>{item.goals[0]} or {item.goals[-1]}, the answer is D</think>"
 
@@ -135,13 +159,18 @@ def test_thoughts_in_an_answer_are_not_scored(kind):
 
 
 def test_points_in_a_list_are_all_read_and_numbers_may_be_texts():
+    """The reply is a JSON list of the right points, in which x is a number and y a text."""
     item = item_of("PickXtimes")
     points = [{"x": point.x, "y": str(point.y)} for point in item.points]
     assert judge_reply(item, "points", json.dumps(points)).right
 
 
 def test_slots_are_judged_one_by_one():
-    """The color is right and the number is not."""
+    """The reply has the right color and another number: one slot is right, the answer is not.
+
+    Numbers of repeats are from 1 to 5, so `% 5 + 1` gives another of them. The JSON stands in a
+    block of code after other words.
+    """
     item = item_of("PickXtimes")
     answer = json.loads(item.answer)
     other = {**answer, "repeats": answer["repeats"] % 5 + 1}
@@ -154,6 +183,7 @@ def test_slots_are_judged_one_by_one():
 
 
 def test_a_reply_that_is_no_goal_has_all_slots_wrong():
+    """Words without JSON: not right, nothing understood, and both slots of the task wrong."""
     verdict = judge_reply(item_of("PickXtimes"), "slots", "red, I guess")
     assert verdict == (False, None, {"color": False, "repeats": False})
 
@@ -171,7 +201,11 @@ def test_a_reply_that_is_no_goal_has_all_slots_wrong():
     ids=["in both", "just outside", "swapped", "one", "one too many", "outside the picture"],
 )
 def test_points_must_lie_in_the_masks_in_order(points, right, parts):
-    """The masks are 8 × 8 pixels, at (10, 40) and at (30, 40)."""
+    """The masks are 8 × 8 pixels, at (10, 40) and (30, 40): x from 10 to below 18 is in the first.
+
+    `parts` says of each mask whether its point lies in it. With a point too many both are hit, but
+    the answer is not right.
+    """
     reply = json.dumps({"points": [{"x": x, "y": y} for x, y in points]})
 
     verdict = judge_reply(item_of("PickXtimes"), "points", reply)
@@ -184,7 +218,11 @@ def test_points_must_lie_in_the_masks_in_order(points, right, parts):
     ("second", "right"), [({"x": 10, "y": 40}, True), ({"x": 30, "y": 40}, False)]
 )
 def test_points_of_amounts_have_no_order(second, right):
-    """But each mask must be met: the second point lies in the first mask, or again in the other."""
+    """Each of the two masks, at (10, 40) and (30, 40), must be met once, in any order.
+
+    The first point lies in the second mask. So a second point in the first mask completes the
+    answer, and another one at (30, 40) leaves the first mask unmet.
+    """
     reply = json.dumps({"points": [{"x": 30, "y": 40}, second]})
     assert judge_reply(item_of("BinFill"), "points", reply).right == right
 
@@ -195,6 +233,11 @@ def test_points_of_amounts_have_no_order(second, right):
               '{"points": [{"x": 2, "y": 1e400}]}', '{"x": 1, "y": 2, "x": 3}']
 )  # fmt: skip
 def test_replies_that_point_nowhere_are_no_answer(reply):
+    """No reply has a point of two finite numbers: nothing is understood, so nothing is right.
+
+    Among them are an empty list, a truth value for x, NaN, a number beyond floats, and x given
+    twice.
+    """
     verdict = judge_reply(item_of("PickXtimes"), "points", reply)
 
     assert verdict.understood is None
@@ -205,7 +248,7 @@ def test_replies_that_point_nowhere_are_no_answer(reply):
 def half_answered():
     """The score, and rows by setting, of four of eight episodes of five tasks.
 
-    All explicit answers are right, and all others say nothing.
+    All explicit answers are right; all others are `{}`, which says nothing and counts as wrong.
     """
     answers = []
     for item in items():
@@ -216,6 +259,11 @@ def half_answered():
 
 
 def test_rates_and_gap_are_those_of_the_items_that_have_answers(half_answered):
+    """Explicit answers are all right and direct ones all empty: rates 1 and 0, so a gap of -1.
+
+    Answers are to four episodes of five tasks, hence 4 * 5 trials; items without an answer do not
+    count.
+    """
     _, rows = half_answered
 
     assert rows["explicit"].summary.rate == 1
@@ -225,7 +273,11 @@ def test_rates_and_gap_are_those_of_the_items_that_have_answers(half_answered):
 
 
 def test_p_values_are_those_of_the_sign_flip_test_and_holms_of_four_settings(half_answered):
-    """All 20 pairs differ to one side; spatial has fewer tasks, so its p-value is larger."""
+    """All 20 pairs (4 episodes of 5 tasks) differ to one side: 2 of 2**20 flips of signs do so.
+
+    Holm multiplies the smallest of the four settings' p-values by 4; that of spatial, which fewer
+    tasks have, is larger.
+    """
     _, rows = half_answered
 
     p_value = 2 * 0.5**20
@@ -235,7 +287,10 @@ def test_p_values_are_those_of_the_sign_flip_test_and_holms_of_four_settings(hal
 
 
 def test_a_rate_is_corrected_for_chance(half_answered):
-    """0 at chance, and 1 if all is right; a rate of 0 is as far below as chance allows."""
+    """Corrected is (rate - chance) / (1 - chance): 0 at chance, and 1 if all is right.
+
+    Direct answers are empty, so their rate is 0, which is as far below chance as can be.
+    """
     _, rows = half_answered
     direct = rows["direct"]
 
@@ -243,6 +298,7 @@ def test_a_rate_is_corrected_for_chance(half_answered):
 
 
 def test_unusable_and_missing_answers_are_counted(half_answered):
+    """Of episodes below 4 the answers are `{}` but for explicit ones; from 4 on there are none."""
     score, _ = half_answered
 
     assert score.unparsed == sum(
@@ -252,14 +308,17 @@ def test_unusable_and_missing_answers_are_counted(half_answered):
 
 
 def test_only_items_with_hidden_slots_have_a_rate_of_them(half_answered):
-    """Explicit words hide nothing."""
+    """Explicit words hide no slot, so they have no rate; of direct ones no answer `{}` is right."""
     _, rows = half_answered
     assert (rows["explicit"].hidden, rows["direct"].hidden) == (None, 0)
 
 
 @pytest.mark.parametrize("rule", ["first-mention", "surface"])
 def test_shortcuts_are_right_as_often_as_the_listeners_that_use_them(rule):
-    """Those of `roboirg tables --floors`, within 15 points."""
+    """A rule answers items as often right as `floor_level` says of a policy with the same rule.
+
+    A setting has 48 items (24 episodes of two tasks), so 0.15 is two standard errors of a rate.
+    """
     dataset = items(episodes=24, tasks=("PickXtimes", "VideoPlaceButton"))
     _, rows = rows_of(floor_answers(rule, dataset), "slots", dataset)
 
@@ -274,6 +333,11 @@ def test_shortcuts_are_right_as_often_as_the_listeners_that_use_them(rule):
 
 
 def test_who_hears_the_command_alone_is_right_in_explicit_and_guesses_in_direct():
+    """The floor `command` reads the last utterance alone, which says all in explicit.
+
+    In direct it picks among the goals that fit: its rate is `command_chance` within 0.15, two
+    standard errors of the rate of 48 items.
+    """
     dataset = items(episodes=24, tasks=("PickXtimes", "VideoPlaceButton"))
 
     _, rows = rows_of(floor_answers("command", dataset), "slots", dataset)
@@ -284,6 +348,11 @@ def test_who_hears_the_command_alone_is_right_in_explicit_and_guesses_in_direct(
 
 
 def test_the_words_alone_are_learned_from_the_train_split():
+    """The floor `text-only` learned answers from words without a picture (needs scikit-learn).
+
+    On 50 episodes of StopCube explicit words name the answer, so it is nearly always right; the
+    words of direct help it to at least 0.3 more than a guess.
+    """
     pytest.importorskip("sklearn")
     dataset = [item for item in items(("StopCube",), 50) if item.setting in ("explicit", "direct")]
 
@@ -295,6 +364,10 @@ def test_the_words_alone_are_learned_from_the_train_split():
 
 @pytest.mark.parametrize("name", sorted(set(FLOORS) - {"text-only"}))
 def test_a_floor_answers_every_item_whatever_the_others_are(name):
+    """Two episodes of StopCube get the same answers alone as among all items, and each has one.
+
+    A choice is answered by a letter.
+    """
     few = [item for item in items() if item.task == "StopCube" and item.episode < 2]
 
     answers = list(floor_answers(name, few))
@@ -306,7 +379,7 @@ def test_a_floor_answers_every_item_whatever_the_others_are(name):
 
 
 def test_answers_of_every_kind_are_read_as_they_were_written(tmp_path):
-    """An empty line between them does no harm."""
+    """One answer to each kind of question is written and read; an empty line does no harm."""
     path = tmp_path / "model.jsonl"
     answers = [
         Answer(items()[0].id, "slots", f"It is {items()[0].answer}"),
@@ -333,6 +406,9 @@ def test_answers_of_every_kind_are_read_as_they_were_written(tmp_path):
     ids=["no JSON", "no item", "unknown item", "unknown question", "again", "empty"],
 )
 def test_a_file_that_holds_no_answers_is_refused_in_one_sentence(tmp_path, line, words):
+    """In a line, ID stands for the id of an item that the dataset has; `words` are in the
+    message.
+    """
     path = tmp_path / "answers.jsonl"
     path.write_text(line.replace("ID", items()[0].id))
 
@@ -353,7 +429,7 @@ def run(*arguments):
 
 @pytest.fixture
 def scored(tmp_path):
-    """Score a model that is right and one that is mixed, next to the floor; return the command.
+    """What came of `score grounding` of a right model and a mixed one, with the floor of chance.
 
     Items are of two episodes of five tasks, BinFill with fewer. Of the mixed one, every seventh
     answer is missing, the others are right, wrong or unusable; to choices it always says A.
@@ -379,22 +455,31 @@ def scored(tmp_path):
 
 
 def test_the_command_prints_a_table_of_scores(scored, tmp_path, snapshot):
+    """`scored` has run the command on a right model, a mixed one and the floor of chance.
+
+    The snapshot has the table with a row for each of them, kind of question and setting.
+    """
     assert scored.exit_code == 0, scored.output
     assert scored.output.replace(str(tmp_path), "FOLDER") == snapshot
 
 
 def test_the_command_writes_a_report_of_each_model(scored, tmp_path, snapshot):
+    """The snapshot has the section of the mixed model's slots, up to that of the floor.
+
+    `scored` has run the command, whose report has a section for each model and kind of question.
+    """
     _, _, report = (tmp_path / "report.md").read_text().partition("\n## mixed, slots\n")
     assert report.partition("\n## chance, slots")[0] == snapshot
 
 
 def test_the_command_writes_the_answers_of_floors(scored, tmp_path):
-    """To three questions about each item."""
+    """`scored` asked for the floor of chance, which answers the three questions of each item."""
     answers = read_answers(tmp_path / "floors" / "chance.jsonl", items())
     assert len(answers) == 3 * len(read_items(tmp_path / "set"))
 
 
 def test_items_of_several_splits_are_not_scored_together():
+    """One more item, of the split val, is added to items of the test split."""
     dataset = [*items(), replace(items()[0], split="val")]
     with pytest.raises(InvalidValueError, match="several splits, wordings or versions"):
         score_answers(dataset, [Answer(items()[0].id, "choice", "A")], "m")
@@ -417,6 +502,10 @@ def test_items_that_are_a_pipe_are_refused(tmp_path):
     ],
 )
 def test_a_command_that_has_nothing_to_score_is_refused_in_one_sentence(tmp_path, arguments, words):
+    """Of no answers and no floor, a floor that is not known, and a folder without items.
+
+    All other words of the command are in order, with a dataset in the folder.
+    """
     write_items(items(), tmp_path)
 
     done = run("--data", tmp_path, *arguments)

@@ -60,7 +60,11 @@ def said_of(item, episode):
 
 @pytest.mark.parametrize("task", BENCHMARK)
 def test_answers_are_what_the_words_mean_in_the_scene(task):
-    """In all forms and settings of an episode. The right answers are among the scene's goals."""
+    """In all forms and settings of an episode, stored answers are the goals that a reader finds.
+
+    The answer that counts is one of them, and the goals to choose from are those of the scene, each
+    once.
+    """
     answers = goal_schema(task).answers
     episode, items = items_of(task, 0, forms=FORMS, every_variant=True)
     goals_of_scene = {answers[goal] for goal in get_task(task).goals(episode.scene)}
@@ -91,7 +95,7 @@ def test_choices_are_goals_of_the_scene_in_other_words_and_one_is_right(task):
 
 @pytest.mark.parametrize("task", BENCHMARK)
 def test_who_hears_the_command_alone_can_only_guess_among_the_choices(task):
-    """All choices fit the command, where it leaves anything open."""
+    """Where the command leaves anything open (its chance is below 1), all choices fit it."""
     episode, items = items_of(task, 1)
 
     for item in items:
@@ -126,7 +130,9 @@ def test_no_two_items_have_the_same_id():
 
 
 def test_the_id_of_an_item_does_not_depend_on_the_answer():
-    """Or it would give the answer away."""
+    """The same episode with each goal of its scene has one id, which so does not tell the
+    answer.
+    """
     episode = get_episode("PickXtimes", "test", 3)
     options = InstructionOptions("direct")
     goals = get_task("PickXtimes").goals(episode.scene)
@@ -177,16 +183,19 @@ def test_a_mask_is_read_back_from_its_run_lengths(mask):
 @settings(max_examples=30)
 @given(mask=arrays(bool, array_shapes(min_dims=2, max_dims=2, max_side=9)))
 def test_the_pixel_nearest_to_the_center_of_a_mask_is_in_it(mask):
+    """Also in a mask with a hole in its center; an empty mask has no such pixel and is left out."""
     if mask.any():
         assert mask[nearest_to_center(mask)]
 
 
 def test_runs_that_do_not_fill_the_picture_are_refused():
+    """Runs of 1 and 2 pixels make 3, and the picture has 2 × 2."""
     with pytest.raises(InvalidValueError, match="cover 3 pixels; they must cover 2 x 2"):
         decode_mask([1, 2], (2, 2))
 
 
 def test_run_lengths_go_down_the_columns():
+    """By columns the pixels are False, True, True, True: one outside the mask, then three in it."""
     mask = np.array([[False, True], [True, True]])
     assert encode_mask(mask) == [1, 3]
 
@@ -203,10 +212,12 @@ def test_run_lengths_go_down_the_columns():
     ],
 )
 def test_things_to_point_at_are_those_that_the_words_tell_apart(task, kinds):
+    """A task's words tell things of these kinds apart, so an answer points at them."""
     assert pointed_kinds(task) == kinds
 
 
 def test_a_hidden_cube_that_appears_later_is_pointed_at_where_it_will_be():
+    """In ButtonUnmask a cube appears once the button is pressed; it is the goal's color."""
     episode = get_episode("ButtonUnmask", "test", 0)
 
     (referent,) = find_referents(episode)
@@ -216,6 +227,7 @@ def test_a_hidden_cube_that_appears_later_is_pointed_at_where_it_will_be():
 
 
 def test_a_cube_that_was_hidden_in_the_video_is_pointed_at_by_its_container():
+    """The one thing to point at is a container, and the cube in it has the goal's color."""
     episode = get_episode("VideoUnmask", "test", 0)
 
     (referent,) = find_referents(episode)
@@ -236,6 +248,7 @@ def test_of_an_amount_every_thing_of_the_color_will_do():
 
 
 def test_a_question_has_the_instruction_and_the_choices_with_their_letters():
+    """In each setting of an episode, the question of choice lists lines such as "A. pick ..."."""
     _, items = items_of("PickXtimes", 0)
 
     for item in items:
@@ -246,6 +259,10 @@ def test_a_question_has_the_instruction_and_the_choices_with_their_letters():
 
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory):
+    """The request, folder and counts of a dataset of five episodes (`SEEN`) in all settings.
+
+    A video is shown by four frames; its film has every 16th picture.
+    """
     folder = tmp_path_factory.mktemp("grounding") / "set"
     request = ExportRequest(
         tuple((task, "test", index) for task, index in SEEN),
@@ -260,7 +277,11 @@ def exported(tmp_path_factory):
 @pytest.mark.sim
 @pytest.mark.parametrize(("task", "index"), SEEN)
 def test_pixels_lie_in_masks_of_the_right_things(exported, task, index):
-    """The right place is computed from poses and the camera, not from the segmentation."""
+    """Each answer's pixel lies in its mask, and the mask within 9 pixels of the thing's center.
+
+    The right place is computed from poses and the camera, not from the segmentation. Where one
+    thing alone is right, the mask's center is less than 12 pixels from it.
+    """
     _, folder, _ = exported
     items = {item.task: item for item in read_items(folder) if item.setting == "direct"}
     points = items[task].points
@@ -294,6 +315,7 @@ def project(observation, position):
 
 @pytest.mark.sim
 def test_pictures_are_stored_once_and_all_are_there(exported):
+    """Items share pictures: there are as many files as different paths, and as were counted."""
     _, folder, facts = exported
     paths = set()
     for item in read_items(folder):
@@ -359,6 +381,7 @@ def test_a_setting_that_a_task_lacks_is_refused(tmp_path):
 
 
 def test_a_folder_of_something_else_is_not_touched(tmp_path):
+    """The folder holds somebody's thesis, so no dataset is written there."""
     (tmp_path / "thesis.tex").write_text("mine")
     request = ExportRequest((("StopCube", "test", 0),), ("explicit",), ("implicit",))
     with pytest.raises(InvalidValueError, match="not an empty folder"):

@@ -25,6 +25,7 @@ PICTURE = encode_png(Picture(np.zeros((256, 256, 3), np.uint8)))
 
 @functools.cache
 def items():
+    """The items of the first episode of each task, in all settings."""
     found = []
     for task in all_tasks():
         found += items_of(task, 0)[1]
@@ -42,17 +43,23 @@ def replies():
 
 
 def asked(item):
+    """The words of the instruction and of the question, by which a scripted model knows an item."""
     return item.said, item.slots_question
 
 
 @functools.cache
 def own_verdicts():
+    """Our verdicts on the scripted replies about slots, by the items' ids."""
     answers = [Answer(item.id, "slots", replies()[asked(item)]) for item in items()]
     (score,) = score_answers(items(), answers, "scripted")
     return {item.id: verdict for item, verdict in score.judged}
 
 
 def test_the_listener_is_asked_what_the_dataset_asks_and_takes_its_answer():
+    """A vision-language listener is served the item's right answer and decides the right goal.
+
+    The request that the server got has the texts of the dataset's item in their order.
+    """
     item = next(item for item in items() if item.setting == "direct")
     episode = get_episode(item.task, item.split, item.episode)
     with fake_vlm([item.answer]) as server:
@@ -68,6 +75,7 @@ def test_the_listener_is_asked_what_the_dataset_asks_and_takes_its_answer():
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
+    """The folder of a dataset of the items, all with one black picture."""
     folder = tmp_path_factory.mktemp("inspect") / "set"
     stored = store_content(folder, "pictures", PICTURE, ".png")
     write_items([replace(item, picture=stored) for item in items()], folder)
@@ -75,6 +83,7 @@ def data(tmp_path_factory):
 
 
 def run_inspect(data, replies_of, logs, question="slots", stop_reason="stop", **options):
+    """Run our task in Inspect with a model that answers by `replies_of`; return the log."""
     inspect_ai = pytest.importorskip("inspect_ai")
     from inspect_ai.model import ModelOutput, ModelUsage, get_model
 
@@ -99,6 +108,11 @@ def run_inspect(data, replies_of, logs, question="slots", stop_reason="stop", **
 
 
 def test_inspect_and_our_scores_agree(data, tmp_path):
+    """A scripted model answers right, wrong and unusably by turns (`replies`).
+
+    Inspect and `score_answers` agree on each item. An unusable reply is asked for once more, so
+    that its conversation has four messages instead of two.
+    """
     pytest.importorskip("inspect_ai")
     from roboirg.apps.grounding.inspect_grounding import log_answers
 
@@ -126,6 +140,10 @@ def test_inspect_and_our_scores_agree(data, tmp_path):
 
 @pytest.mark.parametrize("question", ["choice", "points"])
 def test_inspect_asks_the_other_questions(data, tmp_path, question):
+    """The model gets one picture and gives the right reply, so that all are right: accuracy 1.
+
+    Options of the task leave the setting direct and two tasks.
+    """
     pytest.importorskip("inspect_ai")
     right = {item.question(question) + item.said: item for item in items()}
 
@@ -144,6 +162,7 @@ def test_inspect_asks_the_other_questions(data, tmp_path, question):
 
 
 def test_inspect_says_what_is_wrong(data):
+    """A question and a setting that do not exist are refused by their names."""
     pytest.importorskip("inspect_ai")
     from roboirg.apps.grounding.inspect_grounding import roboirg_grounding
     from roboirg.core.errors import InvalidValueError
@@ -173,6 +192,7 @@ def test_a_draft_that_was_cut_off_is_no_answer(question, reply, understood):
 
 
 def test_inspect_marks_replies_that_reached_the_limit_of_tokens(data, tmp_path):
+    """The model stops in "Answer: A. But" for its limit; the draft is marked, and not right."""
     pytest.importorskip("inspect_ai")
     from roboirg.apps.grounding.inspect_grounding import log_answers
 

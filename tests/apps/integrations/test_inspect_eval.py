@@ -64,6 +64,11 @@ def ours(model):
 
 @pytest.mark.parametrize("samples", SAMPLES)
 def test_the_page_s_commands_have_the_outcomes_of_our_runner(model, ours, tmp_path, samples):
+    """The page's commands are played by Inspect with a scripted model, right in every other
+    episode. Replaced are the tasks, and how many episodes are played, and how many at a time.
+    `ours` has outcomes of our runner with the same model: they agree in success and steps. The
+    model is told neither setting nor seed, and is asked once an episode.
+    """
     model.requests.clear()
     more = f"-T episodes={PER_TASK} -T max_steps={MAX_STEPS}"
 

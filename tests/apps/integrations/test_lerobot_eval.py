@@ -37,6 +37,11 @@ def ours(checkpoint):
 def test_the_page_s_commands_have_the_outcomes_of_our_runner(
     checkpoint, ours, tmp_path, batch, use_async
 ):
+    """The page's commands are played by LeRobot with a checkpoint of recorded actions.
+
+    Replaced are the checkpoint, tasks, setting, and how many episodes are played, and how many at a
+    time. `ours` has the outcomes of our runner with the same checkpoint, which agree.
+    """
     run_page(
         "LeRobot",
         tmp_path,

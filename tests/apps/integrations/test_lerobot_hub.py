@@ -35,6 +35,12 @@ def hub(tmp_path):
 def test_the_page_s_program_has_the_outcomes_of_our_runner(
     checkpoint, ours, hub, tmp_path, batch, use_async
 ):
+    """The program of the page is written to a file and played with LeRobot 0.4, offline.
+
+    Replaced are the checkpoint (by one that plays recorded actions, and is made known), sizes of
+    batches, and what is written of each episode. `ours` are outcomes of our runner with the same
+    actions, so tasks, episodes and successes agree.
+    """
     values = {
         "import json\n": "import json\nimport replay_checkpoint\n",  # makes the policy known
         "lerobot/some-checkpoint": checkpoint,
@@ -55,6 +61,7 @@ def test_the_page_s_program_has_the_outcomes_of_our_runner(
 
 
 def options():
+    """The options of episodes that the program of the page should write with its verdicts."""
     return {"cameras": ["front"], "meshes": MESHES, "max_steps": MAX_STEPS}
 
 

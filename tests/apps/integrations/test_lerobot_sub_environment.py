@@ -17,6 +17,7 @@ SIZE = 32
 
 
 def reset(**options):
+    """Return an environment of two steps of VideoUnmask, and what its reset to seed 51 gives."""
     env = LeRobotSubEnvironment(
         "VideoUnmask", cameras=("front",), size=SIZE, max_steps=2, **options
     )
@@ -48,6 +49,10 @@ def test_the_video_comes_first_and_the_end_is_repeated():
 
 
 def test_an_action_that_is_none_ends_the_episode_until_a_reset_is_meant():
+    """An action of NaN ends the episode as a failure; later steps repeat that end.
+
+    Only a reset that says that a new rollout begins starts the next episode.
+    """
     env, *_ = reset()
     ended = env.step(np.full(8, np.nan))
     assert ended[1:] == (0.0, True, False, {"is_success": False, "is_video_demo": False})
@@ -59,7 +64,10 @@ def test_an_action_that_is_none_ends_the_episode_until_a_reset_is_meant():
 
 
 def test_batches_report_the_end_where_lerobot_looks_for_it():
-    """LeRobot 0.4 reads successes from `final_info` alone."""
+    """Two episodes of one step end together, as failures, since the arm only holds still.
+
+    LeRobot 0.4 reads successes from `final_info` alone. Seeds 1000 and 1001 are episodes 0 and 1.
+    """
     env = make_batch("StopCube", 2, False, {"cameras": ("front",), "size": SIZE, "max_steps": 1})
     env.reset(seed=[1000, 1001])
     actions = np.tile(HOME_ACTION, (2, 1)).astype(np.float32)

@@ -61,6 +61,10 @@ def folder(tmp_path_factory):
 
 
 def test_the_page_s_commands_have_equal_outcomes(folder):
+    """The page's commands trained ACT and played two episodes by lerobot-eval and by `roboirg run`.
+
+    `folder` has run them with smaller networks and fewer steps. Both have the same successes.
+    """
     told = json.loads((folder / "runs" / "eval" / "eval_info.json").read_text())
     (theirs,) = [task["metrics"]["successes"] for task in told["per_task"]]
 
@@ -119,6 +123,12 @@ def ensembling(folder, tmp_path):
     [("act", [8] * 5), ("diffusion", [7, 1] * 5), ("vqbet", [1] * STEPS), ("ensembling", None)],
 )
 def test_actions_are_those_of_lerobot_s_loop(folder, kind, at_a_time, monkeypatch, request):
+    """A policy executes the same actions in our loop and in lerobot-eval's, over 40 steps.
+
+    `at_a_time` is how many each answer has: ACT's chunks of 8; diffusion's 7 and 1 in turn;
+    otherwise one. Noise is drawn from the same seed in both, and the arm moves, so that
+    equal actions say something.
+    """
     place = folder / "outputs" / kind / LAST if at_a_time else request.getfixturevalue(kind)
     draw_the_same(get_policy_class(kind if at_a_time else "act"), monkeypatch)
     expected = lerobot_s_actions(place, 1)

@@ -87,6 +87,12 @@ def in_shards(count):
 
 @pytest.mark.parametrize("batch", BATCHES)
 def test_the_page_s_commands_have_the_outcomes_of_our_runner(table, ours, tmp_path, batch):
+    """The page's commands are played by vla-eval with a server of recorded actions.
+
+    Replaced are the configuration, by one with fewer episodes, and the shards, by as many as play
+    at a time. `ours` has outcomes of our runner with the same actions: they agree in success and
+    steps. The server was told nothing that gives the goal away.
+    """
     log = tmp_path / "told.jsonl"
     with serving(table, log, batch) as port:
         write_configuration(tmp_path / "run.yaml", port)
@@ -130,6 +136,10 @@ def test_the_page_names_the_version_that_is_played():
 
 
 def test_the_class_declares_what_it_does():
+    """11 tasks of the benchmark, 1,300 steps and 50 episodes; a pose has 7 numbers.
+
+    Without wrist pictures, observations are the front picture, the words and the state.
+    """
     benchmark = RoboIRGBenchmark(send_wrist_image=False, action_space="ee_pose")
     assert len(benchmark.get_tasks()) == 11
     assert benchmark.get_metadata() == {"max_steps": 1300, "max_episodes_per_task": 50}

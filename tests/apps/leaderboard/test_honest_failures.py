@@ -21,7 +21,7 @@ ENDING_THEIR_PROCESS = ("Die_reset", "Kill_reset", "Sleep_reset", "Die_act", "Ki
 
 
 def play(folder, names, executor, **options):
-    """Play six steps of an episode by each policy."""
+    """Play six steps of an episode by each policy, which are classes of failing_policies.py."""
     plan = Plan.model_validate(
         {
             "policies": [f"failing_policies:{name}" for name in names],
@@ -53,6 +53,10 @@ def records_by_class(folder):
 
 
 def test_the_record_has_the_kind_of_error_that_ended_the_episode(in_process):
+    """Policies of three lists were played: those that raise or exit, those that give no actions,
+    the rest. A name has what a class does and in which call, as `Raises_act_2`. The rest reach the
+    end of the episode, so their records have no error.
+    """
     errors = {name: record.error for name, record in records_by_class(in_process).items()}
 
     assert errors == {
@@ -66,7 +70,10 @@ def test_the_record_has_the_kind_of_error_that_ended_the_episode(in_process):
     ("name", "steps"), [("Raises_act_1", 0), ("Raises_act_2", 1), ("Posing", 2)]
 )
 def test_the_actions_before_an_error_are_kept(name, steps, in_process):
-    """Posing raises in its third call."""
+    """Steps are those before the call that raises: the first, second and third (`Posing`) of `act`.
+
+    An action is one step here.
+    """
     record = records_by_class(in_process)[name]
 
     assert record.steps == steps
@@ -74,6 +81,10 @@ def test_the_actions_before_an_error_are_kept(name, steps, in_process):
 
 
 def test_a_run_of_policies_that_fail_in_this_process_holds(in_process):
+    """Six policies raise or exit and ten give no actions, so that 16 records have an error.
+
+    To play the run again confirms all of them.
+    """
     found = verify_run(in_process, workers=1)
 
     assert found.holds, found
@@ -82,6 +93,10 @@ def test_a_run_of_policies_that_fail_in_this_process_holds(in_process):
 
 @pytest.mark.slow
 def test_a_run_of_policies_whose_process_ends_holds(tmp_path):
+    """Policies kill their process, end it, or sleep for longer than the 30 s they have.
+
+    The run is played again in processes of its own, and holds.
+    """
     play(tmp_path, ENDING_THEIR_PROCESS, LocalProcesses(1), policy_timeout_s=30.0)
 
     found = verify_run(tmp_path)

@@ -178,6 +178,10 @@ def planned(**changes):
 def test_records_that_are_none_are_refused_by_the_name_of_their_file(
     change, complaint, reader, run
 ):
+    """Each change spoils the first of two records, or the file; reading and packing both refuse it.
+
+    `complaint` is a pattern of the one sentence (`$` is the record), which also names the file.
+    """
     change(run)
 
     message = refusal(reader, run)
@@ -204,6 +208,10 @@ def test_records_that_are_none_are_refused_by_the_name_of_their_file(
 def test_fields_that_packs_hold_unread_are_refused_by_who_reads_them(
     change, complaint, reader, run
 ):
+    """A step that is too large, and fields that no version of records has, as `luck`.
+
+    Packing doesn't read these fields; reading and merging do, and name field and file.
+    """
     change(run)
 
     message = refusal(reader, run)
@@ -222,12 +230,14 @@ DAMAGE = {
 @pytest.mark.parametrize("reader", [pack, verify])
 @cases("damage", DAMAGE)
 def test_a_run_with_a_damaged_line_is_refused(damage, reader, run):
+    """`DAMAGE` spoils the first of two lines of records, so that it can't be decoded."""
     damage(run)
     assert "has 1 damaged line, the first is line 1" in refusal(reader, run)
 
 
 @cases("damage", DAMAGE)
 def test_merging_warns_of_a_damaged_line_and_leaves_it_out(damage, run, caplog):
+    """`DAMAGE` spoils the first of two records; the second one is what the merged run has."""
     damage(run)
 
     merged = merge(run)
@@ -260,6 +270,9 @@ def lead_out(run, name):
     "name", ["logs", "logs/*.txt", "actions/*/*.npz", "videos/*.mp4", PLAN_FILE, "plans/1.json"]
 )
 def test_links_that_lead_out_of_a_run_are_not_followed(name, reader, run):
+    """A file or folder of the run becomes a link to a secret outside: refused, and copied
+    nowhere.
+    """
     lead_out(run, name)
 
     assert "link leads elsewhere" in refusal(reader, run)
@@ -272,6 +285,7 @@ def test_links_that_lead_out_of_a_run_are_not_followed(name, reader, run):
 
 @pytest.mark.parametrize("name", ["videos", "videos/*.mp4", "videos/*.jpg"])
 def test_the_page_embeds_nothing_from_outside(name, run):
+    """Videos or posters of the run become links to a secret outside, and the page is refused."""
     lead_out(run, name)
     assert "link leads elsewhere" in refusal(report, run)
 
@@ -285,11 +299,13 @@ def test_the_page_follows_no_circle_of_links(run):
 
 
 def test_a_poster_of_10_gib_is_not_embedded(run):
+    """The poster is a file of 10 GiB (sparse, so without room on the disk); the page is small."""
     sparse(10 << 30)(next(run.glob("videos/*.jpg")))
     assert report(run).stat().st_size < 20 << 20
 
 
 def test_a_run_of_a_tebibyte_is_refused_before_it_is_packed(run):
+    """A log has 1 << 40 bytes (sparse); no half-written pack (`.part`) is left."""
     replaced("logs/large.txt", sparse(1 << 40))(run)
 
     assert "logs/large.txt" in refusal(pack, run)
@@ -297,6 +313,7 @@ def test_a_run_of_a_tebibyte_is_refused_before_it_is_packed(run):
 
 
 def test_hidden_files_and_pipes_are_not_packed(run):
+    """Two files join the logs, a hidden one and a pipe: all others are packed."""
     (run / "logs" / ".DS_Store").touch()
     os.mkfifo(run / "logs" / "pipe.txt")
 
@@ -307,6 +324,7 @@ def test_hidden_files_and_pipes_are_not_packed(run):
 
 
 def test_a_plan_of_900_000_jobs_is_read(run):
+    """9,000 seeds times 50 episodes times two policies; a million is the limit."""
     planned(policy_seeds=list(range(9_000)), episodes=list(range(50)))(run)
     assert len(read_plans(run)) == 1
 
@@ -324,6 +342,7 @@ def test_a_plan_of_900_000_jobs_is_read(run):
     },
 )
 def test_a_stored_plan_that_cannot_be_counts_as_missing(change, run):
+    """The plan of a run is spoiled or too large; its two records then come from no plan."""
     change(run)
 
     assert read_plans(run) == ()
@@ -334,6 +353,7 @@ def test_a_stored_plan_that_cannot_be_counts_as_missing(change, run):
     "reader", [merge, lambda run: read_plan_file(str(run / PLAN_FILE))], ids=["merged", "played"]
 )
 def test_a_plan_of_3_gb_is_neither_merged_nor_played(reader, run):
+    """The plan is a sparse file of 3 << 30 bytes, and refused by its size."""
     replaced(PLAN_FILE, sparse(3 << 30))(run)
 
     assert "plan.json has more than" in refusal(reader, run)
@@ -415,7 +435,10 @@ UNKNOWN_METHOD = _headers_with(8, 99)
     },
 )
 def test_action_files_that_are_none_are_refused_and_named_by_verify(damaged, run):
-    """By verify for both records, which name the same file."""
+    """`damaged` makes other bytes of the good file, which is an archive of NumPy's arrays.
+
+    Both records of the run name this file, so that verify tells of it twice.
+    """
     digest = line_of(run)["action_log"]
     path = action_path(run, digest)
     path.write_bytes(damaged(path.read_bytes()))
@@ -496,6 +519,10 @@ def _swollen(good, only=b""):
     },
 )
 def test_a_pack_that_is_none_is_refused_and_leaves_nothing_behind(build, complaint, run):
+    """`build` makes the bytes of a bad pack from those of a good one.
+
+    It is refused with this complaint, and the folder has the same files as before.
+    """
     path = pack(run)
     path.write_bytes(build(path.read_bytes()))
     files_before = sorted(run.parent.rglob("*"))
@@ -507,7 +534,10 @@ def test_a_pack_that_is_none_is_refused_and_leaves_nothing_behind(build, complai
 
 
 def test_what_a_command_does_not_read_of_a_pack_is_not_unpacked(run, monkeypatch):
-    """Videos that are too large keep nobody from the records."""
+    """The archive says of its videos that they have 4 GiB each; only actions are asked for.
+
+    The limit is 10 GiB here. Videos that are too large keep nobody from the two records.
+    """
     monkeypatch.setattr("roboirg.records.packs.MOST_PACKED_BYTES", 10 << 30)
     path = pack(run)
     path.write_bytes(_swollen(path.read_bytes(), only=b"videos/"))
@@ -518,6 +548,7 @@ def test_what_a_command_does_not_read_of_a_pack_is_not_unpacked(run, monkeypatch
 
 
 def test_a_pack_of_videos_that_are_too_large_is_refused_by_who_reads_them(run, monkeypatch):
+    """The archive says of the files in `videos` that they have 4 GiB each, above 10 GiB in all."""
     monkeypatch.setattr("roboirg.records.packs.MOST_PACKED_BYTES", 10 << 30)
     path = pack(run)
     path.write_bytes(_swollen(path.read_bytes(), only=b"videos/"))
@@ -526,6 +557,7 @@ def test_a_pack_of_videos_that_are_too_large_is_refused_by_who_reads_them(run, m
 
 
 def test_a_warning_about_a_pack_names_the_pack(run, caplog):
+    """A damaged line is added to the records in the pack; they are read with a warning."""
     path = pack(run)
     records = (run / RECORDS_FILE).read_bytes() + b"damaged\n"
     path.write_bytes(_with({RECORDS_FILE: records})(path.read_bytes()))
@@ -556,6 +588,7 @@ stated.all = { color = "the {color} cube" }
     },
 )
 def test_wording_files_that_are_malformed_or_huge_are_refused_by_name(content, complaint, tmp_path):
+    """Each content is a file that is no TOML, or goes beyond a limit, or reads an attribute."""
     path = tmp_path / "words.toml"
     path.write_text(content)
 

@@ -13,6 +13,11 @@ from roboirg.records.store import read_records
 
 
 def test_the_same_run_comes_out(run, tmp_path):
+    """The run has records, a plan, actions, videos, logs, and here a file of somebody's.
+
+    Without other wishes records, plans and actions are packed, in .jsonl, .json and .npz. The
+    unpacked folder goes when it is left.
+    """
     (run / "secret.txt").write_text("not packed")
 
     pack_run(run, tmp_path / "a.zip")
@@ -25,6 +30,9 @@ def test_the_same_run_comes_out(run, tmp_path):
 
 
 def test_a_pack_has_a_manifest_with_the_number_of_records_and_the_policies(run, tmp_path):
+    """The run has one record of each of two policies; the manifest in the pack is what was
+    returned.
+    """
     manifest = pack_run(run, tmp_path / "a.zip")
 
     assert (manifest.records, manifest.policies) == (2, ("oracle", "random"))
@@ -33,6 +41,7 @@ def test_a_pack_has_a_manifest_with_the_number_of_records_and_the_policies(run, 
 
 
 def test_earlier_plans_of_a_run_are_packed(run, tmp_path):
+    """To store another plan moves the first one to `plans`; both are in the pack."""
     store_plan(b"[]", run)  # the other one stays, as an earlier plan
 
     pack_run(run, tmp_path / "a.zip")
@@ -53,6 +62,7 @@ def disk_that_lists_files_backward(monkeypatch):
 def test_the_same_run_gives_the_same_bytes_on_another_disk(
     run, tmp_path, disk_that_lists_files_backward
 ):
+    """Disks list files in different orders; a pack has one order of its own."""
     pack_run(run, tmp_path / "a.zip", videos=True)
     disk_that_lists_files_backward()
     pack_run(run, tmp_path / "b.zip", videos=True)
@@ -61,6 +71,7 @@ def test_the_same_run_gives_the_same_bytes_on_another_disk(
 
 
 def test_videos_are_packed_if_asked_for(run, tmp_path):
+    """Each of the run's two records has a video."""
     pack_run(run, tmp_path / "a.zip", videos=True)
 
     with opened_run(tmp_path / "a.zip") as folder:

@@ -21,7 +21,12 @@ MOST_BYTES = 1_500_000
 
 @pytest.mark.usefixtures("in_this_process")
 def test_the_commands_of_the_page_make_a_pack_that_holds(tmp_path):
-    """On one episode in one setting, as others take minutes."""
+    """The page's commands of the scripted policies are played: `run`, and the one that packs it.
+
+    Of each, settings and episodes are replaced by one setting and one episode, and folders by a
+    temporary one, as all take minutes. The pack holds; the listener solves the episode, and the
+    policy that keeps to the previous goal doesn't.
+    """
     lines = re.findall(r"^roboirg (.* (?:runs|results)/scripted.*)$", PAGE, re.MULTILINE)
     run, pack = (
         line.replace("--settings every --episodes 3", "--settings contextual --episodes 1")
@@ -43,7 +48,11 @@ def test_the_commands_of_the_page_make_a_pack_that_holds(tmp_path):
 
 @pytest.mark.parametrize("pack", PACKS, ids=lambda pack: pack.name)
 def test_a_shipped_pack_holds_where_it_is_played_again(pack):
-    """On a processor of another maker, one episode in ten moves differently."""
+    """0.3 % of each pack's episodes are played again, and no record is wrong or missing.
+
+    On a processor of another maker, one episode in ten moves differently; such records are marked
+    `elsewhere`. Packs are small enough for the repository.
+    """
     assert pack.stat().st_size <= MOST_BYTES
 
     with opened_run(pack) as folder:

@@ -49,6 +49,7 @@ def honest(tmp_path_factory):
 
 
 def test_an_honest_run_holds(honest):
+    """Two policies played two episodes here, so that each record is found again exactly."""
     found = verify_run(honest)
 
     assert found.holds, found
@@ -91,6 +92,8 @@ def test_what_was_altered_does_not_hold(name, forged):
 
 
 def test_of_a_flipped_event_both_sides_are_printed(forged):
+    """The second event of the first record is said to be over (`holds` False) and was not."""
+
     def flip_the_second_event(lines, _folder, _rng):
         lines[0]["events"][1]["holds"] = False
         return lines
@@ -170,6 +173,11 @@ def test_outcomes_are_checked_in_records_in_other_words(run_in_other_words):
 
 
 def test_a_record_has_the_words_of_its_plan_and_of_its_metadata(forged):
+    """The first record names wordings (a pool and a hash) that neither plan nor episode has.
+
+    That is found three times: against the plan, against the other record, and in the record.
+    """
+
     def reword_the_first(lines, _folder, _rng):
         lines[0]["words"] = "StopCube/test@0a0a0a0a0a0a"
         return lines
@@ -184,6 +192,10 @@ def test_a_record_has_the_words_of_its_plan_and_of_its_metadata(forged):
 
 @pytest.mark.parametrize("words", ["StopCube/train@0a0a0a0a0a0a", "anything", "none"])
 def test_words_of_another_pool_or_of_no_name_do_not_excuse_from_checking(forged, words):
+    """All records name words that are none of the test split's.
+
+    Words of somebody else's file may be unknown here, but these names don't make them so.
+    """
     forge(forged, with_all(words=words))
     found = verify_run(forged)
 
@@ -192,6 +204,7 @@ def test_words_of_another_pool_or_of_no_name_do_not_excuse_from_checking(forged,
 
 
 def test_an_episode_of_the_plan_that_was_left_out_is_named(honest, forged):
+    """The first of two records is removed; the plan has both, so the first one is missing."""
     _, second_line = (forged / "records.jsonl").read_bytes().splitlines(keepends=True)
     (forged / "records.jsonl").write_bytes(second_line)
 
@@ -202,6 +215,9 @@ def test_an_episode_of_the_plan_that_was_left_out_is_named(honest, forged):
 
 
 def test_records_of_another_plan_than_the_stored_one_do_not_hold(forged):
+    """The stored plan is changed (videos of all), so its fingerprint is no more that of the
+    records.
+    """
     plan = json.loads((forged / PLAN_FILE).read_bytes()) | {"video": "all"}
     (forged / PLAN_FILE).write_text(json.dumps(plan), "utf-8")
 
@@ -209,6 +225,7 @@ def test_records_of_another_plan_than_the_stored_one_do_not_hold(forged):
 
 
 def test_a_run_without_a_plan_does_not_hold(forged):
+    """The plan is removed, so both records come from a plan that nobody kept."""
     (forged / PLAN_FILE).unlink()
 
     found = verify_run(forged, sample=0.0)
@@ -218,6 +235,10 @@ def test_a_run_without_a_plan_does_not_hold(forged):
 
 
 def test_words_of_another_part_of_the_discourse_are_found_in_records_that_are_not_played(forged):
+    """The forgery changes which part of the discourse a record's first utterance is.
+
+    Nothing is played again (a sample of 0), as the words follow from the episode alone.
+    """
     forgery, words = FORGERIES["other stage"]
     forge(forged, forgery)
 
@@ -248,6 +269,10 @@ def shift_end_states(run, by, *, is_hash_changed=True, **changes):
 
 
 def test_on_another_processor_a_run_may_end_a_little_elsewhere(forged):
+    """Records name another processor, and the first one's end state is 0.001 off.
+
+    That is within the tolerance for other processors; the deviation is reported.
+    """
     shift_end_states(forged, by=0.001, **OTHER_PROCESSOR)
 
     found = verify_run(forged)
@@ -258,6 +283,7 @@ def test_on_another_processor_a_run_may_end_a_little_elsewhere(forged):
 
 
 def test_on_the_same_processor_no_run_may_end_elsewhere(forged):
+    """End states are 0.001 off, and the records name this machine's processor."""
     shift_end_states(forged, by=0.001)
     assert not verify_run(forged).holds
 
@@ -274,7 +300,11 @@ def test_on_the_same_processor_no_run_may_end_elsewhere(forged):
 def test_larger_differences_of_another_processor_do_not_hold_and_a_note_may_excuse_them(
     forged, by, changes, excused
 ):
-    """Motion decides how many steps an episode takes and what happens in it."""
+    """Records of another processor differ by more than the tolerance, or in more than the end.
+
+    Motion decides how many steps an episode takes and what happens in it, so a note may excuse such
+    records. The seed of the scene comes before any motion, and is never excused.
+    """
     shift_end_states(forged, by=by, **OTHER_PROCESSOR, **changes)
 
     found = verify_run(forged)
@@ -301,6 +331,7 @@ def test_a_merged_run_holds_by_the_plans_of_its_parts(honest, tmp_path):
 
 
 def test_of_a_sample_of_one_half_one_of_two_records_is_played_again(honest):
+    """Both records are read, which progress counts; one is played again and is exact."""
     progress = []
 
     found = verify_run(honest, sample=0.5, seed=3, progress=lambda *now: progress.append(now))
@@ -311,7 +342,10 @@ def test_of_a_sample_of_one_half_one_of_two_records_is_played_again(honest):
 
 
 def test_what_is_printed_of_a_verification(capsys, snapshot):
-    """At most twenty of each kind, and how many there are besides."""
+    """The snapshot has a verification with 23 wrong and 22 missing records, then one that holds.
+
+    At most twenty of each kind are printed, and how many there are besides.
+    """
     checks = tuple(RecordCheck(f"check-{n}", ("one.", "two.")) for n in range(23))
     verdicts = Counter({"exact": 30, "tolerant": 4})
     verdicts["not replayed"] = 26
@@ -331,6 +365,7 @@ def verified(run, share):
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize(("share", "played"), [("10%", "1 was"), ("1.0", "2 were")])
 def test_the_command_says_how_many_records_were_played_again(honest, share, played):
+    """The run has two records. 10 % of them is at least one; 1.0 is all."""
     done = verified(honest, share)
 
     assert done.exit_code == 0, done.output
@@ -339,6 +374,7 @@ def test_the_command_says_how_many_records_were_played_again(honest, share, play
 
 @pytest.mark.usefixtures("in_this_process")
 def test_the_command_says_what_does_not_hold(forged):
+    """The forgery makes a failure a success. One thing doesn't hold, and the exit code is 2."""
     forge(forged, FORGERIES["failure to success"][0])
 
     done = verified(forged, "100%")
@@ -350,4 +386,5 @@ def test_the_command_says_what_does_not_hold(forged):
 
 @pytest.mark.parametrize("share", ["many", "5", "0%", "101%", "nan"])
 def test_the_command_refuses_a_share_that_is_none(honest, share):
+    """A share is from above 0 % to 100 %, or a number up to 1."""
     assert f"{share!r}; give one such as 5%" in str(verified(honest, share).exception)

@@ -9,7 +9,7 @@ from roboirg.apps.policy_check.policy_check import check_policy
 
 
 class KeepsQueue(OneByOne):
-    """Its queue of actions outlives its reset."""
+    """Its queue of actions outlives its reset: the next episode begins with the last one's."""
 
     def __init__(self, seed=0):
         super().__init__(seed)
@@ -26,6 +26,8 @@ class KeepsQueue(OneByOne):
 
 
 class InvertsGripper(Honest):
+    """Its gripper is -1 when open and 1 when closed, the other way around."""
+
     def gripper(self, observation):
         return -super().gripper(observation)
 
@@ -66,6 +68,7 @@ def results_of(kind, **options):
     ],
 )
 def test_a_planted_mistake_is_found_by_its_check_and_by_no_other(kind, check, verdict, words):
+    """Each class has one mistake, which its name says; no other check warns or fails."""
     results = results_of(kind)
 
     complaints = [result for result in results if result.verdict in ("fail", "warn")]
@@ -77,10 +80,14 @@ def test_a_planted_mistake_is_found_by_its_check_and_by_no_other(kind, check, ve
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("kind", HONEST)
 def test_nothing_is_found_in_honest_policies(kind, seed):
+    """`HONEST` are policies without a mistake that act in different ways; checks pass or note."""
     assert {result.verdict for result in results_of(kind, seed=seed)} <= {"pass", "note"}
 
 
 def test_the_distance_from_the_expert_passes_if_it_is_below_half_of_holding_still():
+    """The honest policy does nearly what the made-up expert did, so 0.0002 is far below
+    0.0249 rad.
+    """
     (result,) = [result for result in results_of(Honest) if result.check == "expert"]
 
     assert result.verdict == "pass"
@@ -91,5 +98,6 @@ def test_the_distance_from_the_expert_passes_if_it_is_below_half_of_holding_stil
 
 
 def test_the_distance_of_an_untrained_policy_from_the_expert_is_noted():
+    """It is farther than half of holding still, which is a note and no failure."""
     (result,) = [result for result in results_of(Untrained) if result.check == "expert"]
     assert result.verdict == "note"

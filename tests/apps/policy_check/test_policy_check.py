@@ -37,6 +37,8 @@ class Calibrated(Sound):
 
 
 class Shapeless(Sound):
+    """Its actions have seven numbers; they should have eight."""
+
     def act(self, observation):
         return np.zeros((3, 7))
 
@@ -62,11 +64,15 @@ class Elephant(Sound):
 
 
 class Dice(Sound):
+    """Each call draws other actions, from no seed."""
+
     def act(self, observation):
         return np.random.default_rng().uniform(-1, 1, (4, 8))
 
 
 class HonestDice(Dice):
+    """Acts at random, says so, and has a version that says nothing."""
+
     deterministic = False
     version = "unknown"
 
@@ -114,16 +120,21 @@ def messages(policy, verdict):
 
 
 def test_depth_and_matrices_are_named_if_a_policy_wants_them():
+    """`Calibrated` has the attributes depth and calibration, so its requirements name both."""
     requirements = messages(f"{__name__}:Calibrated", "pass")["requirements"]
     assert requirements.endswith("observations every 1, depth, calibration.")
 
 
 def test_a_policy_of_waypoints_is_not_compared_with_the_expert():
+    """A waypoint has no action of the expert to compare with; the recorder, `print`, isn't
+    called.
+    """
     *_, result = check_policy(f"{__name__}:Waypoints", record_expert=print)
     assert result == ("expert", "note", "Not checked: a waypoint takes many control steps.")
 
 
 def test_a_sound_policy_passes_everything():
+    """`Sound` keeps the contract: all eight checks pass, in this order, and none is only noted."""
     results = check_policy(f"{__name__}:Sound", seed=3)
 
     assert [(result.check, result.verdict) for result in results] == [
@@ -139,6 +150,7 @@ def test_a_sound_policy_passes_everything():
 
 
 def test_the_check_says_with_which_seed_a_policy_was_made_and_how_it_acts():
+    """`Sound` is asked three times and gives five actions of eight numbers each time."""
     loads, _, _, acts, *_ = check_policy(f"{__name__}:Sound", seed=3)
 
     assert "made with seed 3" in loads.message
@@ -169,6 +181,7 @@ def test_the_check_that_finds_a_mistake_says_what_was_expected(kind, check, word
 
 
 def test_noise_that_a_policy_declares_is_noted_and_no_failure():
+    """`HonestDice` acts at random, and says so by `deterministic = False`."""
     policy = f"{__name__}:HonestDice"
 
     assert "as the policy declares" in messages(policy, "note")["deterministic"]
@@ -177,10 +190,16 @@ def test_noise_that_a_policy_declares_is_noted_and_no_failure():
 
 @pytest.mark.parametrize("policy", [HonestDice(), Sound()], ids=["unknown", "none"])
 def test_a_policy_without_a_version_is_advised_to_set_one(policy):
+    """`HonestDice` has the version "unknown", and `Sound` has none."""
     assert "set the attribute version" in messages(policy, "note")["version"]
 
 
 def test_actions_out_of_the_usual_range_are_noted():
+    """`Reckless` has 9 in one number of its second action, in two of the third, three of the last.
+
+    So three of four actions are out of range, and nine of twelve after three answers. Value 1 has
+    the narrowest range, up to 1.76 rad, so it is the farthest; action 2 is the first with it.
+    """
     notes = messages(f"{__name__}:Reckless", "note")
     assert notes["range without a video"] == (
         "9 of 12 actions have a number outside the usual range of joint_angle; farthest is value 1 "
@@ -189,6 +208,7 @@ def test_actions_out_of_the_usual_range_are_noted():
 
 
 def test_a_privileged_policy_is_noted():
+    """The policy `oracle` reads the goal from the simulator."""
     assert "It is privileged" in messages("oracle", "note")["loads"]
 
 
@@ -203,6 +223,7 @@ def test_a_privileged_policy_is_noted():
     ids=["unknown", "no server", "unknown option", "no policy"],
 )
 def test_a_policy_that_cannot_be_tried_fails_with_the_reason(spec, words):
+    """One check fails, with these words: nothing else can be checked."""
     (message,) = messages(spec, "fail").values()
     assert words in message
 
@@ -214,6 +235,10 @@ def test_a_policy_that_cannot_be_tried_fails_with_the_reason(spec, words):
 def test_the_command_prints_a_table_and_has_an_exit_code(
     value, code, summary, tmp_path, monkeypatch
 ):
+    """The policy of a file in the current folder acts by zeros, which is sound, or by NaN.
+
+    Actions that are no numbers fail one check, after which others cannot be made: exit code 2.
+    """
     (tmp_path / "my_policy.py").write_text(
         "import numpy as np\nclass Mine:\n    def reset(self, i, d): pass\n"
         f"    def act(self, o): return np.full((2, 8), {value})\n"
@@ -243,7 +268,10 @@ def test_the_command_prints_a_table_and_has_an_exit_code(
 def test_results_are_printed_as_a_table_and_warnings_and_failures_are_counted(
     capsys, verdicts, summary
 ):
-    """``[x]`` is no markup."""
+    """Messages are "[x].", which is no markup and so printed as it is.
+
+    The last line counts checks, failures and warnings; notes are not counted.
+    """
     results = [CheckResult(f"check {verdict}", verdict, "[x].") for verdict in verdicts]
 
     print_check_results(results, Console(width=80))
@@ -260,8 +288,10 @@ class Versioned(Sound):
 
 
 def test_the_version_that_records_will_have_is_printed():
+    """`Versioned` has the version "step 3000"."""
     assert "step 3000" in messages(f"{__name__}:Versioned", "pass")["version"]
 
 
 def test_what_reset_forgets_is_not_checked_of_a_policy_with_noise():
+    """`Versioned` says that it is not deterministic, so answers after a reset may differ."""
     assert "Not checked" in messages(Versioned(), "note")["reset forgets"]

@@ -78,6 +78,10 @@ def test_the_server_listens_on_this_machine_alone(served):
     ids=["wrong key", "no key", "another host", "another page"],
 )
 def test_a_score_from_elsewhere_is_refused_and_does_not_show_the_key(served, fault):
+    """The form is right, and the request has a wrong key or none, or comes from another page.
+
+    It is forbidden (403), nothing is stored, and the answer doesn't have the key.
+    """
     form = form_of(served, served.plan.trials[0], "success")
 
     status, headers, text = ask(served, "/score", form, **fault)
@@ -88,6 +92,7 @@ def test_a_score_from_elsewhere_is_refused_and_does_not_show_the_key(served, fau
 
 
 def test_a_score_from_the_page_itself_is_stored(served):
+    """The request has the key and the page's own address; it leads back to the page (303)."""
     form = form_of(served, served.plan.trials[0], "success")
 
     status, _, _ = ask(served, "/score", form, origin=f"http://127.0.0.1:{served.port}")
@@ -120,11 +125,15 @@ def test_the_page_runs_no_foreign_scripts_and_tells_others_no_address(served):
     ],
 )
 def test_requests_for_what_is_not_there_or_too_large_are_refused(served, path, form, status):
+    """Pages and trials that do not exist, and a note of 70,000 letters, have the status of HTTP."""
     assert ask(served, path, form)[0] == status
 
 
 @pytest.mark.parametrize("changes", [{"trial": "missing"}, {"choice": "magic"}, {"revision": ""}])
 def test_a_malformed_score_leads_back_to_the_page_with_a_message(served, changes):
+    """A trial, a choice and a revision that do not exist: no record, and a message in the
+    address.
+    """
     form = form_of(served, served.plan.trials[0], "success") | changes
 
     status, headers, _ = ask(served, "/score", form)
@@ -166,6 +175,7 @@ def test_line_ends_in_a_note_become_spaces(served):
 
 
 def test_a_video_outside_the_folder_is_not_noted(served):
+    """The path leads out of the study's folder; the score is stored without a video."""
     trial = served.plan.trials[0]
 
     _, headers, _ = ask(served, "/score", form_of(served, trial, "success", video="../secret.mp4"))
@@ -242,6 +252,10 @@ def test_keys_in_the_field_of_a_note_are_letters(page, served):
 
 @pytest.mark.browser
 def test_a_trial_can_be_scored_again_by_going_back(page, served):
+    """Key s scores a success, the left arrow goes back, and key 1 scores the task's first failure.
+
+    The task is PutInBox, whose first failure is a wrong place. The pressed button is the score.
+    """
     first = served.plan.trials[0]
     press(page, "s")
 
@@ -255,6 +269,7 @@ def test_a_trial_can_be_scored_again_by_going_back(page, served):
 
 @pytest.mark.browser
 def test_the_page_fits_narrow_screens(page):
+    """The screen is 400 pixels wide: nothing is wider, and buttons are high enough for fingers."""
     assert page.evaluate("document.documentElement.scrollWidth") <= NARROW["width"]
     for button in page.locator("main button").all():
         assert button.bounding_box()["height"] >= 40

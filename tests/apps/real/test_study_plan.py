@@ -108,6 +108,7 @@ def by_block(trial):
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_tasks_take_turns_from_block_to_block(seed):
+    """Two tasks, three trials each: six blocks, of which each pair has both tasks, in any order."""
     plan = make_study(("a",), tasks=TASKS, trials=3, demonstrations=0, seed=seed)
 
     tasks = [next(trials).job.task for _, trials in groupby(plan.trials, by_block)]
@@ -118,6 +119,7 @@ def test_tasks_take_turns_from_block_to_block(seed):
 @settings(max_examples=15)
 @given(study=studies, seed=st.integers(0, 2**63))
 def test_a_seed_changes_the_order_of_trials_and_nothing_else(study, seed):
+    """Two studies that differ in the seed have the same trials, demonstrations and twins."""
     plan = make_study(**study)
 
     other = make_study(**{**study, "seed": seed})
@@ -154,6 +156,7 @@ def test_the_papers_study_is_the_default():
 
 @pytest.mark.parametrize(("task", "number"), [("PutInBox", 4), ("PickByCount", 8)])
 def test_all_arrangements_are_there_once(task, number):
+    """A task can be laid out in so many ways; a round of the order has each of them once."""
     order = counterbalanced_order(task)
     assert len(set(order)) == len(order) == number
 
@@ -218,17 +221,20 @@ def test_the_plans_for_the_twin_have_the_trials_and_no_others(study):
 
 
 def test_csv_says_what_the_plan_says(snapshot):
+    """The snapshot has the two tables of a plan of two policies: its trials and demonstrations."""
     plan = make_study(("a", "b"), tasks=TASKS, trials=2, demonstrations=2)
     assert trials_csv(plan) + demonstrations_csv(plan) == snapshot
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_the_drawing_has_the_robot_s_left_on_the_left(task, snapshot):
+    """The snapshot has the drawing of a scene as SVG."""
     (trial,) = make_study(("a",), tasks=(task,), settings=("direct",), trials=1).trials
     assert draw_svg(trial.episode.scene) == snapshot
 
 
 def test_the_sheet_has_its_texts_and_drawings_in_their_places(snapshot):
+    """The snapshot has the page for operators, with names in the place of drawings."""
     plan = make_study("ab", tasks=TASKS, trials=1, demonstrations=2)
     page = sheet_text(plan)
 
@@ -239,6 +245,7 @@ def test_the_sheet_has_its_texts_and_drawings_in_their_places(snapshot):
 
 
 def test_a_turned_box_is_drawn_counter_clockwise():
+    """0.5 rad are 28.6 degrees. In SVG positive angles turn clockwise, hence the minus."""
     scene = get_episode("PutInBox", "val", 0).scene
     (box, *_) = (thing for thing in scene.objects if thing.kind == "box")
 
@@ -274,4 +281,7 @@ def test_each_failure_has_a_key_of_its_own_and_wrong_things_are_not_the_one_mean
 
 @pytest.mark.parametrize(("left", "side"), [("green", "left"), ("purple", "right")])
 def test_the_side_of_a_green_target_follows_from_the_color_at_the_left(left, side):
+    """If green is at the left, the target is there; with another color there, it is at the
+    right.
+    """
     assert Arrangement(color="green", left=left).side == side

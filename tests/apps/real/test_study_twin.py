@@ -11,6 +11,12 @@ pytestmark = pytest.mark.sim
 
 
 def test_run_plays_the_trials_of_a_study(tmp_path):
+    """A study with one trial of each of two tasks is planned; `run` plays both plans of its twin.
+
+    Records are those of the study's trials. The policy is a listener by the name "mine", which
+    reads the goal from the simulator and solves both tasks.
+    """
+
     def call(*words):
         done = CliRunner().invoke(app, [*map(str, words)])
         assert done.exit_code == 0, done.output

@@ -53,11 +53,13 @@ def drawn(count, caption="done", style=STYLE):
 
 
 def test_every_picture_is_there_once_and_in_order_of_time():
+    """`moments` makes pictures of the value 10 + their number; eight of them are drawn."""
     pictures = [axes.images[0].get_array() for axes in drawn(8).axes]
     assert [picture[0, 0, 0] for picture in pictures] == [10, 11, 12, 13, 14, 15, 16, 17]
 
 
 def test_pictures_are_in_rows_of_four_from_top_to_bottom_and_left_to_right():
+    """Eight pictures: each row has one height, the first row is higher, both begin at the left."""
     places = [axes.get_position() for axes in drawn(8).axes]
 
     heights = [round(place.y0, 6) for place in places]
@@ -70,6 +72,9 @@ def test_pictures_are_in_rows_of_four_from_top_to_bottom_and_left_to_right():
 
 @pytest.mark.parametrize("caption", ["done: pick", "done: pick up the container " * 30])
 def test_no_word_leaves_the_strip(caption):
+    """A short caption and one of 30 lines' words, under each of twelve pictures, stay on the
+    figure.
+    """
     figure = drawn(12, caption)
 
     for text in figure.texts:
@@ -93,6 +98,9 @@ def test_no_word_is_drawn_over_another(caption):
     ids=["setting", "time in the video", "time of the policy"],
 )
 def test_a_strip_names_settings_and_times_in_their_colors(text, color):
+    """Three moments are at steps 0 (in the video), 10 and 20; with 20 steps a second, 10 is
+    0.5 s.
+    """
     texts = {found.get_text(): found for found in drawn(3).texts}
     assert texts[text].get_color() == color
 
@@ -122,11 +130,19 @@ def test_black_text_is_drawn_in_another_color_on_dark():
     ],
 )
 def test_the_remarkable_is_chosen_first(remarkable, chosen):
-    """Smaller numbers are more remarkable: 0 is the start or the end, 4 a filler."""
+    """Smaller numbers are more remarkable: 0 is the start or the end, 4 a filler.
+
+    The answer has the places of the chosen moments, six at least; of eight, a filler is left out
+    before a moment of 1.
+    """
     assert choose_moments(remarkable) == chosen
 
 
 def test_fillers_only_fill_up_to_the_smallest_number_of_moments():
+    """Of 23 moments the start, one of 1 and the end are remarkable (places 0, 21, 22).
+
+    The other 20 are fillers, of which only as many are taken as `MIN_MOMENTS` needs.
+    """
     chosen = choose_moments([0, *[4] * 20, 1, 0])
 
     assert len(chosen) == MIN_MOMENTS
@@ -134,6 +150,7 @@ def test_fillers_only_fill_up_to_the_smallest_number_of_moments():
 
 
 def test_of_very_many_remarkable_moments_some_are_left_out():
+    """Forty moments that are equally remarkable are more than a strip holds."""
     assert len(choose_moments([1] * 40)) == MAX_MOMENTS
 
 
@@ -165,6 +182,7 @@ def test_of_very_many_remarkable_moments_some_are_left_out():
     ids=["like ones", "away", "swap", "shuttle", "glow", "vanish"],
 )
 def test_motions_are_described_in_words(motions, sentence):
+    """Each tuple of motions of a scene gives one sentence; stages count from 0, in words from 1."""
     assert describe_motions(Scene((), motions)) == [sentence]
 
 
@@ -188,6 +206,10 @@ def test_an_episode_without_a_video_has_no_description_of_one():
 
 @pytest.mark.sim
 def test_a_playthrough_shows_the_start_each_stage_and_the_end(snapshot):
+    """The expert solves an episode, so that the last picture is at its last step.
+
+    The snapshot has the steps and captions of its pictures, and whether they are in the video.
+    """
     played = play_through(get_episode("VideoUnmask", "test", 3))
 
     assert (played.verdict, played.moments[-1].step) == ("success", played.steps)
@@ -199,7 +221,10 @@ def test_a_playthrough_shows_the_start_each_stage_and_the_end(snapshot):
 
 
 def test_containers_that_change_places_are_remarkable_as_soon_as_they_do():
-    """Twice in this episode, from steps 90 and 140 on."""
+    """In this episode containers appear at step 33 and change places at steps 90 and 140.
+
+    `at` is asked for every step, in order, and gives the caption of what happens after it.
+    """
     episode = get_episode("ButtonUnmaskSwap", "test", 3)
     key_events = KeyEvents(episode.scene.motions)
 
@@ -211,6 +236,10 @@ def test_containers_that_change_places_are_remarkable_as_soon_as_they_do():
 
 
 def test_motions_of_a_stage_are_remarkable_from_then_on():
+    """Stage 2 begins at step 80, and its swap 50 steps later, over 50 steps, so it is halfway at
+    155. It is told at the next step, 156, and never before the stage. What goes under another
+    object (`Away` with `under`) is not remarkable.
+    """
     key_events = KeyEvents([Swap("a", "b", 50, 50, 0.1, stage=2), Away("c", 10, 60, under="a")])
 
     before = [step for step in range(80) if key_events.at(step, 0)]
