@@ -187,7 +187,10 @@ class StoredRun(Generic[Stored]):
     def __init__(self, folder: Path, parse_line: Callable[[bytes, Path, int], Stored]) -> None:
         """Read all lines; of each identity keep what the newest one gave, and where that is.
 
-        In `newest`, a record that was written again has the place of its first line.
+        An episode that ended in an error and was played again has two lines. `newest` has what the
+        second gave, at the place of the first: lines A, B, A' → A', B.
+
+        `_places_in_order` has the same order and length as `newest`; `_places` relies on that.
         """
         self._path = folder / RECORDS_FILE
         self.file = LineFile(self._path)
@@ -201,7 +204,11 @@ class StoredRun(Generic[Stored]):
             raise StoreError(
                 f"There are no records in {folder}; give the --out folder of a `roboirg run`."
             )
-        results, self._places_in_order = zip(*placed.values(), strict=True)
+        results = []
+        self._places_in_order = []
+        for result, place in placed.values():
+            results.append(result)
+            self._places_in_order.append(place)
         self.newest: tuple[Stored, ...] = _with_versions(results)
 
     @cached_property
