@@ -204,11 +204,7 @@ class StoredRun(Generic[Stored]):
             raise StoreError(
                 f"There are no records in {folder}; give the --out folder of a `roboirg run`."
             )
-        results = []
-        self._places_in_order = []
-        for result, place in placed.values():
-            results.append(result)
-            self._places_in_order.append(place)
+        results, self._places_in_order = zip(*placed.values(), strict=True)
         self.newest: tuple[Stored, ...] = _with_versions(results)
 
     @cached_property

@@ -144,8 +144,7 @@ class ChoiceController:
         if motion is not None:
             yield from self._expert.execute(motion)
             return
-        at_rest = np.append(self._world.robot.arm_positions, self._expert.gripper)
-        yield at_rest[None]
+        yield np.append(self._world.robot.arm_positions, self._expert.gripper)[None]
 
     def _motion(self, choice: Choice, point: Point) -> Primitive | None:
         """Return the motion of a choice, with its object; None if there is nothing to do.

@@ -167,7 +167,11 @@ def to_arrays(
             always gives the same episode.
     """
     skipped = _skipped_looks(recorded, decisions)
-    learned = _learned_decisions(decisions, _counted_looks(recorded, rng))
+    learned = {decision.look: decision for decision in decisions}
+    for look in _counted_looks(recorded, rng):
+        learned.setdefault(
+            look, LookDecision(look, None, FALSE_POSITIVE)
+        )  # neither move nor object
     passes = passes_so_far(recorded)
     steps_left = steps_to_act(recorded)
 
@@ -210,19 +214,6 @@ def _skipped_looks(recorded: ExpertRecording, decisions: Sequence[LookDecision])
     """
     between = {look for look in recorded.looks.tolist() if recorded.steps[look] % LOOK_EVERY}
     return between - {decision.look for decision in decisions}
-
-
-def _learned_decisions(
-    decisions: Sequence[LookDecision], counted_looks: set[int]
-) -> dict[int, LookDecision]:
-    """Return what is learned at looks, by their numbers: decisions, or else only counts.
-
-    A counted look without a decision gets one with neither move nor object.
-    """
-    learned = {look: LookDecision(look, None, FALSE_POSITIVE) for look in counted_looks}
-    for decision in decisions:
-        learned[decision.look] = decision
-    return learned
 
 
 def _counted_looks(recorded: ExpertRecording, rng: np.random.Generator) -> set[int]:
