@@ -26,7 +26,7 @@ from roboirg.policies.by_name.finding import policy_of
 from roboirg.records.record import Job, Record, Summary
 from roboirg.runs.job_instruction import PreparedJob
 from roboirg.runs.plan.plan_maker import make_plan
-from roboirg.runs.play.episode_record import begin_record, conclude
+from roboirg.runs.play.episode_record import begin_record, conclude_episode
 from roboirg.runs.run.executor import choose_executor
 from roboirg.runs.run.runner import episode_runner
 from roboirg.util.atomic_write import replacing, write_atomically
@@ -103,7 +103,7 @@ def record_of(trial: Trial, entry: Entry) -> Record:
     if play.attribution is not None and play.attribution.failure in SIDED:
         start = play.policy_metadata[START_STEP]
         late = f"not done after {trial.job.environment.max_steps} steps"
-        conclude(record, PreparedJob(trial.job), start, timed_out=play.cause == late)
+        conclude_episode(record, PreparedJob(trial.job), start, timed_out=play.cause == late)
     return record
 
 

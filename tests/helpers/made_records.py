@@ -10,7 +10,7 @@ import msgspec
 from roboirg.records.record import Job, Outcome, Record
 from roboirg.records.store import RecordStore
 from roboirg.runs.job_instruction import PreparedJob
-from roboirg.runs.play.episode_record import begin_record, conclude
+from roboirg.runs.play.episode_record import begin_record, conclude_episode
 
 
 def make_record(
@@ -24,7 +24,7 @@ def make_record(
         known |= {"error": None, "cause": cause}
     record = msgspec.structs.replace(record, **known)
     if outcome != "error":
-        conclude(record, prepared, 0)
+        conclude_episode(record, prepared, 0)
     return record
 
 

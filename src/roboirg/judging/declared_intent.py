@@ -35,9 +35,17 @@ class DeclaredIntent:
     def revise(self, found: FailureAttribution, episode: Episode) -> FailureAttribution:
         """Return the failure that the acts show, corrected by what the policy declared it would do.
 
-        Who declared something wrong failed by grounding, whatever the hands did; who declared the
-        right thing did not: then the hands did not follow. A subgoal that was not due at all
-        decides nothing.
+        A policy that declared something wrong failed by grounding, whatever its hands did; one that
+        declared the right thing understood, and its hands did not follow. If the hands took the
+        blue cube:
+
+        - with the verdict ``"wrong_thing"`` on the last subgoal it is ``wrong_object``;
+        - with ``"right"`` it is ``not_followed``;
+        - with any other, or none, such as a subgoal that was not due, the failure stays as it is.
+
+        Args:
+            found: the failure that the acts alone show.
+            episode: with the goal that was meant.
         """
         if self.listens:
             return self._revise_listener(found, episode)
@@ -45,12 +53,11 @@ class DeclaredIntent:
         last_verdict = verdicts[-1] if verdicts else ""
         if last_verdict == "right":
             return _not_followed(found)
-        if last_verdict in _FAILURE_BY_VERDICT and found.kind != "grounding":
-            words = f"named something else than what was due: {found.sentence[:-1]}"
-            return FailureAttribution.of(
-                _FAILURE_BY_VERDICT[last_verdict], found.subject, found.step, words
-            )
-        return found
+        declared = _FAILURE_BY_VERDICT.get(last_verdict)
+        if declared is None or found.kind == "grounding":
+            return found
+        words = f"named something else than what was due: {found.sentence[:-1]}"
+        return FailureAttribution.of(declared, found.subject, found.step, words)
 
     def _revise_listener(self, found: FailureAttribution, episode: Episode) -> FailureAttribution:
         """Return the failure of a policy whose model named the goal that it understood.

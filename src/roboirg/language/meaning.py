@@ -260,17 +260,26 @@ def _listed_values(term: Term, field: str, episode: Episode) -> Values:
 
 
 def _operand_values(operand: Operand, field: str, episode: Episode) -> Values:
-    """Return the values of a goal's field for which a value or a description that was said stands.
+    """Return the values that words of an instruction give a field of the goal.
 
-    A value stands for itself. A description stands for what it leads to in the scene or the video:
-    the cube *on the left* for its color.
+    For ``color`` the value ``"red"`` gives ``{"red"}``; the description *on the left* gives the
+    color of the cube there. Empty if no single thing fits the description, or if the thing has no
+    value of this field.
+
+    Args:
+        operand: a value that was said, or a description of a thing in the scene or the video.
+        field: of the goal, ``color``, or ``colors.1`` for the second of several.
+        episode: with the scene; its own goal is not read.
     """
     if not isinstance(operand, Described):
         return frozenset([operand])
+    # With a video, clues are about what happened in it; without one, about where a thing stands.
     if episode.scene.past and operand.kind == "clue":
         return _values_of_event(operand, field, episode)
     thing = _described_thing(operand, episode)
-    return frozenset() if thing is None else _values_of_thing(thing, field, episode)
+    if thing is None:
+        return frozenset()
+    return _values_of_thing(thing, field, episode)
 
 
 def _values_of_event(described: Described, field: str, episode: Episode) -> Values:

@@ -225,17 +225,22 @@ def _read_side_target(match: PhraseMatch) -> Target:
 def _read_target(match: PhraseMatch) -> Target | None:
     """Return a target that is named by a placement of the video.
 
-    *The second target used before the press* gives ``Target(rank=2, relation="before")``. None if
-    its ordinals contradict each other, *the second target used first*, so that it stays unread.
+    *The second target used before the press* gives ``Target(rank=2, relation="before")``, *the
+    target of placement 3* ``Target(rank=3)``, and *the target after the press* no rank. None if its
+    ordinals contradict each other, *the second target used first*, so that the phrase stays unread.
+
+    Reads `_PRESS_TARGET`, `_WHERE`, `_TARGET` and `_PLACING`; a group that a pattern lacks, or that
+    matched nothing, is ``""``.
     """
+    relation = _relation(match["when"])
     ordinals = [match["rank"], match["at"], match["of"], match["first"]]
     rank = _common_rank(ordinals)
     if rank is None and any(ordinals):
         return None
-    number = match["placing"] or match["number"]  # "the target of placement 2"
+    number = match["placing"] or match["number"]
     if number:
         rank = number_of(number)
-    return Target(None, rank, _relation(match["when"]))
+    return Target(None, rank, relation)
 
 
 def _relation(word: str) -> Relation | None:

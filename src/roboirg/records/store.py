@@ -187,7 +187,10 @@ class StoredRun(Generic[Stored]):
     def __init__(self, folder: Path, parse_line: Callable[[bytes, Path, int], Stored]) -> None:
         """Read all lines; of each identity keep what the newest one gave, and where that is.
 
-        In `newest`, a record that was written again has the place of its first line.
+        An episode that ended in an error and was played again has two lines. `newest` has what the
+        second gave, at the place of the first: lines A, B, A' → A', B.
+
+        `_places_in_order` has the same order and length as `newest`; `_places` relies on that.
         """
         self._path = folder / RECORDS_FILE
         self.file = LineFile(self._path)

@@ -128,13 +128,23 @@ class ChoiceController:
         self._expert = MotionPrimitives(world)
 
     def trajectories(self, action: CheckedActions) -> Iterator[JointTrajectory]:
-        """Yield the trajectories of the motion; one control step at rest if it has none."""
+        """Yield joint trajectories (n, 8), one after the other, that carry out a choice.
+
+        If there is nothing to do (`_motion`), the robot rests for one control step. Each trajectory
+        is planned from where the robot is when it is asked for, so execute one before the next.
+
+        Args:
+            action: (3,) number of the choice, row and column: ``[2, 110, 84]`` is the third choice
+                with the object nearest to row 110 and column 84 of the front picture.
+        """
         number, row, column = action
-        motion = self._motion(self._choices[int(number)], (round(row), round(column)))
-        if motion is None:
-            yield np.append(self._world.robot.arm_positions, self._expert.gripper)[None]
+        choice = self._choices[int(number)]
+        point = (round(row), round(column))
+        motion = self._motion(choice, point)
+        if motion is not None:
+            yield from self._expert.execute(motion)
             return
-        yield from self._expert.execute(motion)
+        yield np.append(self._world.robot.arm_positions, self._expert.gripper)[None]
 
     def _motion(self, choice: Choice, point: Point) -> Primitive | None:
         """Return the motion of a choice, with its object; None if there is nothing to do.

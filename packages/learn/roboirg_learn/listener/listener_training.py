@@ -325,17 +325,24 @@ def _as_detected(views: Iterable[LabeledView], class_names: Sequence[str]) -> li
 
 
 class DetectorCourse(Course[LabeledView]):
-    """A detector learns the labels of the train split."""
+    """A detector learns the labels of the train split.
+
+    Args:
+        labeled: labeled pictures, of the train split to learn from and of others to validate.
+        plan: epochs, and the seed of weights and batches.
+    """
 
     net: DetectorNet
     learning_rate = DETECTOR_RATE
 
     def __init__(self, labeled: LabeledEpisodes, plan: TrainingPlan) -> None:
-        torch.manual_seed(plan.reader.seed)
+        """Collect the pictures and make an untrained network, the same for each seed."""
         self._plan = plan
         self._classes = labeled.classes
         self._learned = _views_in(labeled.train)
         self._validation = _views_in(labeled.validation)
+        # The network draws its weights when it is made, so the seed must be set before.
+        torch.manual_seed(plan.reader.seed)
         self.net = DetectorNet(len(self._classes))
         self.epochs = plan.detector_epochs
         self.steps_per_epoch = batch_count(self._learned)

@@ -127,6 +127,22 @@ def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray
     return np.array([x, y, height, *yaw_code, opening, is_video], np.float32)
 
 
+class LookLabels(NamedTuple):
+    """What a network learns at one look; each field is one of D numbers in `EpisodeArrays`.
+
+    Names and meanings of the fields are those of `EpisodeArrays`, `NO_LABEL` where there is nothing
+    to learn. In an episode of three looks with decisions at the first and the last, the field
+    `decisions` is 0 in the first labels and 2 in the second.
+    """
+
+    decisions: int
+    moves: int
+    tracks: int
+    stages_done: int
+    passes: int
+    steps_left: int
+
+
 def to_arrays(
     recorded: ExpertRecording,
     decisions: Sequence[LookDecision],
@@ -137,7 +153,8 @@ def to_arrays(
 ) -> EpisodeArrays:
     """Return a recorded episode as network input and labels, seen as by an imperfect detector.
 
-    Looks that a policy would not have are left out, so looks are numbered anew.
+    Looks that a policy would not have are left out, and the others numbered anew: if the recording
+    has looks 0 to 3 and look 2 is left out, look 3 becomes 2.
 
     Args:
         recorded: the episode.
@@ -146,42 +163,57 @@ def to_arrays(
         object_classes: classes of objects and their heights.
         moves: the number of each move, or of each subgoal template; one that is missing gets
             `NO_LABEL`.
-        rng: draws the counted looks, then the noise of the detector.
+        rng: draws the counted looks, then the noise of the detector; in this order, so that a seed
+            always gives the same episode.
     """
-    history = LookHistory()
-    track_of: dict[int, int] = {}  # the last track of each object that was found, by its number
+    skipped = _skipped_looks(recorded, decisions)
     learned = {decision.look: decision for decision in decisions}
-    skipped = _merged_looks(recorded) - learned.keys()
     for look in _counted_looks(recorded, rng):
-        learned.setdefault(look, LookDecision(look, None, FALSE_POSITIVE))
+        learned.setdefault(
+            look, LookDecision(look, None, FALSE_POSITIVE)
+        )  # neither move nor object
     passes = passes_so_far(recorded)
     steps_left = steps_to_act(recorded)
-    rows = []  # of labels, in the order of the fields of `EpisodeArrays`
+
+    history = LookHistory()
+    last_track: dict[int, int] = {}  # by the recording's number of an object
+    labels = []
+    # The mistakes of the detector are drawn when the loop begins, also those at skipped looks.
     for look, labeled in enumerate(labeled_looks(recorded, object_classes, rng)):
         if look in skipped:
             continue
         is_video = bool(recorded.is_video[look])
         tracks = history.add(labeled.detections, recorded.tool[look], is_video=is_video)
-        track_of.update(zip(labeled.objects.tolist(), tracks.tolist(), strict=True))
-        # A decision without an object has the number of a false positive.
-        track_of[FALSE_POSITIVE] = NO_LABEL
-        if look in learned:
-            decision = learned[look]
-            move = moves.get(decision.move, NO_LABEL)
-            track = track_of.get(decision.object_number, NO_LABEL)
-            counts = recorded.done[look], passes[look], steps_left[look]
-            rows.append((len(history) - 1, move, track, *counts))
-    return EpisodeArrays(history.to_arrays(), goal, *np.array(rows, np.int64).T)
+        last_track.update(zip(labeled.objects.tolist(), tracks.tolist(), strict=True))
+        # The number of false positives is also that of decisions without an object.
+        last_track.pop(FALSE_POSITIVE, None)
+        if look not in learned:
+            continue
+        decision = learned[look]
+        labels.append(
+            LookLabels(
+                decisions=len(history) - 1,
+                moves=moves.get(decision.move, NO_LABEL),
+                tracks=last_track.get(decision.object_number, NO_LABEL),
+                stages_done=recorded.done[look],
+                passes=passes[look],
+                steps_left=steps_left[look],
+            )
+        )
+    columns = np.array(labels, np.int64).T
+    by_name = dict(zip(LookLabels._fields, columns, strict=True))
+    return EpisodeArrays(history.to_arrays(), goal, **by_name, subgoal_inputs=None)
 
 
-def _merged_looks(recorded: ExpertRecording) -> set[int]:
-    """Return the numbers of the expert's decisions between two regular looks.
+def _skipped_looks(recorded: ExpertRecording, decisions: Sequence[LookDecision]) -> set[int]:
+    """Return the numbers of the looks of a recording that a policy would not have.
 
-    Regular looks are at multiples of `LOOK_EVERY` control steps. Some of the others are no
-    decisions of a policy: where the expert decides to use the gripper after a move, a policy
-    decides both at once, and so has no such look.
+    A policy has the regular looks, at multiples of `LOOK_EVERY` control steps, and those of its
+    decisions. The expert looks once more where it uses the gripper after a move; a policy decides
+    both at once, so this look is skipped.
     """
-    return {look for look in recorded.looks.tolist() if recorded.steps[look] % LOOK_EVERY}
+    between = {look for look in recorded.looks.tolist() if recorded.steps[look] % LOOK_EVERY}
+    return between - {decision.look for decision in decisions}
 
 
 def _counted_looks(recorded: ExpertRecording, rng: np.random.Generator) -> set[int]:

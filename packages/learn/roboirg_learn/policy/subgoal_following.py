@@ -38,33 +38,43 @@ class SubgoalNamer:
         self._seen = seen
         planner = self._body.plan["memory"]
         self._history = PLANNER_HISTORIES[planner](len(self._body.templates))
-        self._last_choice: tuple[int, int | None] | None = None  # template and track
+        self._last_choice: tuple[int, int | None] | None = None  # number and track
         self._subgoal = ""
 
     def next(self, goal: NDArray[np.float32]) -> str:
-        """Return the subgoal after the last look, in words with a point.
+        """Return the subgoal after the last look, in words with a point, and remember it.
 
         For example "pick up the red cube at <110, 84>", with row and column in the front picture.
-        While template and track stay the same the words do, too: the point does not follow the
-        object.
+        While the planner chooses the same template and object, the words stay the same, too: the
+        point is where the object was when it was chosen first.
+
+        What is named and kept now is input of the planner at the next look, so a second call at
+        the same look would count it twice.
 
         Args:
             goal: (size,) as `GoalLayout.encode` returns it.
+
+        Raises:
+            RuntimeError: the policy has no planner.
         """
         if self._body.planner is None:
             raise RuntimeError("This policy has no planner.")
         look = self._seen.looks - 1
         chosen = self._seen.choose(self._body.planner, goal, self._subgoal_inputs(look))
-        self._history.name(chosen.number, look)
-        # `to_keep` has indices into the recent looks; before the first look there is none.
-        to_keep = [recent_looks(look)[index] for index in chosen.to_keep]
-        self._history.choose(number for number in to_keep if number >= 0)
-
+        self._remember(chosen, look)
         choice = (chosen.number, chosen.track)
         if choice != self._last_choice:
             self._last_choice = choice
             self._subgoal = self._words(chosen)
         return self._subgoal
+
+    def _remember(self, chosen: NetworkChoice, look: int) -> None:
+        """Add to the history what was named at a look, and which recent looks are to be kept."""
+        self._history.name(chosen.number, look)
+        recent = recent_looks(look)
+        to_keep = [recent[index] for index in chosen.to_keep]
+        # Numbers below 0 stand for looks before the first one.
+        self._history.choose(number for number in to_keep if number >= 0)
 
     def _subgoal_inputs(self, look: int) -> SubgoalInputs:
         """Return the planner's input at one look, of its history.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from roboirg.extension.commands import InvalidValueError
 from roboirg_learn.policy.planner_history import (
     PLANNER_HISTORIES,
+    PlannerHistory,
     ideal_planner_inputs,
     requests_for_hands,
 )
@@ -31,10 +32,10 @@ def with_planner_inputs(
     object_classes: ObjectClasses,
     rng: np.random.Generator,
 ) -> EpisodeArrays:
-    """Return an episode with the subgoals that hands or a planner are given.
+    """Return an episode with what a network of this memory is given and learns of subgoals.
 
-    Hands get the subgoal that is due at each decision, and no goal; a planner gets what it would
-    have named and kept. Episodes for other networks are returned as they are.
+    With ``"hands"`` it is the subgoal that is due at each decision, and no goal; for a planner it
+    is what it would have named and kept before. For any other network nothing changes.
 
     Args:
         memory: of the network; a name of `MEMORIES`.
@@ -45,17 +46,45 @@ def with_planner_inputs(
         rng: moves the points of subgoals, for hands.
     """
     if memory == HANDS:
-        stages_done = arrays.stages_done.tolist()
-        subgoals = recorded_subgoals(recorded.recording, recorded.episode, stages_done, rng)
-        requests = [_encode_known_request(subgoal, object_classes) for subgoal in subgoals]
-        no_goal = np.zeros_like(arrays.goal)
-        return arrays._replace(goal=no_goal, subgoal_inputs=requests_for_hands(requests))
+        return _with_requests(recorded, arrays, object_classes, rng)
     if memory in PLANNERS:
-        history = PLANNER_HISTORIES[memory](templates)
-        video = int(arrays.looks.tool[:, IS_VIDEO].sum())
-        subgoal_inputs = ideal_planner_inputs(history, arrays.moves, arrays.decisions, video)
-        return arrays._replace(subgoal_inputs=subgoal_inputs)
+        return _with_history(PLANNER_HISTORIES[memory](templates), arrays)
     return arrays
+
+
+def _with_requests(
+    recorded: Recorded,
+    arrays: EpisodeArrays,
+    object_classes: ObjectClasses,
+    rng: np.random.Generator,
+) -> EpisodeArrays:
+    """Return an episode for hands: the subgoal due at each decision, and zeros as goal.
+
+    Hands must not know the goal, so that they follow subgoals of any planner.
+
+    Args:
+        recorded: the episode and its recording.
+        arrays: the same as network input.
+        object_classes: classes of objects and their heights.
+        rng: moves the points of subgoals a little.
+    """
+    stages_done = arrays.stages_done.tolist()
+    subgoals = recorded_subgoals(recorded.recording, recorded.episode, stages_done, rng)
+    requests = [_encode_known_request(subgoal, object_classes) for subgoal in subgoals]
+    no_goal = np.zeros_like(arrays.goal)
+    return arrays._replace(goal=no_goal, subgoal_inputs=requests_for_hands(requests))
+
+
+def _with_history(history: PlannerHistory, arrays: EpisodeArrays) -> EpisodeArrays:
+    """Return an episode for a planner: what it would have named and kept before each decision.
+
+    Args:
+        history: a new one of the planner's kind; it is filled.
+        arrays: network input whose `moves` are numbers of subgoal templates.
+    """
+    looks_of_video = int(arrays.looks.tool[:, IS_VIDEO].sum())
+    subgoal_inputs = ideal_planner_inputs(history, arrays.moves, arrays.decisions, looks_of_video)
+    return arrays._replace(subgoal_inputs=subgoal_inputs)
 
 
 def _encode_known_request(subgoal: str, object_classes: ObjectClasses) -> NDArray[np.float32]:

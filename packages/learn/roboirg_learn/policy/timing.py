@@ -70,8 +70,9 @@ def timed_move(
 ) -> int:
     """Return the number of the next of M moves: the best one, unless it would come at a wrong time.
 
-    A policy that waits, or is about to, moves when less than `DUE_TIME` is left, not earlier, and
-    not later. With the scores 1, 2 and 3, of which the last is a wait, it is move 1 when it is time
+    A policy that neither waits nor is about to takes the best move. Any other takes the best that
+    is no wait when it is time to move, less than `DUE_TIME` before the moment, and until then the
+    best wait. With the scores 1, 2 and 3, of which the last is a wait, it is move 1 when it is time
     and else move 2, the wait.
 
     Args:
@@ -81,7 +82,10 @@ def timed_move(
         was_waiting: whether the last move was a wait.
     """
     best = scores.argmax()
-    if is_wait[best] or was_waiting:
-        is_time = time_left < DUE_TIME
-        best = np.where(is_wait != is_time, scores, -np.inf).argmax()
-    return int(best)
+    if not is_wait[best] and not was_waiting:
+        return int(best)
+    if time_left < DUE_TIME:
+        allowed = ~is_wait
+    else:
+        allowed = is_wait
+    return int(np.where(allowed, scores, -np.inf).argmax())

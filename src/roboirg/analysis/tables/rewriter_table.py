@@ -68,19 +68,23 @@ def make_rewriter_table(data: RunData) -> Table:
 def _rows(frame: Frame) -> Iterator[Row]:
     """Yield a row for each rewriter, policy and setting that is not explicit.
 
+    A rewriter is a model that states an instruction in explicit words before the policy gets it.
     The policy must have been played alone and behind the rewriter in the setting, and alone in the
-    explicit one.
+    explicit one: with *direct* and *explicit* alone and *direct* behind it, there is one row,
+    *direct*.
     """
-    cells = gather(frame, ("run", "options"))
+    cells_of = gather(frame, ("run", "options"))
     for behind, alone in _pairs(list(frame.names)):
-        explicit = cells.get((alone, REFERENCE_OPTIONS))
+        explicit = cells_of.get((alone, REFERENCE_OPTIONS))
         if explicit is None:
             continue
-        for options in _shared_options(cells, behind, alone):
-            if options != REFERENCE_OPTIONS:
-                groups = [cells[behind, options], cells[alone, options], explicit]
-                words = _words(_rates_of_tasks(groups))
-                yield Row(options_label(options), frame.names[behind], words)
+        for options in _shared_options(cells_of, behind, alone):
+            if options == REFERENCE_OPTIONS:
+                continue
+            rewritten = cells_of[behind, options]
+            said = cells_of[alone, options]
+            rates = _rates_of_tasks([rewritten, said, explicit])  # `_words` needs this order
+            yield Row(options_label(options), frame.names[behind], _words(rates))
 
 
 def _pairs(policy_runs: Sequence[PolicyRun]) -> Iterator[_Rewritten]:

@@ -258,16 +258,23 @@ def _can_say(scenario: Scenario, plan: ContentPlan) -> bool:
 def _can_fill(slot: Slot, plan: ContentPlan) -> bool:
     """Return whether a content plan has words for a slot of a sentence, such as ``{place:spot}``.
 
-    Only slots for descriptions, such as places, depend on the plan; values of the goal always have
-    words. A place must be sayable in the form that the slot asks for: ``spot`` after *It's dusty*,
-    none after a noun, ``any`` for either.
+    Values of the goal, ``{color}``, always have words; whether a description has any, such as a
+    place, depends on the plan. A place must also be sayable in the form that the slot asks for:
+    ``spot``, *right by the button*, after *It's dusty*; no form after a noun; ``any`` takes both.
+    With a place whose form is ``spot``, ``{place:spot}`` and ``{place:any}`` can be filled, and
+    ``{place}`` cannot.
     """
-    if slot.name.partition(".")[0] not in _DESCRIPTION_SLOTS:
+    name = slot.name.partition(".")[0]  # of "place.1", the place of a second thing
+    if name not in _DESCRIPTION_SLOTS:
         return True
-    values = plan.values.get(slot.name, ())
-    if not values:
+    fillers = plan.values.get(slot.name, ())
+    if not fillers:
         return False
-    return values[0].kind != "place" or slot.form in (_ANY_FORM, values[0].form)
+    # All fillers of a slot have the same kind and form.
+    description = fillers[0]
+    if description.kind != "place":
+        return True
+    return slot.form in (_ANY_FORM, description.form)
 
 
 def _possible_list_lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:

@@ -24,29 +24,35 @@ _OPEN: dict[str, Wordings] = {}
 def open_wordings(path: str | Path | None, identity: str | None = None) -> str | None:
     """Open a wording file for this process, and return its identity; None for our own words.
 
-    ``open_wordings("mine.toml")`` returns ``mine@1a2b3c4d``, the name and a hash of the content. A
-    worker of a run also passes the identity that its episodes need, so that a file that has changed
-    meanwhile is refused.
+    Returned for each path, with no identity wanted:
+
+    - ``"mine.toml"``: ``"mine@1a2b3c4d"``, the file's name and a hash of its content;
+    - ``"mine@1a2b3c4d"``, if it is open in this process: the same;
+    - ``"train"`` or ``"test"``, a pool of our own words: the same;
+    - None: None, for all of our own words.
+
+    A worker of a run also passes the identity that its episodes need, so that a file that has
+    changed meanwhile is refused.
 
     Args:
-        path: the file, or the identity of wordings that are open; ``train`` or ``test`` for our own
-            words of that pool; None for our own words.
-        identity: the wordings that are wanted; None for those of the file.
+        path: the file, an open identity, a pool, or None; see above.
+        identity: the wordings that are wanted, an identity or a pool; None for those of `path`.
 
     Raises:
         InvalidValueError: the file cannot be read, is invalid, or is not the one that is wanted.
     """
     if identity in _OPEN:
         return identity  # it is open already, whatever the path
-    # A pool of our own words needs no file.
+    # A pool of our own words needs no file; if one is wanted, the path does not matter.
     if path in POOLS or identity in POOLS:
         return str(identity or path)
-    if path is None:
-        if identity is not None:
-            raise InvalidValueError(f"The wordings {identity} need their file; none was given.")
+    if path is None and identity is None:
         return None
-    # The path may also be the identity of wordings that are open.
-    wordings = _OPEN.get(str(path)) or read_wordings(path)
+    if path is None:
+        raise InvalidValueError(f"The wordings {identity} need their file; none was given.")
+    wordings = _OPEN.get(str(path))
+    if wordings is None:
+        wordings = read_wordings(path)
     if identity not in (None, wordings.identity):
         raise InvalidValueError(
             f"The wording file {str(path)!r} holds {wordings.identity}, but the episodes need "

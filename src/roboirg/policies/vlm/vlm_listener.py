@@ -180,7 +180,13 @@ class VLMListener(VLMNamer, ScriptedPolicy):
         return {**self._configuration, "understood": understood}
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Query the goal and begin to execute it, or first hear the rest of the instruction.
+        """Begin an episode: query the goal from the model and begin to execute it.
+
+        If more of the instruction is still to come, the model is queried after its end, in `hear`.
+
+        Args:
+            instruction: what was said so far; more comes through `hear`.
+            demonstration: arrays of the video; empty without one.
 
         Raises:
             PolicyConnectionError: the model cannot be reached.
@@ -191,6 +197,7 @@ class VLMListener(VLMNamer, ScriptedPolicy):
         self._demonstration = demonstration
         self.understood = None
         self._impossible = False
+        # Last, because it may call `decide`, which needs the demonstration and sets the goal.
         super().reset(instruction, demonstration)
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:

@@ -141,7 +141,7 @@ def audit_record(record: Record, prepared: PreparedJob, limit: PromptLimit) -> N
     record.prompt_verdict = found.verdict
 
 
-def conclude(
+def conclude_episode(
     record: Record,
     prepared: PreparedJob,
     start: int,

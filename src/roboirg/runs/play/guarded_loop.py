@@ -32,7 +32,7 @@ from roboirg.records.action_log import ActionLog
 from roboirg.records.record import Record, SubgoalRecord
 from roboirg.runs.job_instruction import PreparedJob
 from roboirg.runs.play.call_guard import CallGuard
-from roboirg.runs.play.episode_record import conclude, utterances_at
+from roboirg.runs.play.episode_record import conclude_episode, utterances_at
 from roboirg.runs.play.goal_outcomes import recorded_events
 from roboirg.runs.play.video_writer import VideoWriter
 
@@ -104,7 +104,13 @@ class GuardedLoop:
         self._last_info = info
 
     def conclude(self) -> None:
-        """Record the verdict of the episode and its reasons, if it came to its end."""
+        """Record the verdict of the episode and its reasons; nothing if `play` broke off.
+
+        The record gets outcome and cause from the status at the end, and `conclude_episode` adds
+        goals and failure, which it finds in the recorded events and attempts. So call
+        `keep_actions`, which records the attempts, before. A status that is no verdict leaves the
+        outcome as it was, with a cause that begins with ``environment:``.
+        """
         info = self._last_info
         if info is None:
             return
@@ -112,7 +118,7 @@ class GuardedLoop:
         if not record.record_status(info["status"], info.get("cause")):
             record.cause = f"environment: the episode ended with status {info['status']!r}"
             return
-        conclude(
+        conclude_episode(
             record,
             self._prepared,
             self.start_step,

@@ -103,9 +103,12 @@ class _VertexList:
         self.sources.append(source)
 
     def begin_triangle(self, number: int, corners: Sequence[int], normal: int) -> int:
-        """Return the corner (0 to 2) that a triangle begins with, where a vertex has its normal.
+        """Choose the corner (0 to 2) that a triangle begins with, where a vertex has its normal.
 
-        If there is none, one is added at the corner with the fewest vertices.
+        If no corner has such a vertex, one is added at the corner with the fewest vertices: each
+        position needs one in the end. The first triangle begins with corner 0; another one in the
+        same plane, which shares that position, begins there, too, and adds none. `vertices_of` is
+        called later with the corner that is returned.
 
         Args:
             number: of the triangle.
@@ -116,10 +119,11 @@ class _VertexList:
             if (position, normal) in self.with_normal:
                 return corner
         counts = [len(self.at.get(position, ())) for position in corners]
-        fewest = counts.index(min(counts))
-        self.with_normal[corners[fewest], normal] = len(self.sources)
-        self.add(corners[fewest], _TriangleCorner(number, fewest))
-        return fewest
+        begin = counts.index(min(counts))
+        # `add` numbers the new vertex by the sources so far, so note its number before.
+        self.with_normal[corners[begin], normal] = len(self.sources)
+        self.add(corners[begin], _TriangleCorner(number, begin))
+        return begin
 
     def vertices_of(self, corners: Sequence[int], normal: int, first: int) -> list[int]:
         """Return the numbers of the three vertices of a triangle, in its order of corners.
