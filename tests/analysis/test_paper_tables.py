@@ -230,14 +230,15 @@ def test_csv_has_a_line_for_each_rate_with_the_counts_behind_it():
 
 
 def test_a_task_that_the_paper_lacks_has_a_table_of_its_own():
-    """One episode of the task *Outside* is won in both settings: 100, as in explicit (→0)."""
+    """Its only episode is won with both instructions: a rate of 100, which changed by 0."""
     explicit = make_results("1", policy="a", task="Outside")
     direct = make_results("1", "direct", policy="a", task="Outside")
+    tasks_of_the_paper = results_of_all_tasks()
 
-    table = table_of("other", results_of_all_tasks(), explicit, direct, published=True)
+    table = table_of("other", tasks_of_the_paper, explicit, direct, published=True)
 
-    assert [column.name for column in table.columns] == ["Outside", "Avg"]
-    assert str(entries_of_row(table, "direct")["Outside"]) == "100.00 →0.00"
+    rates = {column: str(entry) for column, entry in entries_of_row(table, "direct").items()}
+    assert rates == {"Outside": "100.00 →0.00", "Avg": "100.00 →0.00"}
 
 
 def test_a_task_that_the_paper_lacks_is_not_in_the_papers_table():

@@ -48,23 +48,43 @@ def run_here(*words):
     return CliRunner().invoke(app, ["run", *map(str, words)])
 
 
-def test_an_invalid_action_is_one_sentence_and_what_a_policy_prints_goes_to_its_log(tmp_path):
-    (tmp_path / "mine.py").write_text(CODE_OF_A_POLICY_THAT_PRINTS)
-    words = ("--policy", "mine:Loud", "--tasks", "PickXtimes", "--settings", "direct")
-    said = run_in_a_process(
-        "run", *words, "--episodes", "1", "--out", "o", "--workers", "1", cwd=tmp_path
-    )
-    assert said.returncode == 2
-    assert said.stderr.count("\n") == 1
-    assert "invalid action: " in said.stderr
+@pytest.fixture(scope="module")
+def invalid_action(tmp_path_factory):
+    """The process of a run of one episode by `CODE_OF_A_POLICY_THAT_PRINTS`, and its folder.
 
-    (record,) = read_records(tmp_path / "o")
+    The policy acts for three steps, then returns an invalid action.
+    """
+    folder = tmp_path_factory.mktemp("invalid action")
+    (folder / "mine.py").write_text(CODE_OF_A_POLICY_THAT_PRINTS)
+    words = ("--policy", "mine:Loud", "--tasks", "PickXtimes", "--settings", "direct")
+    process = run_in_a_process(
+        "run", *words, "--episodes", "1", "--out", "o", "--workers", "1", cwd=folder
+    )
+    return process, folder / "o"
+
+
+def test_an_invalid_action_is_an_error_in_one_sentence(invalid_action):
+    process, folder = invalid_action
+
+    (record,) = read_records(folder)
+
     assert (record.outcome, record.steps) == ("error", 3)
+    assert process.returncode == 2
+    assert process.stderr.count("\n") == 1
+    assert "invalid action: " in process.stderr
+
+
+def test_what_a_policy_prints_goes_to_its_log_and_not_to_the_terminal(invalid_action):
+    process, folder = invalid_action
+
+    (record,) = read_records(folder)
 
     told = " ".join(turn.text for turn in record.instruction)
-    log = log_path(tmp_path / "o", record.slug).read_text()
+    log = log_path(folder, record.slug).read_text()
     assert log == f"made\ntold: {told}\nasked\nasked\n"
-    assert not {"told:", "asked"} & {*said.stdout.split(), *said.stderr.split()}
+    printed = process.stdout + process.stderr
+    assert "told:" not in printed
+    assert "asked" not in printed
 
 
 def test_a_render_device_that_is_not_there_ends_the_run_and_keeps_what_was_played(

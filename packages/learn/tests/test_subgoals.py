@@ -349,10 +349,10 @@ def test_a_learned_planner_can_ask_scripted_hands(saved_policy):
     from roboirg.policies.by_name.finding import make_policy
     from roboirg_learn.policy.subgoal_following import LearnedPlanner
 
-    policy = make_policy(f"{saved_policy.spec}&hands=scripted", 0)
+    policy = make_policy(f"{saved_policy.spec}&hands=scripted", seed=0)
 
     assert isinstance(policy.planner, LearnedPlanner)
-    assert "front" in policy.cameras
+    assert "front" in policy.cameras  # which the planner looks through; scripted hands need none
 
 
 @pytest.mark.sim

@@ -3,7 +3,6 @@
 import pytest
 from page_commands import blocks, read_verdicts, replaced, run_page
 from replay_table import (
-    EPISODES,
     MANY,
     MAX_STEPS,
     MESHES,
@@ -42,19 +41,22 @@ class MyPolicy:
 @pytest.mark.slow
 @pytest.mark.parametrize(("count", "mode"), BATCHES)
 def test_the_page_s_program_has_the_outcomes_of_our_runner(table, ours, tmp_path, count, mode):
-    values = {
-        **in_batches_of(count),
-        "setting=SETTING": f"setting=SETTING, cameras=('front',), meshes={MESHES!r}, "
-        f"max_steps={MAX_STEPS}, demonstration_frames='none'",
-        MODES["async"]: MODES[mode],
-    }
+    """The program is that of the page, but for the size of batches and the options of `ours`."""
+    replacements = in_batches_of(count)
+    replacements["setting=SETTING"] = (
+        f"setting=SETTING, cameras=('front',), meshes={MESHES!r}, "
+        f"max_steps={MAX_STEPS}, demonstration_frames='none'"
+    )
+    replacements[MODES["async"]] = MODES[mode]
     (program,) = blocks("Gymnasium", "python")
-    (tmp_path / "play.py").write_text(replaced(program, values))
+    (tmp_path / "play.py").write_text(replaced(program, replacements))
     (tmp_path / "my_policy.py").write_text(MY_POLICY)
+
     run_page("Gymnasium", tmp_path, {}, REPLAY_TABLE=str(table))
-    lines = read_verdicts(tmp_path)
 
-    assert [line["setting"] for line in lines] == [SETTING] * EPISODES
-
-    found = [(line["task"], line["episode"], line["success"], line["steps"]) for line in lines]
-    assert sorted(found) == sorted(ours)
+    verdicts = read_verdicts(tmp_path)
+    outcomes = [
+        (line["task"], line["episode"], line["success"], line["steps"]) for line in verdicts
+    ]
+    assert sorted(outcomes) == sorted(ours)
+    assert {line["setting"] for line in verdicts} == {SETTING}
