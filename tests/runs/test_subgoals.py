@@ -85,7 +85,7 @@ def test_the_table_counts_which_subgoals_were_right_wrong_or_unreadable(tmp_path
     """Of three subgoals one was right, one named a wrong thing, one could not be understood.
 
     These are the first, second and last of the counts. Then the means of two episodes: (3 + 1) / 2
-    = 2 calls, 6.5 / 2 = 3.25 seconds until the answer, 2.25 / 2 = 1.12 seconds of waiting.
+    = 2 calls, 6.5 / 2 = 3.25 seconds until the answer, 2.25 / 2 = 1.125 seconds of waiting, which is rounded up.
     """
     spent = {"calls": 3.0, "answered_s": 6.5, "waited_s": 2.25}
     record = make_record(JOB, "failure", "no", subgoals=THREE_SUBGOALS, usage=spent)
@@ -94,7 +94,7 @@ def test_the_table_counts_which_subgoals_were_right_wrong_or_unreadable(tmp_path
     printed = printed_subgoals_table(fill(tmp_path, record, other))
 
     counts = "| 3 | 1 (33 %) | 1 (33 %) | 0 (0 %) | 0 (0 %) | 1 (33 %) |"
-    assert f"{counts} 2 | 3.25 | 1.12 |" in printed
+    assert f"{counts} 2 | 3.25 | 1.13 |" in printed
 
 
 def test_the_table_has_unknown_costs_where_a_service_did_not_report_all_of_them(tmp_path):
