@@ -85,7 +85,8 @@ def test_the_table_counts_which_subgoals_were_right_wrong_or_unreadable(tmp_path
     """Of three subgoals one was right, one named a wrong thing, one could not be understood.
 
     These are the first, second and last of the counts. Then the means of two episodes: (3 + 1) / 2
-    = 2 calls, 6.5 / 2 = 3.25 seconds until the answer, 2.25 / 2 = 1.125 seconds of waiting, which is rounded up.
+    = 2 calls, 6.5 / 2 = 3.25 seconds until the answer, 2.25 / 2 = 1.125 seconds of waiting, which
+    is rounded up.
     """
     spent = {"calls": 3.0, "answered_s": 6.5, "waited_s": 2.25}
     record = make_record(JOB, "failure", "no", subgoals=THREE_SUBGOALS, usage=spent)
