@@ -224,7 +224,7 @@ def _trials_in(groups: Mapping[Key, ByTask]) -> int:
     trials = 0
     for by_task in groups.values():
         for cell in by_task.values():
-            trials += len(cell.verdicts) + cell.errors + cell.missing
+            trials += len(cell.verdicts) + cell.errors + cell.missing + cell.spared
     return trials
 
 
@@ -426,7 +426,15 @@ def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
         lambda key: with_options(key, replace(key.options, form="resolved")),
         family=lambda key: (key.policy_run, families[key.scope]),
     )
-    return {summary.key: summary for summary in found}
+    summaries = {}
+    for summary in found:
+        summaries[summary.key] = summary
+        if summary.key.policy_run.is_until_decided:
+            # The number of episodes depends on their results: no interval and no fixed p hold.
+            summaries[summary.key] = replace(
+                summary, interval=None, gap=None, second_gap=None, p_holm=None
+            )
+    return summaries
 
 
 def _families(scopes: Mapping[ScopeKey, ByTask]) -> dict[str, str]:

@@ -1,0 +1,121 @@
+"""What two sides show at any time: p-values and intervals that hold however often one looked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from roboirg.analysis.measures.measure import Measured
+from roboirg.core.plain_text import counted
+from roboirg.runs.plan.stopping import Scene, scene_order
+from roboirg.stats.anytime import PairedScenes, mean_bounds, p_path
+from roboirg.stats.cells import ByTask, Cell
+from roboirg.stats.intervals import Interval
+from roboirg.stats.paired_tests import holm
+from roboirg.stats.rates import bounds_text, p_text
+
+
+class AnytimeFigures(NamedTuple):
+    """Evidence on a difference that holds however often one looked.
+
+    Attributes:
+        p_holm: p-value, corrected over all that are tested together.
+        interval: 95 %, of the mean difference over all planned scenes.
+        scenes: how many have results of both sides.
+        planned: how many both sides are planned to have.
+    """
+
+    p_holm: float
+    interval: Interval
+    scenes: int
+    planned: int
+
+    @property
+    def sentence(self) -> str:
+        """The p-value, and of an unfinished plan where its difference will lie.
+
+        For example ``However often one looked: p = 0.21, 84 of 550 scenes; the difference over all
+        of them is between −2.0 and +30.1 points (95 %).``
+        """
+        words = f"However often one looked: {p_text(self.p_holm)}"
+        if self.scenes == self.planned:
+            return f"{words}."
+        scenes = f"{self.scenes} of {counted(self.planned, 'scene')}"
+        bounds = bounds_text(self.interval)
+        return f"{words}, {scenes}; the difference over all of them is {bounds} (95 %)."
+
+
+def anytime_figures(groups: Sequence[Measured[Any]], split: str) -> list[AnytimeFigures]:
+    """Return what each group shows against its reference at any time, corrected over all groups.
+
+    Args:
+        groups: that are tested together.
+        split: of their scenes.
+    """
+    every = [paired_scenes(group.cells, group.others, split) for group in groups]
+    p_values = []
+    for pairs in every:
+        path = p_path(pairs.differences)
+        p_values.append(float(path[-1]) if len(path) else 1.0)
+    figures = []
+    for pairs, p_holm in zip(every, holm(p_values), strict=True):
+        scenes = len(pairs.differences)
+        figures.append(AnytimeFigures(p_holm, mean_bounds(pairs), scenes, pairs.planned))
+    return figures
+
+
+def paired_scenes(cells: ByTask, others: ByTask, split: str) -> PairedScenes:
+    """Return the differences of two sides in the scenes that both have, in the random order.
+
+    Scenes that a side lacks come last in the order: they were not looked at.
+
+    Args:
+        cells: trials of the first side, by task.
+        others: those of the second.
+        split: of the scenes.
+    """
+    differences = {}
+    planned = {}
+    for task in cells.keys() & others.keys():
+        found = _differences(cells[task], others[task])
+        if found:
+            planned[task] = min(_planned_episodes(cells[task]), _planned_episodes(others[task]))
+        for episode, difference in found.items():
+            differences[Scene(task, episode)] = difference
+    order = scene_order(differences, split)
+    # The mean over scenes is then the unweighted mean over tasks.
+    weight_of = {task: sum(planned.values()) / (len(planned) * planned[task]) for task in planned}
+    weights = [weight_of[scene.task] for scene in order]
+    for task, count in planned.items():
+        unknown = count - sum(scene.task == task for scene in order)
+        weights += [weight_of[task]] * unknown
+    ordered = [differences[scene] for scene in order]
+    return PairedScenes(np.array(ordered, dtype=np.float64), np.array(weights))
+
+
+def _differences(first: Cell, second: Cell) -> dict[int, float]:
+    """Return by how much the first is better in each episode that both have, -1 to 1.
+
+    Policy seeds that both have count, or all seeds if they share none.
+    """
+    first_episodes = first.by_episode()
+    second_episodes = second.by_episode()
+    differences = {}
+    for episode in first_episodes.keys() & second_episodes.keys():
+        first_verdicts = first_episodes[episode]
+        second_verdicts = second_episodes[episode]
+        seeds = first_verdicts.keys() & second_verdicts.keys()
+        first_wins = [first_verdicts[seed] for seed in seeds or first_verdicts]
+        second_wins = [second_verdicts[seed] for seed in seeds or second_verdicts]
+        differences[episode] = float(np.mean(first_wins) - np.mean(second_wins))
+    return differences
+
+
+def _planned_episodes(cell: Cell) -> int:
+    """Return how many episodes a cell is planned to have, with those that have no verdict."""
+    counts = cell.counts
+    unknown = counts.errors + counts.missing + counts.spared
+    trials_per_episode = max(counts.trials / max(counts.episodes, 1), 1.0)
+    return counts.episodes + round(unknown / trials_per_episode)
