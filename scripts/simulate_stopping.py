@@ -195,7 +195,9 @@ def _is_within(weighted: Weighted) -> NDArray[np.bool_]:
     scenes = shares.shape[1]
     is_below = winnings_above(lowest, 1 - shares, scenes) >= 2 / ALPHA
     is_above = winnings_above(lowest, shares, scenes) >= 2 / ALPHA
-    return np.logical_or.accumulate(is_below, axis=1) & np.logical_or.accumulate(is_above, axis=1)
+    is_below = np.logical_or.accumulate(is_below, axis=1)
+    is_above = np.logical_or.accumulate(is_above, axis=1)
+    return np.asarray(is_below & is_above)
 
 
 def _has_missed(weighted: Weighted) -> NDArray[np.bool_]:
@@ -205,7 +207,7 @@ def _has_missed(weighted: Weighted) -> NDArray[np.bool_]:
     scenes = shares.shape[1]
     is_above = winnings_above(mean, shares, scenes).max(axis=1) >= 2 / ALPHA
     is_below = winnings_above(1 - mean, 1 - shares, scenes).max(axis=1) >= 2 / ALPHA
-    return is_above | is_below
+    return np.asarray(is_above | is_below)
 
 
 def main() -> None:

@@ -1,0 +1,126 @@
+"""What tables, comparisons and the page make of a run that stopped when it was decided."""
+
+import pytest
+from run_fakes import FakePlay, changed, small_plan
+
+from roboirg.analysis.measures.comparison import compare_settings
+from roboirg.analysis.measures.comparison_text import sentences
+from roboirg.analysis.measures.measure import summarize
+from roboirg.analysis.results.run_cells import cells_of
+from roboirg.analysis.results.sources import Source
+from roboirg.analysis.results.stored_side import against_stored
+from roboirg.analysis.run_results import Results
+from roboirg.core.errors import InvalidValueError
+from roboirg.runs.plan.plan_sections import StopRule
+from roboirg.runs.run.executor import InProcess
+from roboirg.runs.run.runner import run_plan
+
+
+@pytest.fixture(scope="module")
+def stopped_run(tmp_path_factory):
+    """Return the folder of a run over 50 scenes that stopped after 16.
+
+    Explicit always succeeds, and direct in 7 of the 16.
+    """
+    folder = tmp_path_factory.mktemp("stopped")
+    plan = changed(small_plan(50), stop=StopRule())
+    run_plan(plan, folder, FakePlay(), InProcess())
+    return folder
+
+
+def test_episodes_that_need_not_be_played_have_an_outcome_of_their_own(stopped_run):
+    """Of 2 x 50 planned episodes 2 x 16 count; none is missing."""
+    outcomes = list(Source(stopped_run).frame["outcome"])
+
+    assert outcomes.count("spared") == 2 * (50 - 16)
+    assert outcomes.count("missing") == 0
+    assert outcomes.count("success") == 16 + 7
+
+
+def test_results_from_after_the_decision_count_nowhere(tmp_path):
+    """A full run that is given the rule afterwards has the table of one that stopped."""
+    full = small_plan(50)
+    run_plan(full, tmp_path, FakePlay(), InProcess())
+
+    run_plan(changed(full, stop=StopRule()), tmp_path, FakePlay(), InProcess())
+
+    outcomes = list(Source(tmp_path).frame["outcome"])
+    assert outcomes.count("spared") == 2 * (50 - 16)
+
+
+def test_rates_of_a_stopped_run_have_neither_interval_nor_p_value(stopped_run):
+    """Both are for a number of episodes that does not depend on the results."""
+    summaries = summarize(cells_of(Source(stopped_run).frame))
+
+    assert len(summaries) > 0
+    for summary in summaries.values():
+        assert summary.interval is None
+        assert summary.gap is None
+        assert summary.p_holm is None
+
+
+def test_the_table_marks_a_stopped_run_and_prints_what_was_found(stopped_run):
+    table = Results(stopped_run).table("main", "markdown")
+
+    assert "random (until decided)" in table
+    assert "43.75 ‡" in table
+    assert "Until decided: random, direct to explicit: explicit is better, −56.3 points" in table
+    assert "random has no headline number" not in table
+
+
+def test_a_comparison_of_a_stopped_run_prints_only_what_holds_at_any_time(stopped_run):
+    comparison = compare_settings(Source(stopped_run).frame)
+
+    text = "\n".join(sentences(comparison, "random", "random"))
+
+    assert "direct: explicit is better, −56.3 points. However often one looked: p = 0.043" in text
+    assert "16 of 50 scenes" in text
+    assert "exact paired test" not in text
+
+
+def test_a_full_run_is_compared_by_both_kinds_of_p_value(tmp_path):
+    """The plan of 16 scenes was fixed before, so the exact test holds, too."""
+    run_plan(small_plan(16), tmp_path, FakePlay(), InProcess())
+
+    comparison = compare_settings(Source(tmp_path).frame)
+
+    text = "\n".join(sentences(comparison, "random", "random"))
+    assert "exact paired test" in text
+    assert "However often one looked: p = " in text
+
+
+def test_the_results_of_a_stored_policy_are_copied_once_and_become_a_side(tmp_path):
+    """The stored policy ``random`` has played; ``oracle`` is the one that is to be compared."""
+    stored = changed(small_plan(8), settings="direct")
+    run_plan(stored, tmp_path / "stored", FakePlay(), InProcess())
+    plan = changed(small_plan(8, policies=("oracle",)), settings="direct", stop=StopRule())
+    folder = tmp_path / "new"
+
+    first = against_stored(plan, str(tmp_path / "stored"), folder)
+    again = against_stored(plan, f"{tmp_path / 'stored'}:random", folder)
+    run_plan(first, folder, FakePlay(), InProcess())
+
+    assert first == again
+    assert first.stop.against == "random"
+    (compared,) = Source(folder).stopping.compared
+    assert compared.name == "direct, oracle to random"
+    assert compared.decision.scenes == 8
+    assert len(Source(folder).results) == 16
+
+
+def test_a_stored_policy_of_the_same_name_is_refused(tmp_path):
+    """Its results could not be told from the new ones."""
+    run_plan(small_plan(2), tmp_path / "stored", FakePlay(), InProcess())
+
+    with pytest.raises(InvalidValueError, match="give that another one with --policy NAME=SPEC"):
+        against_stored(small_plan(2), str(tmp_path / "stored"), tmp_path / "new")
+
+
+def test_stored_results_under_other_conditions_are_refused(tmp_path):
+    """They were played with fewer steps than the plan allows."""
+    stored = changed(small_plan(2), max_steps=100)
+    run_plan(stored, tmp_path / "stored", FakePlay(), InProcess())
+    plan = small_plan(2, policies=("oracle",))
+
+    with pytest.raises(InvalidValueError, match="no result of an episode of this plan"):
+        against_stored(plan, str(tmp_path / "stored"), tmp_path / "new")
