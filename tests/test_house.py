@@ -21,7 +21,7 @@ ALL_SOURCE_FILES = [
 """The benchmark's files and those of the packages next to it."""
 
 MOST_ROOMS = 21
-MOST_ARROWS = 100
+MOST_ARROWS = 101
 MOST_NAMES = 53
 """Of the benchmark, that the packages next to it import."""
 

@@ -3,8 +3,7 @@
 import pytest
 
 from roboirg.analysis.results.option_labels import has_default_options, options_sort_key
-from roboirg.core.instruction_options import options_label
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions, options_label
 from roboirg.language.settings import plain_settings, setting_names
 
 

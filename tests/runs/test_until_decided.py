@@ -17,7 +17,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.records.record import Job, Record
 from roboirg.records.store import read_results
 from roboirg.runs.plan.plan_sections import StopRule
-from roboirg.runs.plan.stopping import Scene, find_stopping, scene_of, scene_order
+from roboirg.runs.plan.stopping import PlanScene, find_stopping, scene_of, scene_order
 from roboirg.runs.run.executor import InProcess, LocalProcesses
 from roboirg.runs.run.runner import run_plan
 
@@ -52,8 +52,8 @@ def found_in(folder, plan):
 
 def test_the_order_of_scenes_is_random_and_the_same_for_every_plan():
     """Of a smaller plan the scenes come in the order that they have in a larger one."""
-    few = [Scene("PickXtimes", episode) for episode in range(10)]
-    many = [Scene("PickXtimes", episode) for episode in range(50)]
+    few = [PlanScene("PickXtimes", episode) for episode in range(10)]
+    many = [PlanScene("PickXtimes", episode) for episode in range(50)]
 
     order = scene_order(many, "test")
 

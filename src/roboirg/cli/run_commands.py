@@ -73,16 +73,12 @@ def run(
         bool,
         typer.Option(
             "--until-decided",
-            help="Play scene by scene, and stop when it is clear how two policies, or the settings "
-            "of one, differ.",
+            help="Stop once it is clear how policies or settings differ.",
         ),
     ] = False,
     against: Annotated[
         str | None,
-        typer.Option(
-            help="Until it is clear how the policy differs from one that has played: RUN:POLICY.",
-            show_default="none",
-        ),
+        typer.Option(help="Likewise, against RUN:POLICY, which has played.", show_default=False),
     ] = None,
     dry_run: Annotated[
         bool,

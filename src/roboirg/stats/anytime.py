@@ -65,7 +65,7 @@ class PairedScenes(NamedTuple):
         return PairedScenes(self.differences[:places], self.weights)
 
 
-class Decision(NamedTuple):
+class SequentialDecision(NamedTuple):
     """What the scenes say about two sides, up to the place of the order where it was decided.
 
     Attributes:
@@ -85,7 +85,7 @@ class Decision(NamedTuple):
 
 def decide(
     contrasts: Sequence[PairedScenes], alpha: float = ALPHA, margin: float = 0.0
-) -> list[Decision]:
+) -> list[SequentialDecision]:
     """Look after every scene, and close each contrast when it is decided; return what was found.
 
     A look needs the results of the scene in all open contrasts, so it waits for the slowest one.
@@ -124,7 +124,9 @@ def decide(
     for number, pairs in enumerate(contrasts):
         scenes = int(np.isfinite(pairs.differences[: looks[number]]).sum())
         decisions.append(
-            Decision(findings[number], looks[number], scenes, p_values[number], p_holm[number])
+            SequentialDecision(
+                findings[number], looks[number], scenes, p_values[number], p_holm[number]
+            )
         )
     return decisions
 

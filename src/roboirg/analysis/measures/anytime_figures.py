@@ -9,7 +9,7 @@ import numpy as np
 
 from roboirg.analysis.measures.measure import Measured
 from roboirg.core.plain_text import counted
-from roboirg.runs.plan.stopping import Scene, scene_order
+from roboirg.runs.plan.stopping import PlanScene, scene_order
 from roboirg.stats.anytime import PairedScenes, mean_bounds, p_path
 from roboirg.stats.cells import ByTask, Cell
 from roboirg.stats.intervals import Interval
@@ -33,18 +33,18 @@ class AnytimeFigures(NamedTuple):
     planned: int
 
     @property
-    def sentence(self) -> str:
+    def text(self) -> str:
         """The p-value, and of an unfinished plan where its difference will lie.
 
-        For example ``However often one looked: p = 0.21, 84 of 550 scenes; the difference over all
-        of them is between −2.0 and +30.1 points (95 %).``
+        For example ``p = 0.21 after 84 of 550 scenes (over all of them between −2.0 and +30.1
+        points, 95 %)``.
         """
-        words = f"However often one looked: {p_text(self.p_holm)}"
+        words = p_text(self.p_holm)
         if self.scenes == self.planned:
-            return f"{words}."
-        scenes = f"{self.scenes} of {counted(self.planned, 'scene')}"
+            return words
         bounds = bounds_text(self.interval)
-        return f"{words}, {scenes}; the difference over all of them is {bounds} (95 %)."
+        scenes = f"{self.scenes} of {counted(self.planned, 'scene')}"
+        return f"{words} after {scenes} (over all of them {bounds}, 95 %)"
 
 
 def anytime_figures(groups: Sequence[Measured[Any]], split: str) -> list[AnytimeFigures]:
@@ -83,7 +83,7 @@ def paired_scenes(cells: ByTask, others: ByTask, split: str) -> PairedScenes:
         if found:
             planned[task] = min(_planned_episodes(cells[task]), _planned_episodes(others[task]))
         for episode, difference in found.items():
-            differences[Scene(task, episode)] = difference
+            differences[PlanScene(task, episode)] = difference
     order = scene_order(differences, split)
     # The mean over scenes is then the unweighted mean over tasks.
     weight_of = {task: sum(planned.values()) / (len(planned) * planned[task]) for task in planned}

@@ -48,9 +48,8 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
     else:
         yield f"{first} against {second}, on the same episodes."
     yield ""
-    for average, figures in zip(averages, comparison.anytime, strict=True):
+    for average in averages:
         yield average.sentence
-        yield f"  {figures.sentence}"
     if has_several_tasks:
         yield ""
         yield from _decided_cells(cells)
@@ -63,9 +62,16 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
     yield ""
     results = itertools.chain(averages, *breakdowns.values())
     yield from _p_value_notes(results, has_several_tasks=has_several_tasks)
+    yield f"However often one looked: {'; '.join(_anytime_texts(comparison))}."
     if breakdowns:
         yield "Each breakdown is corrected separately, over all its rows."
     yield from _left_out(comparison.averages)
+
+
+def _anytime_texts(comparison: Comparison) -> Iterator[str]:
+    """Yield of each average what holds however often one looked: ``direct p = 0.021``."""
+    for average, figures in zip(comparison.averages, comparison.anytime, strict=True):
+        yield f"{options_label(average.key.options)} {figures.text}"
 
 
 def _until_decided(comparison: Comparison, first: str, second: str) -> Iterator[str]:
@@ -85,7 +91,7 @@ def _until_decided(comparison: Comparison, first: str, second: str) -> Iterator[
         if figures.p_holm <= ALPHA:
             finding = f"{result.better} is better"
         label = options_label(average.key.options)
-        yield f"{label}: {finding}, {points(gap, 1)} points. {figures.sentence}"
+        yield f"{label}: {finding}, {points(gap, 1)} points, {figures.text}."
     yield ""
     yield (
         "p-values and intervals hold however often one looked, after Holm's correction over these "

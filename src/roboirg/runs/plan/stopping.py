@@ -22,7 +22,13 @@ from roboirg.language.settings import EXPLICIT
 from roboirg.records.record import Job, Summary
 from roboirg.records.record_codec import RecordKey, identity_key
 from roboirg.runs.plan.plan_sections import Attempts, StopRule
-from roboirg.stats.anytime import Decision, PairedScenes, decide, mean_bounds, mean_difference
+from roboirg.stats.anytime import (
+    PairedScenes,
+    SequentialDecision,
+    decide,
+    mean_bounds,
+    mean_difference,
+)
 from roboirg.stats.rates import bounds_text, p_text, points
 from roboirg.util.short_hash import short_hash
 
@@ -30,7 +36,7 @@ _SIDES = 2
 _POINTS = 100
 
 
-class Scene(NamedTuple):
+class PlanScene(NamedTuple):
     """A scene of the plan's split."""
 
     task: str
@@ -64,7 +70,7 @@ class Contrast(NamedTuple):
         return f"{label}, {self.first.policy} to {self.second.policy}"
 
 
-class Compared(NamedTuple):
+class ComparedSides(NamedTuple):
     """A comparison of a run, and what was found.
 
     Attributes:
@@ -77,7 +83,7 @@ class Compared(NamedTuple):
 
     contrast: Contrast
     pairs: PairedScenes
-    decision: Decision
+    decision: SequentialDecision
     alpha: float
     margin: float
 
@@ -126,17 +132,17 @@ class Compared(NamedTuple):
         return options_label(chosen.options) if self.contrast.is_gap else chosen.policy
 
 
-Trials = Mapping[Side, Mapping[Scene, Sequence[Job]]]
+Trials = Mapping[Side, Mapping[PlanScene, Sequence[Job]]]
 """The jobs of each side in each scene, one for each policy seed."""
 
 
-def scene_order(scenes: Iterable[Scene], split: str) -> list[Scene]:
+def scene_order(scenes: Iterable[PlanScene], split: str) -> list[PlanScene]:
     """Return scenes in the order in which they are looked at.
 
     It is random, and the same for all plans and policies: that of a hash of the scene's name.
     """
 
-    def key(scene: Scene) -> str:
+    def key(scene: PlanScene) -> str:
         return short_hash(f"order of scenes/{split}/{scene.task}/{scene.episode}")
 
     return sorted(scenes, key=lambda scene: (key(scene), scene))
@@ -186,9 +192,9 @@ class Stopping:
         return contrasts
 
     @cached_property
-    def order(self) -> list[Scene]:
+    def order(self) -> list[PlanScene]:
         """The scenes of all sides that are compared, in the order in which they are looked at."""
-        scenes: set[Scene] = set()
+        scenes: set[PlanScene] = set()
         split = ""
         for contrast in self.contrasts:
             for side in contrast:
@@ -198,7 +204,7 @@ class Stopping:
         return scene_order(scenes, split)
 
     @cached_property
-    def places(self) -> Mapping[Scene, int]:
+    def places(self) -> Mapping[PlanScene, int]:
         """The place of each scene in the order, from 0."""
         return {scene: place for place, scene in enumerate(self.order)}
 
@@ -208,18 +214,20 @@ class Stopping:
         return [self._paired(contrast) for contrast in self.contrasts]
 
     @cached_property
-    def decisions(self) -> list[Decision]:
+    def decisions(self) -> list[SequentialDecision]:
         """What was found of each contrast."""
         return decide(self.pairs, self.rule.alpha, self.rule.margin / _POINTS)
 
     @property
-    def compared(self) -> list[Compared]:
+    def compared(self) -> list[ComparedSides]:
         """Every comparison with what was found of it."""
         found = []
         for contrast, pairs, decision in zip(
             self.contrasts, self.pairs, self.decisions, strict=True
         ):
-            found.append(Compared(contrast, pairs, decision, self.rule.alpha, self.rule.margin))
+            found.append(
+                ComparedSides(contrast, pairs, decision, self.rule.alpha, self.rule.margin)
+            )
         return found
 
     @property
@@ -309,7 +317,7 @@ def find_stopping(
     newest = {identity_key(result): result for result in results}
     compared: list[Job] = [*jobs]
     compared += [result for result in newest.values() if result.policy == rule.against]
-    trials: defaultdict[Side, defaultdict[Scene, list[Job]]] = defaultdict(
+    trials: defaultdict[Side, defaultdict[PlanScene, list[Job]]] = defaultdict(
         lambda: defaultdict(list)
     )
     for job in compared:
@@ -322,5 +330,5 @@ def side_of(job: Job) -> Side:
     return Side(job.policy, job.column)
 
 
-def scene_of(job: Job) -> Scene:
-    return Scene(job.task, job.episode)
+def scene_of(job: Job) -> PlanScene:
+    return PlanScene(job.task, job.episode)

@@ -18,7 +18,7 @@ from rich.text import Text
 from roboirg.core.arms import TOLD
 from roboirg.core.plain_text import counted, printable
 from roboirg.records.record import Record
-from roboirg.runs.plan.stopping import Compared, Stopping
+from roboirg.runs.plan.stopping import ComparedSides, Stopping
 from roboirg.stats.rates import p_text
 
 ESTIMATE_AFTER = 5
@@ -60,7 +60,7 @@ class ConsoleReporter(Reporter):
         self._played = 0
         self._seconds_played = 0.0
         self._workers: int | None = None
-        self._compared: list[Compared] = []
+        self._compared: list[ComparedSides] = []
         self._start = time.monotonic()
         self._bar = Progress(
             TextColumn("[bold]{task.description}"),
@@ -167,7 +167,7 @@ class ConsoleReporter(Reporter):
         return " · ".join(parts)
 
 
-def _progress_of(compared: Compared) -> str:
+def _progress_of(compared: ComparedSides) -> str:
     """Return how far a comparison is: ``direct, mine to pi0: 84 of 550 scenes, p = 0.21 …``.
 
     The p-value holds however often one looks, and is corrected over all comparisons.

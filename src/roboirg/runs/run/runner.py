@@ -55,18 +55,18 @@ class RunSummary(NamedTuple):
         played: number of episodes played in this run, retries not counted.
         errors: records of the plan whose outcome is an error.
         missing: number of jobs of the plan without a record that should have one.
-        spared: number of those that need none, because what is compared was decided before.
         video_errors: why videos of new records could not be written.
         unreachable: policies skipped after too many connection errors.
+        spared: number of jobs that need no record, because what is compared was decided before.
     """
 
     total: int
     played: int
     errors: tuple[Summary, ...]
     missing: int
-    spared: int
     video_errors: tuple[str, ...]
     unreachable: tuple[str, ...]
+    spared: int = 0
 
 
 def run_plan(
@@ -256,9 +256,9 @@ class _RunLoop:
             played=len(self.tries),
             errors=tuple(record for record in found if record.outcome == "error"),
             missing=len(jobs) - len(found) - spared,
-            spared=spared,
             video_errors=tuple(self.video_errors),
             unreachable=tuple(self.unreachable),
+            spared=spared,
         )
 
     def _store_record(self, job: Job, record: Record) -> None:
