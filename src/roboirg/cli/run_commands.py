@@ -49,7 +49,7 @@ Folder = Annotated[str, typer.Argument(help="Output folder of a run.")]
 RetryErrors = Annotated[
     bool,
     typer.Option(
-        help="Play episodes again if their newest record is an error.",
+        help="Replay episodes that ended in an error.",
     ),
 ]
 
@@ -78,7 +78,7 @@ def run(
     ] = False,
     against: Annotated[
         str | None,
-        typer.Option(help="Likewise, against RUN:POLICY, which has played.", show_default=False),
+        typer.Option(help="Likewise, against RUN:POLICY.", show_default=False),
     ] = None,
     dry_run: Annotated[
         bool,
