@@ -18,7 +18,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 from scipy.stats import beta
 
 from roboirg.stats.intervals import ALPHA, Interval
@@ -268,6 +267,6 @@ def _mixed_winnings(gains: Numbers, stakes: Numbers) -> Numbers:
         gains: (..., n) what a scene adds to a stake of 1; at least -1.
         stakes: parts of the money that are bet on each scene.
     """
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):  # nothing is left, or more than can be said
         logarithms = np.cumsum(np.log1p(gains[..., np.newaxis] * stakes), axis=-2)
-    return np.asarray(np.exp(logsumexp(logarithms, axis=-1) - math.log(len(stakes))))
+        return np.asarray(np.exp(logarithms).mean(axis=-1))

@@ -156,7 +156,10 @@ class _Columns:
                     cells = {task: by_task[task] for task in names}
                     # The reference is not compared with itself.
                     others = NOTHING if options == self.reference else at_reference
-                    rates[self.title(options)] = _rate(cells, others)
+                    rate = _rate(cells, others)
+                    if policy_run.is_until_decided:
+                        rate = rate._replace(interval=None)
+                    rates[self.title(options)] = rate
             if rates:
                 rates_of_runs[policy_run] = rates
         return rates_of_runs

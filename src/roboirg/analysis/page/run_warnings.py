@@ -54,10 +54,10 @@ def run_warnings(episodes: PageEpisodes) -> list[Notice]:
     Warnings are about missing episodes, errors, mixed versions and cut prompts; notes about missing
     references, private splits and the headline number.
     """
-    warnings = [*findings_of(episodes.data.frame), *_incomplete(episodes)]
+    warnings = list(_incomplete(episodes))
     warnings += mixtures(episodes.records)
     warnings += heard_notes(episodes.data.frame, episodes.names)
-    notes = list(_without_reference(episodes))
+    notes = [*findings_of(episodes.data.frame), *_without_reference(episodes)]
     notes += _private(episodes)
     notes += headline_notes(episodes.data.cells, episodes.names)
     notices = [Notice("warning", warning) for warning in warnings]

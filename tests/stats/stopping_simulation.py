@@ -1,7 +1,7 @@
 """Simulate runs that stop when they are decided, and print the table of the page about them.
 
-python scripts/simulate_stopping.py
-python scripts/simulate_stopping.py --runs 500
+python tests/stats/stopping_simulation.py
+python tests/stats/stopping_simulation.py --runs 500
 
 In every case two policies play the same scenes; a look follows each scene. Printed are how often a
 difference is found where there is none, how often the interval misses at some look, and how many
