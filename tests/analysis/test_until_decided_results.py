@@ -3,9 +3,11 @@
 import pytest
 from run_fakes import FakePlay, changed, small_plan
 
+from roboirg.analysis.measures.breakdowns import BREAKDOWNS, break_down
 from roboirg.analysis.measures.comparison import compare_settings
 from roboirg.analysis.measures.comparison_text import sentences
 from roboirg.analysis.measures.measure import summarize
+from roboirg.analysis.page.evidence_paths import evidence_paths
 from roboirg.analysis.results.run_cells import cells_of
 from roboirg.analysis.results.sources import Source
 from roboirg.analysis.results.stored_side import against_stored
@@ -66,6 +68,31 @@ def test_the_table_marks_a_stopped_run_and_prints_what_was_found(stopped_run):
     assert "43.75 ‡" in table
     assert "Until decided: random, direct to explicit: explicit is better, −56.3 points" in table
     assert "random has no headline number" not in table
+
+
+def test_gaps_by_kind_of_words_of_a_stopped_run_have_neither_interval_nor_p_value(stopped_run):
+    """Their episodes are those of the run, whose number depends on the results, too."""
+    rows = break_down(BREAKDOWNS["difficulty"], Source(stopped_run).frame)
+
+    assert len(rows) > 0
+    for row in rows:
+        assert row.rate is not None
+        assert (row.interval, row.gap, row.p_holm) == (None, None, None)
+
+
+def test_the_page_draws_the_evidence_from_the_first_scene_to_the_last_look(stopped_run):
+    """The drawing is 600 wide for 50 planned scenes, so that the 16th is at 192.
+
+    It ends above the dashed line, where a single comparison is decided: lower numbers are higher.
+    """
+    (path,) = evidence_paths([Source(stopped_run)])
+
+    corners = path.points.split()
+    last_left, last_height = corners[-1].split(",")
+    assert corners[0] == "0.0,120.0"
+    assert len(corners) == 1 + 16
+    assert last_left == "192.0"
+    assert float(last_height) < path.mark
 
 
 def test_a_comparison_of_a_stopped_run_prints_only_what_holds_at_any_time(stopped_run):

@@ -16,6 +16,7 @@ from run_fakes import changed, line_count, small_plan
 from roboirg.core.errors import InvalidValueError
 from roboirg.records.record import Job, Record
 from roboirg.records.store import read_results
+from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.plan.plan_sections import StopRule
 from roboirg.runs.plan.stopping import PlanScene, find_stopping, scene_of, scene_order
 from roboirg.runs.run.executor import InProcess, LocalProcesses
@@ -171,6 +172,12 @@ def test_three_policies_are_not_compared_until_decided(tmp_path):
 
     with pytest.raises(InvalidValueError, match="this plan has 3: random, oracle, listener"):
         run_plan(changed(plan, stop=StopRule()), tmp_path, Lucky(), InProcess())
+
+
+def test_control_arms_and_a_stop_exclude_each_other():
+    """An arm has other words than its scene's own, so it is no side of a comparison."""
+    with pytest.raises(InvalidValueError, match="compares episodes in their own words"):
+        make_plan("random,oracle", tasks="PickXtimes", arms="told,silent", stop={})
 
 
 def test_a_plan_without_the_rule_has_the_fingerprint_that_it_always_had():
