@@ -72,7 +72,7 @@ def test_the_table_marks_a_stopped_run_and_prints_what_was_found(stopped_run):
 
 def test_gaps_by_kind_of_words_of_a_stopped_run_have_neither_interval_nor_p_value(stopped_run):
     """Their episodes are those of the run, whose number depends on the results, too."""
-    rows = break_down(BREAKDOWNS["difficulty"], Source(stopped_run).frame)
+    rows = break_down(Source(stopped_run).frame, BREAKDOWNS["difficulty"])
 
     assert len(rows) > 0
     for row in rows:

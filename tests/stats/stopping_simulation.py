@@ -217,24 +217,28 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=94)
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
-    print("| no difference | found, % | interval missed, % | within 10 points, % | played, % |")
-    print("| --- | ---: | ---: | ---: | ---: |")
+    _show("| no difference | found, % | interval missed, % | within 10 points, % | played, % |")
+    _show("| --- | ---: | ---: | ---: | ---: |")
     for case in SAME:
         found = simulate(case, options.runs, rng)
         either = found.first + found.second
         numbers = [either, found.missed, found.within, found.played]
-        print(f"| {case.name} | {' | '.join(_percent(number) for number in numbers)} |", flush=True)
-    print()
-    print(
+        _show(f"| {case.name} | {' | '.join(_percent(number) for number in numbers)} |")
+    _show("")
+    _show(
         "| difference | found, % | wrong side, % | within 10 points, % | played, % | fixed test, % "
         "| not paired: found, % | played, % |"
     )
-    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
+    _show("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
     for case in DIFFERENT:
         found = simulate(case, options.runs, rng)
         numbers = [found.first, found.second, found.within, found.played]
         numbers += [found.fixed, found.unpaired, found.unpaired_played]
-        print(f"| {case.name} | {' | '.join(_percent(number) for number in numbers)} |", flush=True)
+        _show(f"| {case.name} | {' | '.join(_percent(number) for number in numbers)} |")
+
+
+def _show(line: str) -> None:
+    print(line, flush=True)  # noqa: T201 - it is a script
 
 
 def _percent(share: float) -> str:
