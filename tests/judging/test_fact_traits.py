@@ -26,19 +26,37 @@ from roboirg.tasks.splits.splits import get_episode
 SOURCE = Path(roboirg.__file__).parent
 
 
-def test_the_kinds_of_facts_in_the_code_are_those_in_the_table_of_traits():
-    """A fact is what holds in the world, such as *picked*; an attempt is a failed try. Searched are
-    all texts like `Fact("picked"` in the package: the files that detect attempts and facts must
-    make all kinds of the table, and no other file a further one."""
-    kinds = {
-        path.stem: set(re.findall(r"\bFact\(\s*\"(\w+)\"", path.read_text()))
-        for path in SOURCE.rglob("*.py")
-    }
-    attempts = {kind for kind, traits in FACT_TRAITS.items() if traits.role is FactRole.ATTEMPT}
-    assert kinds["attempt_detection"] - {"pressed"} == attempts
+def kinds_written_in(path):
+    """Return the kinds in texts such as `Fact("picked"` of a source file: *picked*."""
+    return set(re.findall(r"\bFact\(\s*\"(\w+)\"", path.read_text()))
 
-    facts = set(FACT_TRAITS) - attempts
-    assert kinds["fact_detection"] == set().union(*kinds.values()) - attempts == facts
+
+def kinds_of_attempts():
+    """Return the kinds of the table that are failed tries, such as *clutched*."""
+    return {kind for kind, traits in FACT_TRAITS.items() if traits.role is FactRole.ATTEMPT}
+
+
+def test_attempt_detection_makes_every_kind_of_attempt_in_the_table_of_traits():
+    """An attempt is a failed try, such as fingers that close on nothing. The file that detects them
+    names each kind that the table marks as one, and a pressed button, next to which a press is no
+    attempt."""
+    detected = kinds_written_in(SOURCE / "simulation" / "attempt_detection.py")
+
+    assert detected == kinds_of_attempts() | {"pressed"}
+
+
+def test_fact_detection_makes_every_other_kind_of_fact_in_the_table_of_traits():
+    """A fact is what holds in the world, such as a cube that is *picked*. The file that detects
+    facts names each kind of the table but attempts."""
+    detected = kinds_written_in(SOURCE / "simulation" / "fact_detection.py")
+
+    assert detected == set(FACT_TRAITS) - kinds_of_attempts()
+
+
+def test_no_source_file_names_a_kind_of_fact_that_is_not_in_the_table_of_traits():
+    """A kind in a text such as `Fact("picekd"`, with a slip, would never hold."""
+    for path in SOURCE.rglob("*.py"):
+        assert kinds_written_in(path) <= set(FACT_TRAITS), path
 
 
 def facts_named_in(episode):
@@ -219,17 +237,24 @@ def test_registering_a_kind_of_object_under_a_taken_name_is_refused():
 def test_a_registered_kind_of_object_is_built_and_its_kind_of_fact_detected(
     registered_toppled, registered_pillar, monkeypatch
 ):
-    """A pillar counts as toppled once its center has been beyond x = 0.05, and for ever."""
+    """The fixtures have registered *pillar*, a kind of object, with its builder, and *toppled*, a
+    kind of fact: it holds of a pillar whose center is beyond x = 0.05 m, and lasts once it has
+    held. The detection of facts gets the table with *toppled*. The pillar stands at x = 0, is put
+    to x = 0.1 m, and back."""
     from roboirg.simulation import fact_detection
     from roboirg.simulation.physics_settings import HOME_ACTION
     from roboirg.simulation.world import World
 
     monkeypatch.setattr(fact_detection, "FACT_TRAITS", fact_traits.FACT_TRAITS)
     world = World(SCENE_WITH_A_PILLAR, visible=False)
-    pillar = world.bodies["pillar"]
 
-    assert TOPPLED not in world.step(HOME_ACTION)
-    pillar.put(Point(0.1, 0.0, 0.05))
-    assert TOPPLED in world.step(HOME_ACTION)
-    pillar.put(Point(0.0, 0.0, 0.05))
-    assert TOPPLED in world.step(HOME_ACTION)
+    facts_at_first = world.step(HOME_ACTION)
+    world.bodies["pillar"].put(Point(0.1, 0.0, 0.05))
+    facts_beyond = world.step(HOME_ACTION)
+    world.bodies["pillar"].put(Point(0.0, 0.0, 0.05))
+    facts_back = world.step(HOME_ACTION)
+
+    toppled = Fact("toppled", "pillar")
+    assert toppled not in facts_at_first
+    assert toppled in facts_beyond
+    assert toppled in facts_back

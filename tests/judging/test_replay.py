@@ -36,32 +36,65 @@ def random_events(episode, rng):
     return events
 
 
-@pytest.mark.parametrize("task", all_tasks())
-def test_judging_stored_events_gives_the_verdict_of_judging_every_step(task):
-    """Records store events only, the beginnings and ends of facts; judging them again skips the
-    steps without any. Here 12 episodes with random events are judged step by step, and then from
-    the events: stage, verdict, cause and step of the verdict must be the same. StopCube's stages
-    end by the time, so it goes on for 700 steps after the last event, others for 20."""
+def random_courses(task):
+    """Yield 12 episodes of a task with random events, and the last step of each.
+
+    StopCube's stages end by the time, so it goes on for 700 steps after the last event, others for
+    20.
+    """
     rng = np.random.default_rng(3)
     for index in range(12):
         episode = get_episode(task, "test", index)
         events = random_events(episode, rng)
-        last = events[-1].step + (700 if task == "StopCube" else 20)
-        judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
-        due = []
-        decided = [last]
-        for step, facts in enumerate(facts_by_step(events, last)):
-            due.append(judge.index - len(episode.demonstration))
+        yield episode, events, events[-1].step + (700 if task == "StopCube" else 20)
+
+
+def judged_step_by_step(episode, events, last_step):
+    """Return the judge after every step, and for each step the stage that was due at it, counted
+    from the policy's first one (negative in the video)."""
+    judge = Judge.of(episode)
+    due_stages = []
+    for step, facts in enumerate(facts_by_step(events, last_step)):
+        due_stages.append(judge.index - len(episode.demonstration))
+        judge.update(step, facts)
+    return judge, tuple(due_stages)
+
+
+@pytest.mark.parametrize("task", all_tasks())
+def test_judging_stored_events_gives_the_verdict_of_judging_every_step(task):
+    """A record stores events only: which fact began or ceased to hold at which step. `rejudge`
+    skips the steps at which nothing can change. For random events it must find what the slow way,
+    judging the facts of every single step, finds: the stage due at each step, and the verdict."""
+    for episode, events, last_step in random_courses(task):
+        judge, due_stages = judged_step_by_step(episode, events, last_step)
+
+        replay = rejudge(episode, events, policy_start_step=0, elapsed_steps=last_step)
+
+        assert replay.judge.status == judge.status
+        assert (replay.judge.cause, replay.judge.violation) == (judge.cause, judge.violation)
+        assert replay.expected_stages == due_stages
+
+
+@pytest.mark.parametrize("task", all_tasks())
+def test_the_fast_way_to_completed_stages_finds_those_of_a_whole_replay(task):
+    """`completed_stages` returns which step completed each stage, ``{0: 40, 1: 95}``. `completions`
+    of a replay reads the same, as pairs, from the stage that was due at each step. For random
+    events both must agree."""
+    for episode, events, last_step in random_courses(task):
+        replay = rejudge(episode, events, policy_start_step=0, elapsed_steps=last_step)
+
+        assert completed_stages(episode, events, last_step) == dict(replay.completions())
+
+
+@pytest.mark.parametrize("task", all_tasks())
+def test_stored_events_decide_at_the_first_step_with_a_verdict(task):
+    """`decide` reads from events at which step the verdict fell. The slow way judges every single
+    step up to a verdict, or to the last step if there is none."""
+    for episode, events, last_step in random_courses(task):
+        judge = Judge.of(episode)
+        for step, facts in enumerate(facts_by_step(events, last_step)):
             judge.update(step, facts)
             if judge.status is not Status.ONGOING:
-                decided.append(step)
+                break
 
-        replay = rejudge(episode, events, 0, last)
-
-        assert replay.expected_stages == tuple(due)
-        assert replay.judge.index == judge.index
-        assert replay.judge.status == judge.status
-        assert replay.judge.cause == judge.cause
-        assert replay.judge.violation == judge.violation
-        assert completed_stages(episode, events, last) == dict(replay.completions())
-        assert decide(episode, events, last).step == min(decided)
+        assert decide(episode, events, last_step).step == step
