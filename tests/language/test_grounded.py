@@ -6,7 +6,8 @@ way under the key "touched".
 """
 
 import functools
-from collections import Counter, defaultdict
+import itertools
+from collections import defaultdict
 
 import pytest
 from language_variants import TASKS, random_episodes, said_where_possible
@@ -84,13 +85,13 @@ def test_grounded_instructions_never_name_the_hidden_color(task):
 
 
 def values_by_description(task, slot):
-    """Count the values that each description of a hidden slot stands for in random episodes.
+    """Return the values that each description of a hidden slot stands for in random episodes.
 
-    ``{"the cube nearest to": {"red": 7, "blue": 9}}``: colors, left and right are left out of
+    ``{"the cube nearest to": ["red", "blue", "red"]}``: colors, left and right are left out of
     descriptions, and what follows the 24th character, so that more of them are alike.
     """
     exchangeable = {"red", "green", "blue", "left", "right"}
-    found = defaultdict(Counter)
+    found = defaultdict(list)
     for episode, said in grounded_instructions(task):
         if slot in said.metadata["touched"]:
             spans = [
@@ -99,34 +100,41 @@ def values_by_description(task, slot):
                 if mention.utterance == 0 and mention.slot == slot
             ]
             kept = [word for word in " ".join(spans).split() if word not in exchangeable]
-            found[" ".join(kept)[:24]][str(episode.goal[slot])] += 1
+            found[" ".join(kept)[:24]].append(episode.goal[slot])
     return found
+
+
+def share_of_equal_pairs(groups):
+    """Return how many of the pairs of values of the same group are equal, as a share."""
+    equal = []
+    for values in groups:
+        equal += [first == second for first, second in itertools.combinations(values, 2)]
+    return sum(equal) / len(equal)
 
 
 @pytest.mark.parametrize(
     ("task", "slot"),
     [
-        (task, slot)
-        for task in TASKS_WITH_SETTING
-        for slot, _ in get_episode(task, "test", 0).goal.slots
+        ("PickXtimes", "color"),
+        ("SwingXtimes", "color"),
+        ("VideoUnmask", "colors"),
+        ("VideoUnmaskSwap", "colors"),
+        ("ButtonUnmask", "colors"),
+        ("ButtonUnmaskSwap", "colors"),
+        ("VideoRepick", "repeats"),
+        ("VideoPlaceButton", "relation"),
+        ("VideoPlaceOrder", "placement"),
     ],
 )
 def test_the_description_of_a_hidden_value_does_not_give_the_value_away(task, slot):
-    """Who guesses the value that is most frequent for a description is right no more often than
-    who always guesses the value that is most frequent overall.
+    """The slot of the goal is hidden: *the cube nearest to the button* may be of any color. If a
+    description always stood for the same value, all pairs of episodes with the same description
+    would have the same value, a share of 1. It must be about that of all pairs, 0.1 to 0.5; 0.25
+    more are allowed, since *two containers* tells how many colors are meant."""
+    groups = values_by_description(task, slot).values()
+    all_values = list(itertools.chain.from_iterable(groups))
 
-    Descriptions of fewer than 20 episodes are left out. Allowed for chance are four standard
-    deviations; the seeds are fixed.
-    """
-    groups = values_by_description(task, slot)
-    overall = sum(groups.values(), Counter())
-
-    for description, values in groups.items():
-        size = values.total()
-        expected = max(overall.values()) / overall.total()
-        deviation = (expected * (1 - expected) / size) ** 0.5
-        is_too_small = size < 20
-        assert is_too_small or max(values.values()) / size <= expected + 4 * deviation, description
+    assert share_of_equal_pairs(groups) < share_of_equal_pairs([all_values]) + 0.25
 
 
 def test_stopcube_has_no_grounded_setting():

@@ -4,7 +4,6 @@ A phrase is said only of an object that leads all others by the margin of 3 cm. 
 places are points (x, y) in meters on the table: x grows away from the robot, y to the robot's left.
 """
 
-import itertools
 import math
 
 import pytest
@@ -47,24 +46,30 @@ def name_called(scene, phrase, kind="container", frame="robot"):
     return None
 
 
+def published_episodes_of(task):
+    """Return every seventh episode that RoboMME published for a task, of each split."""
+    found = []
+    for split in SPLITS:
+        found += [published_episode(task, split, index) for index in range(0, 100, 7)]
+    return [episode for episode in found if episode is not None]
+
+
 @pytest.mark.parametrize("frame", FRAMES)
 @each_task_with_places
 def test_in_published_scenes_words_of_place_single_out_a_goal_object(task, frame):
-    """In every seventh published scene, some phrase singles out an object of a goal's color.
-
-    The object is a cube or the container over it. Without one, the spatial setting has no words.
-    """
+    """`things_at` has all objects that some words of place single out. In RoboMME's scenes at least
+    one of them has a color of the goal: a cube, or the container over it. Else the spatial setting
+    had no words for this goal."""
     kind = get_task(task).things.pointed
-    for split, index in itertools.product(SPLITS, range(FRAMES.index(frame), 100, 7)):
-        published = published_episode(task, split, index)
-        if published is None:
-            continue
-        goal = published.goal.as_mapping()
+
+    for episode in published_episodes_of(task):
+        goal = episode.goal.as_mapping()
         objects = []
         for color in goal.get("colors") or [goal["color"]]:
-            objects += things_of_color(published.scene, kind, color)
-        singled_out = things_at(published.scene, kind, frame).values()
-        assert any(item in singled_out for item in objects), (task, split, index)
+            objects += things_of_color(episode.scene, kind, color)
+        singled_out = things_at(episode.scene, kind, frame).values()
+
+        assert any(item in singled_out for item in objects), episode.key
 
 
 @pytest.mark.parametrize(
@@ -230,18 +235,23 @@ def test_a_thing_is_in_a_corner_if_work_area_and_table_agree():
 
 
 def test_a_corner_phrase_is_dropped_if_work_area_and_table_corner_disagree():
-    """The near left corner of the work area is at (-0.3, 0.25), that of the table at (-0.74, 1.2).
-
-    container_0 is the nearest to the first, and container_1 to the second.
-    """
-    words = "closest to your near left corner"
+    """A listener may think of the corner of the area where things stand, at (-0.3, 0.25), or of the
+    corner of the table, at (-0.74, 1.2). container_0 at (-0.11, 0.06) is 0.27 m from the first and
+    1.30 m from the second; container_1 at (0.0, 0.17) is 0.31 and 1.27 m from them. So each is the
+    nearest for one listener, and *closest to your near left corner* is not said."""
     scene = containers((-0.11, 0.06), (0.0, 0.17), (-0.11, -0.2), (0.0, -0.2), (0.1, 0.17))
-    by_phrase = {selector.phrase: selector for selector in selectors(scene, "container", "robot")}
-    corner = by_phrase[words]
-    nearest = [ranking.select(corner.candidates, 0).name for ranking in corner.rankings]
 
-    assert nearest == ["container_0", "container_1"]
-    assert name_called(scene, words) is None
+    assert name_called(scene, "closest to your near left corner") is None
+
+
+@pytest.mark.parametrize("place", [(-0.11, 0.06), (0.0, 0.17)])
+def test_a_corner_phrase_is_said_of_either_container_without_the_other(place):
+    """container_0 is one of two between which *closest to your near left corner* is not clear, but
+    the other one is not there. The three others are farther from the corner of the area and of the
+    table."""
+    scene = containers(place, (-0.11, -0.2), (0.0, -0.2), (0.1, -0.17))
+
+    assert name_called(scene, "closest to your near left corner") == "container_0"
 
 
 @each_task_with_places

@@ -50,18 +50,28 @@ def values_of(goal, slot):
 
 @each_task
 def test_the_metadata_about_a_rival_value_agree_with_the_text(task):
-    """Rules that guess are scored by this metadata: the two values in the order of the text."""
+    """The first utterance introduces two values of a slot of the goal, such as four and five
+    times. The metadata "candidates" has the two in the order of the text, ``{"repeats": [4, 5]}``,
+    by which rules that guess are scored."""
+    for _, said in instructions_with_a_rival(task):
+        candidates = said.metadata["candidates"][said.metadata["rival_slot"]]
+        first_utterance = [mention for mention in said.mentions if mention.utterance == 0]
+        values = [mention.value for mention in first_utterance if mention.value in candidates]
+
+        assert values[:2] == candidates, said.text
+
+
+@each_task
+def test_the_candidates_are_the_right_value_and_its_rival_at_its_position(task):
+    """*Four or five times*, of which four is right: the rival is five, its position "second"."""
     for episode, said in instructions_with_a_rival(task):
         slot = said.metadata["rival_slot"]
-        rival = said.metadata["rival"]
-        pair = [rival, values_of(episode.goal, slot)[0]]
-        if said.metadata["rival_position"] == "second":
-            pair.reverse()
-        introduced = [mention.value for mention in said.mentions if mention.utterance == 0]
-        in_text = [value for value in introduced if value in pair]
+        right_value = values_of(episode.goal, slot)[0]
+        candidates = [right_value, said.metadata["rival"]]
+        if said.metadata["rival_position"] == "first":
+            candidates.reverse()
 
-        assert said.metadata["candidates"] == {slot: pair}, said.text
-        assert in_text[:2] == pair, said.text
+        assert said.metadata["candidates"] == {slot: candidates}, said.text
 
 
 @each_task

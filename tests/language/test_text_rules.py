@@ -219,17 +219,25 @@ def test_a_name_or_sentence_of_the_same_pool_is_no_leak():
 
 @pytest.mark.parametrize("pool", POOLS)
 def test_our_general_remarks_break_no_rule_for_distracting_remarks(pool):
-    """They are inserted into a scenario that breaks no rule by itself."""
+    """General remarks are inserted into any story: *Sorry, I was daydreaming.* Here all of a pool
+    are those of a story that breaks no rule by itself, so what is reported is about a remark. JSON
+    writes the list as TOML does."""
     remarks = json.dumps(general().distractors[pool], ensure_ascii=False)
-    text = BIRTHDAY.replace('pool = "train"', f'pool = "{pool}"')
-    text = "\n".join(
-        f"distractors = {remarks}" if line.startswith("distractors") else line
-        for line in text.splitlines()
-    )
+    story = f"""
+tasks = ["PickXtimes"]
+[[scenario]]
+frame = "birthday"
+pool = "{pool}"
+setting = "direct"
+introduction = "{{person}} turns {{repeats}} today and wants to see the {{color}} cube."
+reinforcement = "{{he}} keeps talking about <it color: it>."
+distractors = {remarks}
+competing = ["{{person.2}} has a {{rival color}} one."]
+cue = "Let's surprise {{him}} with the cube."
+say.color = ["<it color: it>"]
+"""
 
-    broken = report_on(text, every=5).broken
-
-    assert not [rule for rule in broken if not rule.startswith("needs ")]
+    assert not report_on(story, every=5).broken
 
 
 def test_no_general_remark_is_used_both_in_training_and_in_tests():
@@ -238,10 +246,21 @@ def test_no_general_remark_is_used_both_in_training_and_in_tests():
     assert set(remarks["train"]).isdisjoint(remarks["test"])
 
 
+def plural_pointers(*operations):
+    """Return the pointers to numbers in plural words, such as *once for each photo*: those that
+    stand for the number itself (the operation "same"), or for what is calculated from it."""
+    found = set()
+    for row in pointer_table():
+        if row.operation in operations and re.search(r"\b(?:many|often|each)\b", row.words):
+            found.add(row.words)
+    return found
+
+
 def test_a_plural_pointer_is_never_used_where_the_number_may_be_one():
-    """Sums and doubles are never one, so *once for each photo* is right there. Elsewhere words
-    agree, *[repeats: once for that photo|once for each photo]*, but for those that stand for one
-    of two numbers, where singular and plural would tell which."""
+    """The number itself, a difference and a half may be one. Words for them agree with the number:
+    *[repeats: once for that photo|once for each photo]* says the first for one and the second for
+    more. Excepted are words that stand for one of two numbers, where singular and plural would tell
+    which; ``*`` stands for any words."""
     of_two_numbers = {
         "once for each *",
         "that many times",
@@ -250,12 +269,8 @@ def test_a_plural_pointer_is_never_used_where_the_number_may_be_one():
         "as many times as it *",
         "as many times as they *",
     }
-    may_be_one = set()
-    for row in pointer_table():
-        is_plural = re.search(r"\b(?:many|often|each)\b", row.words)
-        if is_plural and row.operation in ("same", "minus", "half"):
-            may_be_one.add(row.words)
 
-    agreeing = may_be_one - of_two_numbers
+    may_be_one = plural_pointers("same", "minus", "half")
+
     assert of_two_numbers < may_be_one
-    assert all(words.startswith("[repeats: ") for words in agreeing)
+    assert all(words.startswith("[repeats: ") for words in may_be_one - of_two_numbers)
