@@ -24,7 +24,6 @@ from roboirg.language import (
 )
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction_row import row
-from roboirg.language.scenarios import spoken
 from roboirg.language.scenarios.scenario_file import FOLDER, setting_scenarios
 from roboirg.language.scenarios.wording_file import parse_wordings
 from roboirg.language.scenarios.wording_store import register_wordings
@@ -139,7 +138,9 @@ def test_a_registered_setting_does_not_change_which_episodes_are_published(regis
 
 
 def test_an_episode_that_one_of_our_settings_refuses_would_not_be_published(register, monkeypatch):
-    """As if DUMMY were one of ours."""
+    """A seed becomes an episode only if each of ACCEPTANCE_SETTINGS can express it. DUMMY, whose
+    name is "dummy", refuses easy scenes; it is made one of them here. So the seed of an easy
+    episode is rejected, with the reason that DUMMY gives."""
     register(DUMMY)
     monkeypatch.setattr(seed_selection, "ACCEPTANCE_SETTINGS", ("direct", "dummy"))
 
@@ -150,14 +151,18 @@ def test_an_episode_that_one_of_our_settings_refuses_would_not_be_published(regi
 
 
 def test_exported_rows_include_a_registered_setting_in_both_forms(register):
-    """It refuses the easy one of the two episodes, so both rows are those of the hard one."""
+    """DUMMY, whose name is "dummy", refuses easy scenes. So of an easy and a hard episode only the
+    hard one has rows of it: one that says *it* (implicit), and one that says what *it* is
+    (resolved)."""
     register(DUMMY)
+
     told = instructions([EASY_EPISODE, HARD_EPISODE], setting_names(), FORMS)
 
-    rows = [row(*job) for job in told]
-
-    forms = [exported["form"] for exported in rows if exported["setting"] == "dummy"]
-    assert forms == ["implicit", "resolved"]
+    rows = [row(episode, said) for episode, said in told]
+    assert [exported["form"] for exported in rows if exported["setting"] == "dummy"] == [
+        "implicit",
+        "resolved",
+    ]
 
 
 EACH_SETTING_WITH_SCENARIOS = pytest.mark.parametrize(
@@ -225,16 +230,6 @@ setting = "lab"
 introduction = "The lab says {repeats:times}."
 say.repeats = ["<each repeats: [repeats: once for that lap|once for each of them]>"]
 """
-MY_FILE_HEAD = 'name = "mine"\ntasks = ["PickXtimes"]\n'
-MY_COMMAND = '[commands]\nall = ["Mine: lift {color} {repeats}."]\n'
-MY_VALUE = '[stated.all]\ncolor = "my {color} cube"\n'
-MY_SCENARIO = """
-[[scenario]]
-frame = "mine"
-setting = "lab"
-introduction = "I say {repeats:times}."
-say.repeats = ["<each repeats: [repeats: once for that lap|once for each of them]>"]
-"""
 
 
 @pytest.fixture
@@ -249,6 +244,12 @@ def add_lab(register, tmp_path):
     return add
 
 
+def registered_file_of_a_user(words):
+    """Register a user's word file for PickXtimes with these words; return its identity."""
+    text = f'name = "mine"\ntasks = ["PickXtimes"]\n{words}\n'
+    return register_wordings(parse_wordings(text, "mine.toml"))
+
+
 def test_a_setting_s_own_file_gives_it_introduction_command_and_phrase_for_a_value(add_lab):
     """All three are in LAB_FILE; our words would be *Grab the blue cube …*"""
     add_lab(LAB_FILE)
@@ -260,20 +261,40 @@ def test_a_setting_s_own_file_gives_it_introduction_command_and_phrase_for_a_val
 
 
 @pytest.mark.parametrize(
-    ("mine", "introduction", "command"),
+    ("words_of_user", "introduction", "command"),
     [
-        (MY_COMMAND, "The lab says four times.", "Mine: lift the lab's blue cube "),
-        (MY_VALUE, "The lab says four times.", "Lab: lift my blue cube "),
-        (MY_SCENARIO, "I say four times.", "Lab: lift the lab's blue cube "),
-        (MY_COMMAND + MY_VALUE + MY_SCENARIO, "I say four times.", "Mine: lift my blue cube "),
+        (
+            '[commands]\nall = ["Mine: lift {color} {repeats}."]',
+            "The lab says four times.",
+            "Mine: lift the lab's blue cube ",
+        ),
+        (
+            '[stated.all]\ncolor = "my {color} cube"',
+            "The lab says four times.",
+            "Lab: lift my blue cube ",
+        ),
+        (
+            """
+[[scenario]]
+frame = "mine"
+setting = "lab"
+introduction = "I say {repeats:times}."
+say.repeats = ["<each repeats: [repeats: once for that lap|once for each of them]>"]
+""",
+            "I say four times.",
+            "Lab: lift the lab's blue cube ",
+        ),
     ],
-    ids=["command", "phrase", "introduction", "all"],
+    ids=["command", "phrase", "introduction"],
 )
-def test_words_of_a_user_file_win_over_those_of_a_setting(add_lab, mine, introduction, command):
-    """A user's file may bring a command, a phrase for a value, or an introduction; what it lacks is
-    taken from the setting's file."""
+def test_words_of_a_user_file_win_over_those_of_a_setting(
+    add_lab, words_of_user, introduction, command
+):
+    """The blue cube is to be lifted four times. LAB_FILE has the words of the setting *lab*: the
+    introduction *The lab says four times*, the command *Lab: lift …* and the phrase *the lab's blue
+    cube* for a value. A user's file brings one of the three; the others stay the setting's."""
     add_lab(LAB_FILE)
-    wordings = register_wordings(parse_wordings(MY_FILE_HEAD + mine, "mine.toml"))
+    wordings = registered_file_of_a_user(words_of_user)
 
     said = instruct(HARD_EPISODE, "lab", wordings=wordings)
 
@@ -282,9 +303,10 @@ def test_words_of_a_user_file_win_over_those_of_a_setting(add_lab, mine, introdu
 
 
 def test_other_settings_do_not_use_a_setting_s_own_file(add_lab):
-    """Neither with our words nor with those of a user's file."""
+    """LAB_FILE has the words of the setting *lab*, as in *Lab: lift the lab's blue cube*. Another
+    setting says none of them, neither with our words nor with those of a user's file."""
     add_lab(LAB_FILE)
-    wordings = register_wordings(parse_wordings(MY_FILE_HEAD + MY_COMMAND, "mine.toml"))
+    wordings = registered_file_of_a_user('[commands]\nall = ["Mine: lift {color} {repeats}."]')
 
     assert "Lab" not in instruct(HARD_EPISODE).text
     assert instruct(HARD_EPISODE, wordings=wordings).text == "Mine: lift the blue cube four times."
@@ -302,14 +324,16 @@ def test_the_word_file_of_a_setting_with_a_name_or_a_whole_sentence_is_refused(a
         instruct(HARD_EPISODE, "lab")
 
 
-@pytest.mark.parametrize("first", ["direct", "calm"])
-def test_a_cached_choice_of_one_setting_does_not_answer_for_another(register, first):
-    """ "calm" is a copy of *contextual* with its own refusal; *direct* shares the cache with it."""
+@pytest.mark.parametrize(("first", "index"), [("direct", 900_001), ("calm", 900_002)])
+def test_a_cached_choice_of_one_setting_does_not_answer_for_another(register, first, index):
+    """*Calm* is a copy of *contextual*, which says the scenarios of *direct*, but refuses every
+    episode. The scenario that is chosen for an episode is cached, for both. So whichever of the two
+    is asked first about an episode that no other test uses, each must give its own answer."""
     calm = dataclasses.replace(contextual.SETTING, name="calm", refusal=lambda _: "never calm")
     register(calm)
-    spoken._CHOICES.clear()
+    episode = get_episode("PickXtimes", "random", index)
 
-    find_refusal(HARD_EPISODE, InstructionOptions(first))
+    find_refusal(episode, InstructionOptions(first))
 
-    assert find_refusal(HARD_EPISODE, InstructionOptions("calm")) == "never calm"
-    assert find_refusal(HARD_EPISODE, InstructionOptions("direct")) is None
+    assert find_refusal(episode, InstructionOptions("calm")) == "never calm"
+    assert find_refusal(episode, InstructionOptions("direct")) is None
