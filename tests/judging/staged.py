@@ -110,19 +110,11 @@ class Staged:
         self.now = (self.now - set(ended)) | set(begun)
         return self.wait()
 
-    def attempt(self, *facts):
-        """Facts of attempts hold for a step."""
+    def attempt(self, *facts, steps=1):
+        """Facts of attempts hold for some steps, and then no longer."""
         self.tried |= set(facts)
-        self.wait()
-        self.tried -= set(facts)
-        return self.wait()
-
-    def visit_above(self, names, steps):
-        """The hand is above objects for so many steps, and one more without being there."""
-        above = {Fact("above", "robot", name) for name in names}
-        self.tried |= above
         self.wait(steps)
-        self.tried -= above
+        self.tried -= set(facts)
         return self.wait()
 
     def rest(self, steps=250):
@@ -168,10 +160,6 @@ class Staged:
         hover = Fact("hovering", "robot", name)
         down = Fact("pressed", name)
         return self.change(hover).change(down).wait(2).change(ended=(down,)).change(ended=(hover,))
-
-    def press_at(self, step):
-        """Press the button so that it is down at a step since reset: the hand hovers before."""
-        return self.until(step - 2).press()
 
     def hover(self, name="button"):
         return self.change(Fact("hovering", "robot", name))

@@ -262,7 +262,7 @@ def test_a_hand_that_comes_empty_to_the_target_has_missed_the_cube_that_it_was_a
     pick, place, *_ = play.episode.stages
     play.perform((pick, place))
 
-    play.visit_above(was_above, steps=50)
+    play.attempt(*(Fact("above", "robot", cube) for cube in was_above), steps=50)
     play.attempt(Fact("emptied", "robot", "target")).press()
 
     assert failure_of(play) == failure
@@ -276,7 +276,7 @@ def test_an_empty_hand_that_opens_at_the_button_has_missed_no_cube():
     pick, place, *_ = play.episode.stages
     play.perform((pick, place))
 
-    play.visit_above(["cube_blue"], steps=50).hover("button")
+    play.attempt(Fact("above", "robot", "cube_blue"), steps=50).hover()
     play.attempt(Fact("emptied", "robot", "target")).press()
 
     assert failure_of(play) == "wrong_count"
@@ -386,7 +386,7 @@ def test_failures_of_stopping_the_moving_cube_too_early_or_too_late(step, failur
     on another visit, the wrong time; between two visits it may be either."""
     play = policy_turn("StopCube", visit=4)
 
-    play.hover().press_at(step)
+    play.hover().until(step - 2).press()  # the button is down two steps later
 
     assert failure_of(play) == failure
 

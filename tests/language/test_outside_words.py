@@ -361,27 +361,24 @@ def package_with_a_mistake(folder, file, before, after):
 @pytest.mark.parametrize(
     ("file", "before", "after", "sentence"),
     [
-        pytest.param(
+        (
             "colored.py", '"colored.toml"', '"gone.toml"',
             "The words of colored are '{}/gone.toml', which is no file; name it by its whole path.",
-            id="file that does not exist",
         ),
-        pytest.param(
+        (
             "colored.toml", '"PickXtimes", ', "",
             ": {}/colored.toml has no colored scenario for it in the pool test.",
-            id="task left out",
         ),
-        pytest.param(
+        (
             "colored.toml", 'setting = "colored"', 'setting = "colorful"',
             " 'new coat': There is no setting 'colorful'; known: colored, direct, direct-rival, ",
-            id="misspelled setting",
         ),
-        pytest.param(
+        (
             "colored.py", "content_plans=content_plans", 'content_plans="drect"',
             "There is no setting for the content_plans of colored, named 'drect'; known: direct, ",
-            id="misspelled plan of contents",
         ),
     ],
+    ids=["no such file", "task left out", "misspelled setting", "misspelled plan of contents"],
 )  # fmt: skip
 def test_a_mistake_in_the_words_of_a_package_is_reported_with_file_and_cure(
     tmp_path, file, before, after, sentence

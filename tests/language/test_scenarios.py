@@ -8,7 +8,6 @@ import difflib
 import itertools
 import json
 import re
-import tomllib
 from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
@@ -92,66 +91,58 @@ def read_scenario_file(text, task="PickXtimes"):
 @pytest.mark.parametrize(
     ("before", "after", "complaint"),
     [
-        pytest.param(
-            "{repeats} today",
-            "{repeat} today",
-            "introduction: There is no slot 'repeat'; known: ",
-            id="misspelled slot",
-        ),
-        pytest.param(
+        ("{repeats} today", "{repeat} today", "introduction: There is no slot 'repeat'; known: "),
+        (
             "<it color: it>.",
             "<it color: that thing>.",
             "<it color: that thing>, which does not exist; the nearest for a color: <that",
-            id="unknown pointer",
         ),
-        pytest.param(
+        (
             "<it color: it>.",
             "<them color: it>.",
             "<them color: it>; in pointers.toml these words have the class 'it' for a color.",
-            id="class of another color pointer",
         ),
-        pytest.param(
+        (
             "<each repeats:",
             "<it repeats:",
             "|once for each year]>; in pointers.toml these words have the class 'each' for a nu",
-            id="class of another number pointer",
         ),
-        pytest.param(
-            "<it color: it>.", "<it color it>.", "has a bracket that is no mark", id="no colon"
-        ),
-        pytest.param("{rival color}", "{rival visit}", "known: aside.0", id="no such rival"),
-        pytest.param(
-            "\ncue = ",
-            "\nclue = ",
-            "'birthday': There is no field 'clue'; known: competing, cue,",
-            id="misspelled field",
-        ),
-        pytest.param(
+        ("<it color: it>.", "<it color it>.", "has a bracket that is no mark"),
+        ("{rival color}", "{rival visit}", "known: aside.0"),
+        ("\ncue = ", "\nclue = ", "'birthday': There is no field 'clue'; known: competing, cue,"),
+        (
             '\ncue = "Let\'s surprise {him} with the cube."',
             "",
             "'birthday' has no cue; direct needs introduction, reinf",
-            id="missing field",
         ),
-        pytest.param(
-            'pool = "train"',
-            'pool = "dev"',
-            "'birthday', pool is 'dev'; it must be train or test.",
-            id="unknown pool",
-        ),
-        pytest.param('pool = "train"\n', "", "'birthday' has no pool.", id="no pool"),
-        pytest.param("[[scenario]]", "[[scenario", "(at line 3, column 11)", id="no TOML"),
-        pytest.param(
+        ('pool = "train"', 'pool = "dev"', "'birthday', pool is 'dev'; it must be train or test."),
+        ('pool = "train"\n', "", "'birthday' has no pool."),
+        ("[[scenario]]", "[[scenario", "(at line 3, column 11)"),
+        (
             "[[scenario]]",
             '[commands.StopCube]\ntrain = ["Go."]\n[[scenario]]',
             "'StopCube'; known: PickXtimes, all.",
-            id="commands of another task",
         ),
-        pytest.param(
+        (
             'pool = "train"\n',
             'pool = "train"\nneeds.tasks = ["StopCube"]\n',
             "'birthday', needs.tasks: There is no task 'StopCube'; known: PickXtimes.",
-            id="needs another task",
         ),
+    ],
+    ids=[
+        "misspelled slot",
+        "unknown pointer",
+        "class of another color pointer",
+        "class of another number pointer",
+        "no colon",
+        "no such rival",
+        "misspelled field",
+        "missing field",
+        "unknown pool",
+        "no pool",
+        "no TOML",
+        "commands of another task",
+        "needs another task",
     ],
 )
 def test_a_mistake_in_a_scenario_file_is_reported_with_file_scenario_and_field(
@@ -170,16 +161,30 @@ def test_a_mistake_in_a_scenario_file_is_reported_with_file_scenario_and_field(
 
 
 def test_an_unknown_pointer_is_refused_with_the_five_nearest_known_ones():
-    """A pointer, a word that refers back, must be in a table of known ones, pointers.toml.
-
-    It has *two fewer than that*, but not *two times fewer than he did*.
-    """
-    unknown = "{step} fewer [step: time|times] than <that reference: {he} did>"
+    """A pointer is words that refer back to a value that was introduced, as `{reference}` is here:
+    *as many as Mia has*. Only the words of a table are allowed. It has *two fewer than that*, but
+    not *two times fewer than he did*; so the error names, after a colon, the five that are most
+    alike, *two fewer than that* among them."""
+    text = """
+tasks = ["PickXtimes"]
+[[scenario]]
+frame = "birthday"
+pool = "train"
+setting = "direct"
+introduction = "{person} turns {repeats} today and wants to see the {color} cube."
+reinforcement = "{he} keeps talking about <it color: it>."
+distractors = ["The cake is at the baker's.", "I forgot the candles.", "It's so loud in here."]
+competing = ["{person.2} has a {rival color} one."]
+cue = "Let's surprise {him} with the cube."
+say.color = ["{step} fewer [step: time|times] than <that reference: {he} did>"]
+"""
 
     with pytest.raises(InvalidValueError) as found:
-        read_scenario_file(BIRTHDAY.replace('["<it color: it>"]', f'["{unknown}"]'))
+        read_scenario_file(text)
 
-    nearest = re.search("for a reference: (.*) .* is any noun", str(found.value))[1].split("; ")
+    _, _, rest = str(found.value).partition("which does not exist; the nearest for a reference: ")
+    listed, _, _ = rest.partition(" (* is any noun)")
+    nearest = listed.split("; ")
     assert len(set(nearest)) == len(nearest) == 5
     assert "{step:*} fewer than <that reference: that>" in nearest
 
@@ -210,8 +215,9 @@ def test_the_documentation_lists_every_pointer_of_the_table():
 
 
 def test_all_mistakes_of_a_scenario_file_are_reported_at_once():
-    """Five mistakes in the first scenario: dev, repeat, colr, them, clue; one in the second:
-    latest."""
+    """The first scenario has five mistakes: the pool dev, the field clue, the slots repeat and
+    colr, and the pointer <them color: it>. The second one has the field remarks.latest, so it lacks
+    remarks.not_latter. Each is reported in a line of the error, which goes on with a cure."""
     text = """
 tasks = ["PickXtimes"]
 [[scenario]]
@@ -236,20 +242,22 @@ remarks.latter = "Do <latter list.1: the latter>: "
 remarks.not_former = "Not <former list.0: the former>: "
 remarks.latest = "Not <latter list.1: the latter>: "
 """
+
     with pytest.raises(InvalidValueError) as found:
         read_scenario_file(text)
 
     complaints = [
-        r"'birthday', pool is 'dev'",
-        r"'birthday': There is no field 'clue'",
-        r"'birthday', introduction: There is no slot 'repeat'",
-        r"'birthday', introduction: There is no slot 'colr'",
-        r"'birthday', reinforcement has the pointer <them color: it>",
-        r"'two': There is no field 'remarks\.latest'",
-        r"'two' has no remarks\.not_latter",
+        "'birthday', pool is 'dev'",
+        "'birthday': There is no field 'clue'",
+        "'birthday', introduction: There is no slot 'repeat'",
+        "'birthday', introduction: There is no slot 'colr'",
+        "'birthday', reinforcement has the pointer <them color: it>",
+        "'two': There is no field 'remarks.latest'",
+        "'two' has no remarks.not_latter",
     ]
-    in_order = ".*\n".join(f"mine.toml, scenario {complaint}" for complaint in complaints)
-    assert re.fullmatch(f"{in_order}.*", str(found.value)), str(found.value)
+    lines = str(found.value).splitlines()
+    for line, complaint in zip(lines, complaints, strict=True):
+        assert line.startswith(f"mine.toml, scenario {complaint}")
 
 
 @pytest.mark.parametrize("text", [BIRTHDAY, TWO_CUBES, FEWER], ids=["birthday", "two", "fewer"])
@@ -261,31 +269,32 @@ def test_the_checker_finds_nothing_wrong_with_a_good_scenario(text):
 @pytest.mark.parametrize(
     ("before", "after", "rule"),
     [
-        pytest.param("turns {repeats} today and ", "", "points at what the", id="not introduced"),
-        pytest.param(
-            "wants to", "has a {color} one and wants to", "has 2 antecedents", id="named twice"
-        ),
-        pytest.param(
-            "Let's surprise", "You saw this. Surprise", "what was seen is not checked", id="seen"
-        ),
-        pytest.param(
-            "The cake", "The second cake", "names second, which could be a value", id="a value"
-        ),
-        pytest.param("The cake", "On the left, the cake", "names on the left", id="a place"),
-        pytest.param("The cake", "Four, the cake", "names four", id="a number"),
-        pytest.param("The cake", "Look at that cake", "may be covered", id="another pointer"),
-        pytest.param(
-            'say.color = ["', 'lead = "Twice: "\nsay.color = ["', "gives away twice", id="leak"
-        ),
-        pytest.param(
-            "The cake", "The cake " + "is so very good " * 9, "only 64 are heard", id="too long"
-        ),
-        pytest.param(
+        ("turns {repeats} today and ", "", "points at what the"),
+        ("wants to", "has a {color} one and wants to", "has 2 antecedents"),
+        ("Let's surprise", "You saw this. Surprise", "what was seen is not checked"),
+        ("The cake", "The second cake", "names second, which could be a value"),
+        ("The cake", "On the left, the cake", "names on the left"),
+        ("The cake", "Four, the cake", "names four"),
+        ("The cake", "Look at that cake", "may be covered"),
+        ('say.color = ["', 'lead = "Twice: "\nsay.color = ["', "gives away twice"),
+        ("The cake", "The cake " + "is so very good " * 9, "only 64 are heard"),
+        (
             "{rival color} one",
             "{rival color} one {list}",
             "a competing remark with a value for list or rival color in this",
-            id="no list",
         ),
+    ],
+    ids=[
+        "not introduced",
+        "named twice",
+        "seen",
+        "a value",
+        "a place",
+        "a number",
+        "another pointer",
+        "leak",
+        "too long",
+        "no list",
     ],
 )
 def test_the_checker_for_authors_names_the_rule_that_a_scenario_breaks(before, after, rule):
@@ -368,36 +377,42 @@ def test_the_word_one_is_a_leak_only_where_it_is_a_number(command, leaks):
     assert find_leaks(only_command(command), Goal.of(color="red", repeats=1)) == leaks
 
 
+def our_scenarios(task, setting, pool):
+    """Return our scenarios of a task in a setting and a pool."""
+    found = []
+    for scenario in task_scenarios(task).scenarios:
+        if (scenario.fields.setting, scenario.fields.pool) == (setting, pool):
+            found.append(scenario)
+    return found
+
+
 @pytest.mark.parametrize(
     ("text", "setting"), [(BIRTHDAY, "direct"), (FEWER, "reasoning")], ids=["direct", "reasoning"]
 )
 def test_adding_a_scenario_changes_only_the_episodes_that_choose_it(text, setting):
-    """Each episode draws one of the scenarios that fit; a new one must not redraw all others.
-
-    Of the published episodes 4 to 59 choose the added one, so that both cases occur; the others
-    keep what they chose before.
-    """
+    """Each episode draws one of the scenarios that fit it. The file has one scenario more for this
+    setting; an episode that does not draw the new one must keep what it drew before. `choices` has
+    what the 200 published episodes draw with it: some, but not all, must draw the new one, or
+    nothing would be compared."""
     (added,) = read_scenario_file(text).scenarios
-    known = []
-    for scenario in task_scenarios("PickXtimes").scenarios:
-        if (scenario.fields.setting, scenario.fields.pool) == (setting, "train"):
-            known.append(scenario)
-    choosing_it = 0
+    known = our_scenarios("PickXtimes", setting, "train")
+    choices = []
 
     for episode in scenes_of("PickXtimes", 0):
         request = request_of(episode, InstructionOptions(setting, wordings="train"))
-        before = choose(request, setting, known)
-        after = choose(request, setting, [*known, added])
-        if after.scenario is added:
-            choosing_it += 1
-        else:
-            assert after == before, episode.key
+        choice = choose(request, setting, [*known, added])
+        choices.append(choice.scenario)
+        if choice.scenario is not added:
+            assert choice == choose(request, setting, known), episode.key
 
-    assert 3 < choosing_it < 60
+    assert 0 < choices.count(added) < len(choices) / 2
 
 
 def test_the_example_file_of_the_documentation_has_a_scenario_for_every_scene():
-    """With the two spatial scenarios of the page, in every fourth published scene."""
+    """docs/add-scenario.md shows a user's file with the scenario "birthday", and then two spatial
+    ones, "wobbly table" and "wasp". Together, in every fourth published scene of PickXtimes, they
+    break no rule of the checker, and no setting that they have words for is left without one that
+    fits (`unserved_settings`)."""
     scenes = scenes_of("PickXtimes", 0)[::4]
     text = USER_FILE_OF_THE_PAGE + SPATIAL_FILE_OF_THE_PAGE
     words = parse_wordings(text, "mine.toml").tasks["PickXtimes"]
@@ -465,15 +480,29 @@ say."colors.0" = ["{words}"]
 
 
 def test_a_text_that_is_too_long_only_when_it_names_everything_is_reported():
-    """The form *resolved* names all values again and so is longer than the usual one."""
-    longer = "<it color: it> is much prettier than {person.2}'s {rival color} one."
-    text = BIRTHDAY.replace("{person.2} has a {rival color} one.", longer)
+    """Policies hear 64 tokens. With its long competing remark this story just fits while it says
+    *it*; in the form *resolved* its command names every value again, *Pick up the red cube …*,
+    which is longer. The report has the rule that is broken, and below it the text that is too
+    long."""
+    text = """
+tasks = ["PickXtimes"]
+[[scenario]]
+frame = "birthday"
+pool = "train"
+setting = "direct"
+introduction = "{person} turns {repeats} today and wants to see the {color} cube."
+reinforcement = "{he} keeps talking about <it color: it>."
+distractors = ["The cake is at the baker's.", "I forgot the candles.", "It's so loud in here."]
+competing = ["<it color: it> is much prettier than {person.2}'s {rival color} one."]
+cue = "Let's surprise {him} with the cube."
+say.color = ["<it color: it>"]
+say.repeats = ["<each repeats: [repeats: once for that year|once for each year]>"]
+"""
 
-    lines = report_lines(report_on(text, every=1), "PickXtimes")
+    report = "\n".join(report_lines(report_on(text, every=8), "PickXtimes"))
 
-    (*_, complaint, example, _) = lines
-    assert re.match(r"  BROKEN needs \d+ tokens; only 64 are heard", complaint)
-    assert re.match(r"    resolved: .*Pick up the \w+ cube and put it on the target", example)
+    assert re.search(r"  BROKEN needs \d+ tokens; only 64 are heard", report)
+    assert re.search(r"\n    resolved: .*Pick up the \w+ cube and put it on the target", report)
 
 
 def test_right_now_at_once_and_a_second_are_not_taken_for_values():
@@ -520,15 +549,20 @@ def test_every_published_scene_can_be_commanded_in_every_setting_and_pool(task):
 
 
 def test_a_story_does_not_speak_of_several_cubes_if_one_goes_into_the_bin():
-    """Wrong would be *I need more cubes like the one on the left. So put one like that one …*"""
-    single = 0
+    """*I need more cubes like the one on the left. So put one like that one into the bin* would be
+    wrong: one cube is needed. Compared are all spatial texts of BinFill with *one like that* or
+    *one of that color* in the command; *I … cubes* and *My mom wants cubes* are the ways in which
+    our stories speak of several."""
+    stories_of_one_cube = []
     options = InstructionOptions("spatial", wordings="train")
     for _, said in said_where_possible(split_episodes(["BinFill"], SPLITS), options):
         story, _, command = said.text.partition(". ")
         if re.search(r"\bone (like|of) that", command):
-            assert not re.search(r"I\b.* cubes|My mom wants cubes", story), said.text
-            single += 1
-    assert single
+            stories_of_one_cube.append(story)
+
+    assert stories_of_one_cube
+    for story in stories_of_one_cube:
+        assert not re.search(r"I\b.* cubes|My mom wants cubes", story), story
 
 
 @pytest.fixture(scope="module", params=WRITTEN)
@@ -661,30 +695,44 @@ def test_of_several_amounts_only_the_color_of_one_has_to_be_found_out(setting, c
 
 
 def test_three_amounts_are_said_in_one_phrase_with_a_mention_for_each_value():
-    """A mention marks the span of the text that stands for a value of the goal."""
-    episodes = scenes_of("BinFill", 0)
-    episode = next(episode for episode in episodes if len(episode.goal["colors"]) == 3)
+    """The goal is two red cubes, one blue and two green ones. A mention marks the words of the text
+    that stand for one value of the goal; they come in the order of the text."""
+    episode = get_episode("BinFill", "test", 11)
+    assert episode.goal == Goal.of(colors=("red", "blue", "green"), counts=(2, 1, 2))
 
     said = instruct(episode)
 
-    assert re.search(r"\w+ red cubes?, \w+ blue ones? and \w+ green ones? ", said.text)
-    (red, one), (blue, two), (green, three) = episode.goal.amounts
+    assert "two red cubes, one blue one and two green ones " in said.text
     values = [mention.value for mention in said.mentions]
-    assert values == [one, red, two, blue, three, green]
+    assert values == [2, "red", 1, "blue", 2, "green"]
 
 
-def test_a_clue_that_excludes_two_objects_mentions_these_in_a_sentence_first():
-    """*There's a cube on the left and one next to the button. The other one is new.*
-
-    Other clues need one sentence: *The cube in the middle is new.* Resolved, the command says
-    *neither … nor*.
-    """
+def grounded_instructions(pattern):
+    """Return the instructions of those of 60 random episodes in which the setting *grounded*
+    describes the cube by a pattern, such as *place*; each with its resolved form."""
     options = InstructionOptions("grounded")
+    found = []
     for episode, said in said_where_possible(first_episodes("PickXtimes", "random", 60), options):
-        resolved = instruct_with(episode, replace(options, form="resolved"))
-        excludes = said.metadata["pattern"] == "sets"
-        assert (said.turns[0].count(".") == 2) == excludes, said.text
-        assert ("neither" in resolved.command) == excludes, resolved.text
+        if said.metadata["pattern"] == pattern:
+            found.append((said, instruct_with(episode, replace(options, form="resolved"))))
+    assert found
+    return found
+
+
+@pytest.mark.parametrize(
+    ("pattern", "sentences", "says_neither"),
+    [("sets", 2, True), ("place", 1, False), ("betweenness", 1, False)],
+)
+def test_a_clue_that_excludes_two_objects_mentions_these_in_a_sentence_first(
+    pattern, sentences, says_neither
+):
+    """The pattern *sets* excludes two cubes, in a sentence of its own: *There's a cube on the left
+    and one next to the button. The other one is new.* Others need one sentence: *The cube in the
+    middle is new.* Sentences of the first turn are counted by their full stops. Resolved, the
+    command of *sets* says *neither … nor*."""
+    for said, resolved in grounded_instructions(pattern):
+        assert said.turns[0].count(".") == sentences, said.text
+        assert ("neither" in resolved.command) == says_neither, resolved.text
 
 
 @pytest.mark.parametrize("kind", ["neutral", "competing"])
@@ -795,29 +843,36 @@ def scenarios_of(pool):
     return list(by_name.values())
 
 
+def pointers_written_in(pool):
+    """Return all pointers in our scenarios of a pool, as one text, without their class and slot:
+    ``<the latter>`` for what scenarios write as ``<latter color: the latter>``."""
+    scenarios = []
+    for file in {get_task(task).words for task in WRITTEN}:
+        _, *written = (FOLDER / file).read_text().split("[[scenario]]")
+        scenarios += [text for text in written if f'pool = "{pool}"' in text]
+    return re.sub(r"<[a-z]+ [^:<>]+: ", "<", "\n".join(scenarios))
+
+
 def is_used(row, text):
     """Return whether a text has the words of a row of the table of pointers.
 
     In the table ``*`` is any noun, and ``**`` any words.
     """
     words = row.words if "<" in row.words else f"<{row.words}>"
-    pattern = re.escape(words.replace('"', "'")).replace(r"\*\*", "[A-Za-z{}' ]+")
-    pattern = pattern.replace(r"\*", "[a-z]+")
-    return re.search(pattern, text) is not None
+    pattern = re.escape(words).replace(r"\*\*", "[A-Za-z{}' ]+")
+    return re.search(pattern.replace(r"\*", "[a-z]+"), text) is not None
 
 
 @each_pool
 def test_every_pointer_is_used_both_in_training_and_in_test_words(pool):
-    """A pointer that training lacks would be new to whoever learned from it, and the test would
-    measure vocabulary. Scenarios write ``<latter color: the latter>``; class and slot are removed.
-    """
-    text = ""
-    for file in {get_task(task).words for task in WRITTEN}:
-        for scenario in tomllib.loads((FOLDER / file).read_text())["scenario"]:
-            if scenario["pool"] == pool:
-                text += re.sub(r"<[a-z]+ [^:<>]+: ", "<", str(scenario).replace('"', "'"))
+    """Pointers are words that refer back, such as *the latter*; a table has all that are allowed.
+    Each must be written in a scenario of both pools, training and tests: one that training lacks
+    would be new to whoever learned from it, and a test would measure vocabulary."""
+    written = pointers_written_in(pool)
 
-    assert [row.words for row in pointer_table() if not is_used(row, text)] == []
+    unused = [row.words for row in pointer_table() if not is_used(row, written)]
+
+    assert unused == []
 
 
 def test_no_instruction_of_the_test_split_occurs_in_training():
@@ -866,16 +921,12 @@ def said_with(scenario, episode):
 
 @each_pool
 def test_that_many_times_is_never_said_of_once(pool):
-    """All our scenarios of PickXtimes that may say *that many times* speak in all scenes that they
-    fit.
-
-    It is said of two to five times, and never of one.
-    """
+    """Each of our scenarios of PickXtimes in the setting *direct* speaks in each scene, whose goal
+    may be to pick the cube up once to five times. *That many times* must occur with all numbers but
+    one."""
     numbers = set()
-    for scenario in task_scenarios("PickXtimes").scenarios:
-        fields = scenario.fields
-        may_say_it = "that many times" in str(scenario.texts)
-        if (fields.setting, fields.pool) == ("direct", pool) and may_say_it:
+    for scenario in our_scenarios("PickXtimes", "direct", pool):
+        if "that many times" in str(scenario.texts):
             for episode in scenes_of("PickXtimes", 0):
                 if "that many times" in said_with(scenario, episode).command:
                     numbers.add(episode.goal["repeats"])
@@ -885,7 +936,10 @@ def test_that_many_times_is_never_said_of_once(pool):
 
 @pytest.mark.parametrize(("relation", "way"), [("one earlier", "back"), ("one later", "on")])
 def test_one_step_means_earlier_or_later_as_its_scenario_declares(relation, way):
-    """*We go back one* and *we go on one* use the same mark, `{step}`."""
+    """A video shows a cube on several targets, one after the other. The story names one of them
+    ({reference}) and a step ({step}, said as *one*); `derive.relations` declares whether the step
+    goes back or on. The checker reports a text that means another goal than the episode's; so no
+    broken rule says that *the third target, we go back one* means the second."""
     text = f"""
 tasks = ["VideoPlaceOrder"]
 [[scenario]]
@@ -897,11 +951,12 @@ derive.relations = ["{relation}"]
 introduction = "From the cube's {{reference}} target, we go {way} {{step}}."
 say.placement = ["<that reference: that one>"]
 """
+
     report = report_on(text, "VideoPlaceOrder", every=4)
 
     assert report.fitting
     assert not report.broken
-    assert all(f"go {way} one. " in text for text in report.renderings)
+    assert all(f"go {way} one. " in said for said in report.renderings)
 
 
 def said_with_gym_reps(repeats):
@@ -994,7 +1049,11 @@ def test_words_of_a_task_without_moving_containers_do_not_speak_of_following_one
 
 
 def test_the_latter_may_follow_one_cube_named_by_place_and_one_by_color():
-    """*I get the cube in the back, and Mia gets the red cube. Lift … mine, then … Mia's.*"""
+    """Two cubes are meant: *I get the cube in the back, and Mia gets the red cube. Lift the
+    container over mine, then the one over Mia's.* Mine is the first cube, which has a place, and
+    Mia's the second, which has a color; the class *latter* says that a pointer means the second of
+    two. The checker must find scenes that the story fits, where it means the goal and breaks no
+    rule."""
     text = """
 tasks = ["ButtonUnmask"]
 [[scenario]]
@@ -1005,9 +1064,8 @@ introduction = "I get the cube {place.0:any}, and {person.2} gets the {colors.1}
 say.colors.0 = ["the container over <other place.0: mine>"]
 say.colors.1 = ["the one over <latter colors.1: {person.2}'s>"]
 """
-    words = read_scenario_file(text, "ButtonUnmask")
 
-    (report,) = check_scenarios(words, None, scenes_of("ButtonUnmask", 40))
+    report = report_on(text, "ButtonUnmask", every=5)
 
     assert report.fitting
     assert not report.broken
