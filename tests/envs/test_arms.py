@@ -68,20 +68,22 @@ def test_between_the_verdict_and_the_end_the_episode_goes_on():
 
 
 def test_a_success_stays_one_while_the_original_goal_is_undecided():
-    """The words state an earlier visit of the moving cube than the original goal. The oracle stops
-    it then, which is a success for the words; the episode goes on until the original goal is
-    decided, here failed, and its status becomes that of the words."""
-    env = make("StopCube", 6)  # the other goal is an earlier visit
+    """In test episode 6 of StopCube the words of the arm *other-goal* state an earlier visit of the
+    moving cube than the original goal. The oracle stops it then, which is a success for the words
+    (the verdict); but the original goal is not decided yet, so the episode goes on. It ends when
+    that has failed, with the verdict as its status."""
+    env = make("StopCube", 6)
     loop = EpisodeLoop(env, make_policy("oracle", seed=0))
-    observation, info = loop.begin()
-    while info["verdict"] == "ongoing":
-        observation, info = loop.execute(loop.act(observation))
+    observation, at_verdict = loop.begin()
+    while at_verdict["verdict"] == "ongoing":
+        observation, at_verdict = loop.execute(loop.act(observation))
 
-    assert (info["verdict"], info["original"]) == ("success", "ongoing")
-    assert (info["status"], info["is_success"]) == ("ongoing", False)
+    at_the_end = loop.take_turns(observation, at_verdict)
 
-    info = loop.take_turns(observation, info)
-    assert (info["status"], info["original"], info["cause"]) == ("success", "failure", None)
+    assert (at_verdict["verdict"], at_verdict["original"]) == ("success", "ongoing")
+    assert (at_verdict["status"], at_verdict["is_success"]) == ("ongoing", False)
+    assert (at_the_end["status"], at_the_end["original"]) == ("success", "failure")
+    assert at_the_end["cause"] is None
 
 
 def test_time_ends_an_episode_whose_original_goal_is_undecided():

@@ -94,18 +94,21 @@ def test_gymnasium_s_vector_environment_gives_what_single_environments_give(vect
 
 
 def test_gymnasium_s_vector_environment_goes_on_with_the_next_episodes(vector):
-    """Two environments begin with episodes 4 and 5, which end after two steps. Gymnasium's own
-    class resets an environment at the step after its end, so the third step begins the next
-    episode, of which 6 is the second one's."""
+    """`vector` has two environments with episodes of two steps. Seed 4 starts episode 4 in the
+    first and 5 in the second; each goes on with its own next one, 5 and 6. An episode ends at the
+    second step; the step after it only begins the next one, as Gymnasium's own class does it."""
+    at_rest = np.tile(HOME_ACTION, (2, 1))
     vector.reset(seed=4)
-    rest = np.tile(HOME_ACTION, (2, 1))
-    vector.step(rest)
 
-    *_, infos = vector.step(rest)
-    batch, *_ = vector.step(rest)
+    vector.step(at_rest)
+    *_, infos = vector.step(at_rest)
+    observations, *_ = vector.step(at_rest)
 
-    assert infos["cause"].tolist() == ["not done after 2 steps"] * 2
-    assert batch["instruction"][1] == roboirg.make("PickXtimes", episode=6).instruction.text
+    next_instructions = [
+        roboirg.make("PickXtimes", episode=index).instruction.text for index in (5, 6)
+    ]
+    assert list(infos["cause"]) == ["not done after 2 steps", "not done after 2 steps"]
+    assert list(observations["instruction"]) == next_instructions
 
 
 @pytest.mark.slow

@@ -554,25 +554,18 @@ def plays_of_any_facts(draw):
 
 @given(plays_of_any_facts())
 @settings(max_examples=120)
-def test_whatever_happened_an_ongoing_or_successful_episode_has_no_failure(play):
-    """The play begins right and goes on with any facts at all. While time is not up, a failure is
-    found exactly if the judge's verdict is one."""
-    found = play.finding(timed_out=False)
+def test_whatever_happened_a_failure_is_found_exactly_if_there_is_one(play):
+    """The play begins right and goes on with any facts at all. In time, a failure is found exactly
+    if the judge's verdict is one; when time is up, also if there is no verdict. It is consistent in
+    itself (`check_finding`): its kind is that of its name, its step in the policy's turn, its
+    subject in the scene."""
+    in_time = play.finding(timed_out=False)
+    at_the_end = play.finding(timed_out=True)
 
-    assert (found is not None) == (play.judge.status is Status.FAILURE)
-
-
-@given(plays_of_any_facts())
-@settings(max_examples=120)
-def test_whatever_happened_a_failure_is_found_when_time_is_up_without_success(play):
-    """The play begins right and goes on with any facts at all, until time is up. Unless the verdict
-    is a success, a failure is found that is consistent in itself (`check_finding`): its kind is
-    that of its name, its step in the policy's turn, its subject in the scene."""
-    found = play.finding(timed_out=True)
-
-    assert (found is None) == (play.judge.status is Status.SUCCESS)
-    if found is not None:
-        check_finding(play, found)
+    assert (in_time is not None) == (play.judge.status is Status.FAILURE)
+    assert (at_the_end is None) == (play.judge.status is Status.SUCCESS)
+    if at_the_end is not None:
+        check_finding(play, at_the_end)
 
 
 # Details

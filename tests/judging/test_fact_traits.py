@@ -31,9 +31,8 @@ def kinds_written_in(path):
     return set(re.findall(r"\bFact\(\s*\"(\w+)\"", path.read_text()))
 
 
-def kinds_of_attempts():
-    """Return the kinds of the table that are failed tries, such as *clutched*."""
-    return {kind for kind, traits in FACT_TRAITS.items() if traits.role is FactRole.ATTEMPT}
+ATTEMPTS = {kind for kind, traits in FACT_TRAITS.items() if traits.role is FactRole.ATTEMPT}
+"""The kinds of the table that are failed tries, such as *clutched*."""
 
 
 def test_attempt_detection_makes_every_kind_of_attempt_in_the_table_of_traits():
@@ -42,7 +41,7 @@ def test_attempt_detection_makes_every_kind_of_attempt_in_the_table_of_traits():
     attempt."""
     detected = kinds_written_in(SOURCE / "simulation" / "attempt_detection.py")
 
-    assert detected == kinds_of_attempts() | {"pressed"}
+    assert detected == ATTEMPTS | {"pressed"}
 
 
 def test_fact_detection_makes_every_other_kind_of_fact_in_the_table_of_traits():
@@ -50,7 +49,7 @@ def test_fact_detection_makes_every_other_kind_of_fact_in_the_table_of_traits():
     facts names each kind of the table but attempts."""
     detected = kinds_written_in(SOURCE / "simulation" / "fact_detection.py")
 
-    assert detected == set(FACT_TRAITS) - kinds_of_attempts()
+    assert detected == set(FACT_TRAITS) - ATTEMPTS
 
 
 def test_no_source_file_names_a_kind_of_fact_that_is_not_in_the_table_of_traits():

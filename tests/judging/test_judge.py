@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from staged import judged
 
-from roboirg.core.conditions import Fact, Rule, facts_of
+from roboirg.core.conditions import Fact, facts_of
 from roboirg.core.episode import Primitive, Stage
 from roboirg.judging import Status, changes, plain_subgoal
 from roboirg.judging.judge import describe_object
@@ -143,18 +143,16 @@ TASKS_THAT_FORBID_FACTS = sorted({*every_task()} - {"StopCube", "PutInBox", "Pic
 
 @pytest.mark.parametrize("task", TASKS_THAT_FORBID_FACTS)
 def test_each_fact_that_a_task_forbids_fails_its_stage_with_a_cause(task):
-    """A stage forbids facts, such as a pick of another cube. Each of them comes together with what
-    the stage expects, when this stage is due: it fails all the same, and the cause names the
-    object and what was expected, as in "picked up the red cube; expected: pick up the blue
-    cube"."""
+    """A stage forbids facts, such as a pick of another cube, or rules, which have tests of their
+    own. Each fact comes together with what the stage expects, when this stage is due: it fails all
+    the same, and the cause names the object and what was expected, as in *picked up the red cube;
+    expected: pick up the blue cube*."""
     episode = get_episode(task, "test", 3)
-    forbidden = [(due, wrong) for due in episode.stages for wrong in due.forbids]
-    facts = [(due, wrong) for due, wrong in forbidden if not isinstance(wrong, Rule)]
-    assert facts
 
-    for due, wrong in facts:
-        judge = judged([due], episode.scene, [wrong, *facts_of(due.expects)])
-
-        assert judge.status is Status.FAILURE, wrong
-        assert describe_object(wrong.subject, episode.scene) in judge.cause
-        assert plain_subgoal(due) in judge.cause
+    for due in episode.stages:
+        for wrong in due.forbids:
+            if isinstance(wrong, Fact):
+                judge = judged([due], episode.scene, [wrong, *facts_of(due.expects)])
+                assert judge.status is Status.FAILURE, wrong
+                assert describe_object(wrong.subject, episode.scene) in judge.cause
+                assert plain_subgoal(due) in judge.cause

@@ -189,29 +189,31 @@ say.color = ["{step} fewer [step: time|times] than <that reference: {he} did>"]
     assert "{step:*} fewer than <that reference: that>" in nearest
 
 
-def lines_of_the_pointer_table():
-    """Return the lines that docs/scenario-marks.md should have, sorted.
-
-    ``| color | same | **it** `it`; **that** `that cube` |``: for each type of value and operation
-    the words, by their class. Types that have the same words share a line.
+def pointers_of_the_page():
+    """Return the table of docs/scenario-marks.md: for each kind of value, operation and class the
+    words, as code. A line has one or more kinds, an operation, and words by their class:
+    ``| color | same | **it** `it`; **that** `that cube` |``.
     """
-    cells = defaultdict(lambda: defaultdict(dict))
-    for row in pointer_table():
-        for kind in row.of:
-            cells[kind, row.operation][row.kind][f"`{row.words}`".replace("|", "\\|")] = None
-    kinds = defaultdict(list)
-    for (kind, operation), classes in cells.items():
-        words = [f"**{name}** {', '.join(words)}" for name, words in classes.items()]
-        kinds[operation, "; ".join(words)].append(kind)
-    lines = [f"| {', '.join(names)} | {how} | {words} |" for (how, words), names in kinds.items()]
-    return sorted(lines)
+    lines = (DOCS / "scenario-marks.md").read_text().splitlines()
+    found = {}
+    for line in lines[lines.index("| stands for | follows by | words |") + 2 :]:
+        kinds, operation, cell = re.fullmatch(r"\| (.*?) \| (.*?) \| (.*) \|", line).groups()
+        for name, words in re.findall(r"\*\*(\w+)\*\* (.*?)(?=; \*\*|$)", cell):
+            for kind in kinds.split(", "):
+                found[kind, operation, name] = set(words.replace("\\|", "|").split(", "))
+    return found
 
 
 def test_the_documentation_lists_every_pointer_of_the_table():
-    """Words such as *it* or *the latter*, in docs/scenario-marks.md as in pointers.toml."""
-    lines = (DOCS / "scenario-marks.md").read_text().splitlines()
-    table = lines[lines.index("| stands for | follows by | words |") + 2 :]
-    assert sorted(table) == lines_of_the_pointer_table()
+    """Pointers are words such as *it* or *the latter*. `pointer_table` has the rows of the file
+    pointers.toml, and the page must list the same words for the same kinds of values, operations
+    and classes."""
+    expected = defaultdict(set)
+    for row in pointer_table():
+        for kind in row.of:
+            expected[kind, row.operation, row.kind].add(f"`{row.words}`")
+
+    assert pointers_of_the_page() == expected
 
 
 def test_all_mistakes_of_a_scenario_file_are_reported_at_once():
