@@ -21,14 +21,16 @@ NAME = f"roboirg.envs.registration:{environment_id('PickXtimes')}"
 
 
 def test_a_reset_chooses_episode_and_words_for_that_episode_alone():
-    """The seed chooses nothing here, as the environment was made for an episode."""
+    """The environment is made for episode 3. A reset asks for another episode in another setting
+    and split, and gives what an environment that is made for it has. The next reset is back at
+    episode 3 with its words; its seed chooses nothing, as an episode was named."""
     env = roboirg.make("PickXtimes", cameras=(), episode=3)
-    made = roboirg.make("PickXtimes", cameras=(), episode=5, setting="spatial", split="val")
     words = env.instruction
+    other = roboirg.make("PickXtimes", cameras=(), episode=5, setting="spatial", split="val")
 
     chosen, _ = env.reset(options={"episode": 5, "setting": "spatial", "split": "val"})
-    assert chosen["instruction"] == made.instruction.text == env.instruction.text
-    assert env.episode == made.episode
+    assert chosen["instruction"] == other.instruction.text == env.instruction.text
+    assert env.episode == other.episode
 
     env.reset(seed=8)
     assert env.instruction == words
@@ -38,15 +40,13 @@ def test_a_reset_chooses_episode_and_words_for_that_episode_alone():
 @pytest.mark.parametrize(
     ("options", "error", "words"),
     [
-        (
-            {"cameras": ()},
-            UnknownNameError,
-            "no reset option 'cameras'; known: split, episode",
-        ),
+        ({"cameras": ()}, UnknownNameError, "no reset option 'cameras'; known: split, episode"),
         ({"episode": 50}, InvalidValueError, "no episode 50"),
     ],
 )
 def test_a_reset_refuses_unknown_options_and_episodes(options, error, words):
+    """Cameras are chosen when an environment is made, not at a reset. The split *test* has 50
+    episodes, 0 to 49."""
     env = roboirg.make("PickXtimes", cameras=())
 
     with pytest.raises(error, match=words):
@@ -63,8 +63,8 @@ def test_an_environment_of_an_episode_of_ones_own_may_change_its_words_and_not_t
 
 
 def test_seeds_choose_episodes_if_none_is_named():
-    """There are 50 episodes, so a seed chooses the rest of its division by 50; without one the next
-    episode is played, and after the last one the first."""
+    """There are 50 episodes, so a seed chooses the rest of its division by 50 (1049: 49); without
+    one the next episode is played, and after the last one the first."""
     env = roboirg.make("PickXtimes", cameras=(), episode=None)
     played = []
 
@@ -84,7 +84,9 @@ def vector():
 
 
 def test_gymnasium_s_vector_environment_gives_what_single_environments_give(vector):
-    """Seed 4 chooses episode 4 for the first one, and 5 for the second."""
+    """`vector` has two environments of PickXtimes. Gymnasium gives the first one the seed 4, and
+    the second one the next, 5, which choose episodes 4 and 5. So the second row of each part of the
+    observations must be that of a single environment of episode 5, made with the same OPTIONS."""
     batch, infos = vector.reset(seed=4)
 
     observation, _ = roboirg.make("PickXtimes", episode=5, **OPTIONS).reset()
@@ -113,7 +115,9 @@ def test_gymnasium_s_vector_environment_goes_on_with_the_next_episodes(vector):
 
 @pytest.mark.slow
 def test_a_fork_before_drawing_works():
-    """In a process of its own: forking is refused where pictures have been drawn."""
+    """Gymnasium's "async" vector environment forks a process for each of its two environments. The
+    program runs in a process of its own, since forking is refused where pictures have been drawn.
+    It prints the instructions; seed 4 chooses episodes 4 and 5."""
     program = (
         "import gymnasium\n"
         f"vector = gymnasium.make_vec({NAME!r}, 2, 'async', episode=None, **{OPTIONS})\n"
