@@ -70,22 +70,24 @@ def facts_named_in(episode):
 
 @pytest.mark.parametrize("task", every_task())
 def test_facts_in_tasks_are_about_objects_that_their_kind_allows(task):
-    """*Picked* is about a cube or a tape, and has no place; *over* has a place."""
+    """The table of traits says of each kind of fact which kinds of objects it can be about, and at
+    which places: *picked* is about a cube or a tape and has no place, *over* has one. So it must be
+    for all facts that stages, motions and the video of four episodes name."""
     for index in range(4):
         episode = get_episode(task, "test", index)
-        kinds = {item.name: item.kind for item in episode.scene.objects} | {"robot": "robot"}
+        kinds = {item.name: item.kind for item in episode.scene.objects}
+        kinds |= {"robot": "robot", None: None}
         for fact in facts_named_in(episode):
             traits = FACT_TRAITS[fact.kind]
             assert kinds[fact.subject] in traits.subjects, fact
-            if traits.places:
-                assert kinds[fact.place] in traits.places, fact
-            else:
-                assert fact.place is None, fact
+            assert kinds[fact.place] in (traits.places or [None]), fact
 
 
 @pytest.mark.parametrize("kind", FACT_TRAITS)
 def test_the_words_of_a_kind_of_fact_name_its_subject_and_place(kind):
-    """The robot is not named, as in "pressed the red button"."""
+    """The words of a kind of fact have gaps, as in *placed {subject} on {place}*. They must have
+    one for the place if the kind has places, and one for the subject unless that is always the
+    robot, which is not named: *pressed the red button* has a button as its subject."""
     traits = FACT_TRAITS[kind]
 
     words = traits.past.format(subject="SUBJECT", place="PLACE")
@@ -166,10 +168,9 @@ def test_a_registered_kind_of_fact_is_described_in_the_words_it_brings(registere
 
 
 def test_a_failure_by_a_registered_kind_of_fact_is_named_by_its_role(registered_toppled):
-    """*Toppled* has the role of a press, which ends a task: done too early, it is a wrong count.
-
-    A cube carried over a target too early is a wrong order.
-    """
+    """The plan is to pick a cube, to topple a pillar and to carry the cube over a target; the pick
+    is due. The fixture has registered *toppled* with the role of a press, which ends a task: done
+    too early, it is a wrong count. A cube carried over a target too early is a wrong order."""
     carried = Fact("over", "cube", "target_left")
     plan = [stage_that_expects(fact) for fact in (Fact("picked", "cube"), TOPPLED, carried)]
 
@@ -216,6 +217,7 @@ SCENE_WITH_A_PILLAR = Scene((SceneObject("pillar", "pillar", Point(0.0, 0.0, 0.0
 
 @pytest.mark.sim
 def test_an_unknown_kind_of_object_is_refused():
+    """The scene has an object of the kind *pillar*, for which nothing is registered here."""
     from roboirg.simulation.world import World
 
     with pytest.raises(UnknownNameError, match="no kind of object 'pillar'"):
@@ -224,8 +226,8 @@ def test_an_unknown_kind_of_object_is_refused():
 
 @pytest.mark.sim
 def test_registering_a_kind_of_object_under_a_taken_name_is_refused():
-    """*Cube* is a kind of the benchmark, which has its own builder; `build_pillar` is another
-    one."""
+    """*Cube* is a kind of the benchmark, which has its own builder; `build_pillar` is another one,
+    which could not build cubes."""
     from roboirg.simulation import bodies
 
     with pytest.raises(InvalidValueError, match="already a kind of object 'cube'"):

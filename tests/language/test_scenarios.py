@@ -343,7 +343,8 @@ def only_command(text, mentions=(), landmarks=()):
 
 
 def test_a_color_of_the_goal_in_the_command_is_found_as_a_leak():
-    """A command that refers back must not name what the introduction has said."""
+    """A command that refers back must not name what the introduction has said. The goal is the
+    green cube, then the red one: *red* is a value of it."""
     said = only_command("Lift the first cube, then the other red cube.")
     assert find_leaks(said, Goal.of(colors=("green", "red"))) == {"red"}
 
@@ -354,13 +355,15 @@ FIRST_REFERS_BACK = Mention(0, 12, 17, "anaphor", "first", "visit", 1)
 
 @pytest.mark.parametrize(("mentions", "leaks"), [([], {"first"}), ([FIRST_REFERS_BACK], set())])
 def test_words_that_refer_back_are_no_leak(mentions, leaks):
-    """*First* names the visit of the goal, unless it is marked as the first of two in a list."""
+    """A leak is a value of the goal in the command. *First* names the visit of the goal, unless a
+    mention marks its characters as a word that refers back, to the first of two in a list."""
     said = only_command("Stop it the first time.", mentions)
     assert find_leaks(said, Goal.of(visit=1)) == leaks
 
 
 def test_a_place_of_the_goal_in_the_command_is_found_as_a_leak():
-    """*Closest to you* is another place of the goal, but it is not said."""
+    """The metadata has two places of the objects of the goal. The command names one, *at the far
+    left*; *closest to you* is not said."""
     landmarks = ["at the far left", "closest to you"]
     said = only_command("Lift the cube at the far left.", landmarks=landmarks)
     assert find_leaks(said, Goal.of(visit=1)) == {"at the far left"}
@@ -436,7 +439,10 @@ def test_the_example_file_of_the_documentation_has_a_scenario_for_every_scene():
     ids=["no number is nine fewer", "no cube has a clue", "no cube has a second place"],
 )
 def test_a_scenario_that_fits_no_scene_is_reported_with_the_reason(text, before, after, reason):
-    """The reason is that of the first scene, PickXtimes/train/0."""
+    """FEWER and WOBBLY are good scenarios, *Mia needs five photos, and I took two …* and *The table
+    wobbles on the left …*; `before` is replaced by `after` in one. No number of a goal is nine
+    fewer than another, no cube has a clue in the setting *spatial*, and none a second place. So no
+    scene fits, and the reason is that of the first one, PickXtimes/train/0."""
     *_, last_rule = report_on(text.replace(before, after)).broken
     assert last_rule.startswith(f"fits none of the scenes; in PickXtimes/train/0 {reason}")
 
@@ -449,7 +455,8 @@ def test_the_report_for_authors_shows_a_competing_remark_of_a_contextual_dialogu
 
 
 def test_the_report_for_authors_shows_no_competing_remark_if_the_setting_has_none():
-    """TWO_CUBES is a scenario of *direct-rival*, which has no such remarks."""
+    """The scenario, *We have the red cube, and they still sell the blue one*, is of the setting
+    *direct-rival*, which has no remarks about a color that is not wanted."""
     lines = report_lines(report_on(TWO_CUBES), "PickXtimes")
     assert not any("competing" in line for line in lines)
 
@@ -463,7 +470,9 @@ def test_the_report_for_authors_shows_no_competing_remark_if_the_setting_has_non
     ],
 )
 def test_a_command_to_lift_the_cube_instead_of_its_container_is_a_broken_rule(words, is_broken):
-    """*Lift the other one* would mean the cube, which nobody can lift through its container."""
+    """In VideoUnmask cubes are under containers. *Lift the other one* would mean the cube, which
+    nobody can lift through its container; *the container over the other one* and *the one over
+    mine* mean the container."""
     text = f"""
 tasks = ["VideoUnmask"]
 [[scenario]]
@@ -508,7 +517,8 @@ say.repeats = ["<each repeats: [repeats: once for that year|once for each year]>
 
 
 def test_right_now_at_once_and_a_second_are_not_taken_for_values():
-    """The checker refuses words that could be a value of the goal, such as *right* or *once*."""
+    """The checker refuses words that could be a value of the goal, such as *right*, *left*, *once*
+    or *second*. In this story they are none: *right now*, *it's left*, *at once*, *a second*."""
     text = """
 tasks = ["PickXtimes"]
 [[scenario]]
@@ -582,14 +592,18 @@ def some_instructions(request):
 
 
 def test_no_instruction_has_marks_or_doubled_spaces_left(some_instructions):
-    """Marks are `{color}` and `<it color: it>`; doubled are spaces, a space before a comma,
-    full stops."""
+    """`some_instructions` has what is said of eight episodes of a task with all options that can
+    express them. Scenarios are written with marks, `{color}` and `<it color: it>`, which must all
+    be replaced; a value that is left out must leave no two spaces or full stops, and no space
+    before a comma."""
     for _, _, said in some_instructions:
         assert not re.search(r"[{}<>|\[\]]|  | [.,]|[.]{2}", said.text), said.text
 
 
 def test_every_mention_marks_words_without_spaces_around_them(some_instructions):
-    """A mention is the span of a text that stands for a value of the goal."""
+    """`some_instructions` has what is said of eight episodes of a task with all options that can
+    express them. A mention is the span of a text that stands for a value of the goal, such as *the
+    blue cube*; it is not empty."""
     for _, _, said in some_instructions:
         for mention in said.mentions:
             span = said.span(mention)
@@ -597,7 +611,9 @@ def test_every_mention_marks_words_without_spaces_around_them(some_instructions)
 
 
 def test_metadata_of_instructions_are_plain_json_with_the_same_keys(some_instructions):
-    """Only instructions of a scenario name it."""
+    """`some_instructions` has what is said of eight episodes of a task with all options that can
+    express them. All have the same metadata as the explicit instruction; only those of a scenario
+    name it, too."""
     for episode, _, said in some_instructions:
         assert json.loads(json.dumps(said.metadata)) == dict(said.metadata)
         assert said.metadata.keys() - {"scenario"} == instruct(episode).metadata.keys()
@@ -605,19 +621,25 @@ def test_metadata_of_instructions_are_plain_json_with_the_same_keys(some_instruc
 
 
 def test_only_spatial_instructions_have_a_frame_of_reference(some_instructions):
-    """The frame says whose left and right is meant."""
+    """`some_instructions` has what is said of eight episodes of a task with all options that can
+    express them. The frame says whose left and right is meant, the robot's or the camera's; only
+    the setting *spatial* says left and right."""
     for _, options, said in some_instructions:
         assert (said.metadata["frame"] is not None) == (options.setting == "spatial"), said.text
 
 
 def test_an_instruction_is_the_same_when_it_is_asked_for_again(some_instructions):
-    """Would find words that depend on what was said before."""
+    """`some_instructions` has what is said of eight episodes of a task with all options that can
+    express them. Asked for again, after all the others, each must be the same: words must not
+    depend on what was said before."""
     for episode, options, said in some_instructions:
         assert instruct_with(episode, options) == said
 
 
 def test_a_contextual_dialogue_without_context_is_a_direct_instruction(some_instructions):
-    """Stages 1 and 5 are the introduction and the command."""
+    """`some_instructions` has what is said of eight episodes of a task with all options that can
+    express them. A dialogue of the setting *contextual* has five stages, of which 1 is the
+    introduction and 5 the command. With these two alone it is what *direct* says."""
     for episode, options, said in some_instructions:
         if options.setting == "contextual" and options.stages == (1, 5):
             direct = instruct_with(episode, replace(options, setting="direct"))
@@ -625,7 +647,9 @@ def test_a_contextual_dialogue_without_context_is_a_direct_instruction(some_inst
 
 
 def test_a_resolved_command_ends_with_the_explicit_command(some_instructions):
-    """*So grab the blue cube and …*: the form *resolved* names every value."""
+    """`some_instructions` has what is said of eight episodes of a task with all options that can
+    express them. The form *resolved* of the setting *direct* names every value, as in *So grab the
+    blue cube and …*: after its first words it is the explicit command."""
     for episode, options, said in some_instructions:
         if (options.setting, options.form) == ("direct", "resolved"):
             explicit = instruct(episode, wordings=options.wordings)
@@ -739,7 +763,9 @@ def test_a_clue_that_excludes_two_objects_mentions_these_in_a_sentence_first(
 
 @pytest.mark.parametrize("kind", ["neutral", "competing"])
 def test_a_context_of_nine_remarks_begins_with_those_of_a_context_of_two(kind):
-    """A dialogue has four turns besides its remarks: two before them, and two after them."""
+    """A dialogue has four turns besides its remarks, two before and two after them. So with nine
+    remarks it has 13 turns; the first four, of which two are remarks, and the last two are those of
+    the dialogue with two remarks."""
     episode = get_episode("PickXtimes", "train", 2)
 
     few = instruct(episode, "contextual", distractor=kind, distractors=2).turns
@@ -751,12 +777,15 @@ def test_a_context_of_nine_remarks_begins_with_those_of_a_context_of_two(kind):
 
 
 def test_a_task_without_words_of_ours_is_refused_by_name(monkeypatch):
+    """`take_words` removes our file of words of VideoRepick, as if none had been written."""
     take_words(monkeypatch, "VideoRepick")
     with pytest.raises(InvalidValueError, match="VideoRepick names no file of words"):
         instruct(get_episode("VideoRepick", "test", 0), "direct")
 
 
 def test_a_scenario_for_a_task_without_words_of_ours_needs_commands_of_its_own(monkeypatch):
+    """`take_words` removes our words of VideoRepick. The file has a scenario for this task, the
+    story of a birthday, but no command that would follow it."""
     take_words(monkeypatch, "VideoRepick")
     lacking = "has no commands of VideoRepick in the pool train."
     with pytest.raises(InvalidValueError, match=lacking):
@@ -799,13 +828,16 @@ say.color = ["the cube <there place: there>"]
     ],
 )
 def test_one_file_of_words_gives_each_of_its_tasks_its_own_commands(task, train, test):
-    """SwingXtimes has its own command in the pool test; that of training is shared."""
+    """FILE_FOR_TWO_TASKS has commands for all its tasks, *Move …* in training and *Take …* in
+    tests, and one more for SwingXtimes in tests, *Swing …*, which takes the place of the shared
+    one."""
     words = read_scenario_file(FILE_FOR_TWO_TASKS, task)
     assert words.commands == {"train": (train,), "test": (test,)}
 
 
 def test_one_file_of_words_gives_a_task_its_own_phrase_for_a_number():
-    """SwingXtimes says *for three laps*; the phrase for the color is shared."""
+    """FILE_FOR_TWO_TASKS has phrases for color and number for all its tasks, and one more for the
+    number in SwingXtimes, *for three laps*."""
     pick = read_scenario_file(FILE_FOR_TWO_TASKS, "PickXtimes").stated
     swing = read_scenario_file(FILE_FOR_TWO_TASKS, "SwingXtimes").stated
 
@@ -825,7 +857,8 @@ def test_a_scenario_that_needs_a_task_is_said_in_that_task_only(task, frames):
 
 @pytest.mark.parametrize("task", ["PickXtimes", "SwingXtimes"])
 def test_a_file_without_commands_uses_our_commands_of_each_task(task):
-    """The file has one scenario, the story of a birthday, and no table `[commands]`."""
+    """The user's file has one scenario for two tasks, the story of a birthday, and no table
+    `[commands]`. So each task has our commands of it."""
     text = BIRTHDAY.replace('tasks = ["PickXtimes"]', 'tasks = ["PickXtimes", "SwingXtimes"]')
 
     words = read_scenario_file(text, task)
@@ -904,7 +937,9 @@ def introduction_words(scenario):
 
 
 def test_no_test_introduction_is_a_training_one_with_other_nouns():
-    """Two introductions count as alike if they share 70 % of their words in the same order."""
+    """Each introduction of a test scenario is compared with each of a training scenario, as lists
+    of words in which values are blanks. They count as alike if they share 70 % of their words in
+    the same order: a policy that has learned one would know the other."""
     training = [introduction_words(scenario) for scenario in scenarios_of("train")]
     for scenario in scenarios_of("test"):
         words = introduction_words(scenario)
@@ -972,20 +1007,25 @@ def said_with_gym_reps(repeats):
 
 
 def test_a_phrase_for_several_repetitions_stands_in_the_command():
+    """Our scenario "gym reps" of VideoRepick says *once for each rep* where a cube is to be picked
+    up more than once. `said_with_gym_reps` has what it says in the first scene with this number."""
     said = said_with_gym_reps(repeats=2)
 
     assert "put it back once for each rep, then" in said.command
 
 
 def test_a_phrase_that_is_left_out_for_once_leaves_no_gap_in_the_command():
-    """*Put it back once for each rep, then …* becomes *put it back, then …*"""
+    """Our scenario "gym reps" of VideoRepick says *put it back once for each rep, then …*, but for
+    a cube that is to be picked up once *put it back, then …*"""
     said = said_with_gym_reps(repeats=1)
 
     assert re.fullmatch("Pick up .* and put it back, then press the button.", said.command)
 
 
 def test_a_phrase_that_is_left_out_for_once_still_agrees_with_the_number_one():
-    """Without *for each rep*, who listens knows that it is once."""
+    """Our scenario "gym reps" of VideoRepick leaves *once for each rep* out of the command where it
+    is once. So its text has one mention, *Let's do one rep*, and the declared meaning is that the
+    words agree with the number of the goal."""
     said = said_with_gym_reps(repeats=1)
 
     assert len(said.mentions) == 1
@@ -994,15 +1034,18 @@ def test_a_phrase_that_is_left_out_for_once_still_agrees_with_the_number_one():
 
 
 def test_no_number_of_one_or_two_is_given_away_by_singular_or_plural():
-    """*Once for that run* is one, and *once for each run* would be two: a command with one of them
-    leaves the color at least to be found out."""
+    """In PickByCount a cube is picked up once or twice. *Once for that run* is one, and *once for
+    each run* would be two: a scenario whose words agree with the number ("Agreement") has to leave
+    the color to be found out, too, so both slots are said by it."""
     for scenario in task_scenarios("PickByCount").scenarios:
         if "Agreement" in str(scenario.texts.get("say.repeats", ())):
             assert scenario.said == ("color", "repeats"), scenario.fields.frame
 
 
 def test_each_of_the_three_remarks_of_a_scenario_comes_first_in_some_episode():
-    """240 dialogues with one remark each: every scenario should show each of its remarks."""
+    """A scenario has three distracting remarks. In 240 dialogues with one remark each, every
+    scenario that is said must show each of them; *He* and *She* at the beginning are left out, as
+    persons differ."""
     found = defaultdict(set)
     for index in range(240):
         episode = get_episode("StopCube", "random", index)
@@ -1016,7 +1059,9 @@ def test_each_of_the_three_remarks_of_a_scenario_comes_first_in_some_episode():
 
 @pytest.mark.parametrize("task", ["ButtonUnmask", "ButtonUnmaskSwap"])
 def test_introductions_do_not_mention_containers_that_are_not_there_yet(task):
-    """In these tasks the containers come down only after the button is pressed."""
+    """In these tasks the containers come down only after the button is pressed, and the words are
+    heard before. Commands are left out: they may say *the container over the cube*, which is lifted
+    later."""
     for scenario in task_scenarios(task).scenarios:
         for name, texts in scenario.texts.items():
             for text in texts:
@@ -1027,14 +1072,17 @@ def test_introductions_do_not_mention_containers_that_are_not_there_yet(task):
 
 @pytest.mark.parametrize("task", ["ButtonUnmask", "ButtonUnmaskSwap"])
 def test_commands_for_cubes_that_will_be_covered_say_the_container_over_the_cube(task):
-    """Only the container can be lifted then."""
+    """When the command is followed, a container has come down on each cube, and only the container
+    can be lifted. So each phrase for the first color begins with it."""
     for scenario in task_scenarios(task).scenarios:
         for text in scenario.texts["say.colors.0"]:
             assert literal(text).startswith("the container over ")
 
 
 def test_a_place_before_containers_move_is_said_to_be_one_at_the_start():
-    """*The container that started in the back* is elsewhere when the command is heard."""
+    """In VideoUnmaskSwap containers change places in the video. *The container that started in the
+    back* is elsewhere when the command is heard. So each scenario that names a place (all of the
+    setting *spatial*, and others with a clue to exclude) says that it was so at the start."""
     at_the_start = "start|beginning|early in the video|before .* moved|as soon as they moved"
     for scenario in task_scenarios("VideoUnmaskSwap").scenarios:
         if scenario.fields.setting == "spatial" or "aside" in str(scenario.texts):
@@ -1043,7 +1091,8 @@ def test_a_place_before_containers_move_is_said_to_be_one_at_the_start():
 
 
 def test_words_of_a_task_without_moving_containers_do_not_speak_of_following_one():
-    """In ButtonUnmask containers stay where they come down."""
+    """In ButtonUnmask containers stay where they come down, so no text may say that somebody lost
+    track of one, as in a shell game."""
     moved = r"follow|keep(?:ing)? (?:up|track)|los(?:es?|t|ing) track|shell game"
     for scenario in task_scenarios("ButtonUnmask").scenarios:
         for text in itertools.chain.from_iterable(scenario.texts.values()):
@@ -1074,7 +1123,9 @@ say.colors.1 = ["the one over <latter colors.1: {person.2}'s>"]
 
 
 def test_his_or_hers_may_stand_for_the_color_that_a_person_wants():
-    """*Leo wants the red cube, and Mia wants the blue one. Do his: lift it …*"""
+    """*Leo wants the red cube, and Mia wants the blue one. Do his: lift it …* The mark {hers} is
+    said as *his* or *hers*. The checker must find no broken rule, and one of the texts that it
+    renders must say one of the two."""
     text = """
 tasks = ["PickXtimes"]
 [[scenario]]
@@ -1134,7 +1185,9 @@ def test_the_one_i_mentioned_always_says_where_it_was_mentioned(pool):
 
 
 def test_the_other_one_may_mean_the_moment_that_was_not_named():
-    """There are two moments, before and after a press; one is named as gone."""
+    """There are two moments, before and after the press of a button. The story names one ({taken})
+    as gone, so that *the other one* is the one that is meant. The checker must find scenes that the
+    story fits, and no broken rule."""
     text = """
 tasks = ["VideoPlaceButton"]
 [[scenario]]
@@ -1152,7 +1205,9 @@ say.relation = ["on <other taken: the other one it used>"]
 
 
 def test_the_other_one_is_refused_if_two_of_three_colors_could_be_meant():
-    """*The green cube is gone. … The other one*: of three colors two are left."""
+    """*The green cube is gone. … The other one*: of three colors two are left, so the checker must
+    report that the words leave several goals, and that *the other one* stands for no single
+    value."""
     text = """
 tasks = ["VideoPlaceButton"]
 [[scenario]]

@@ -141,14 +141,16 @@ text = "lift the red cube to the target, repeat 2"
 
 
 def test_a_whole_sentence_hides_no_value():
-    """It states the goal, so nothing has to be found out."""
+    """The file has the sentence *lift the red cube to the target, repeat 2*. It states the goal, so
+    nothing has to be found out."""
     episode = episode_with("PickXtimes", color="red", repeats=2)
     said = instruct(episode, wordings=identity_of(TWO_SENTENCES))
     assert said.metadata["hidden_slots"] == 0
 
 
 def test_a_goal_without_a_sentence_in_a_user_s_file_is_refused_in_explicit():
-    """The file has sentences for red and blue cubes; the goal is a green one."""
+    """The file has sentences for red and blue cubes, twice. The goal is a green one, which the
+    setting *explicit* would have to state in words of the file."""
     identity = identity_of(TWO_SENTENCES)
     episode = episode_with("PickXtimes", color="green", repeats=2)
     complaint = "has no sentence of PickXtimes for the goal: green, twice; leave explicit out"
@@ -158,7 +160,8 @@ def test_a_goal_without_a_sentence_in_a_user_s_file_is_refused_in_explicit():
 
 
 def test_a_goal_without_a_sentence_in_a_user_s_file_can_be_said_in_other_settings():
-    """The goal is a green cube; the file has sentences for red and blue ones."""
+    """The goal is a green cube; the file has sentences for red and blue ones. *Direct* does not
+    state the goal in a sentence, so it uses our words."""
     episode = episode_with("PickXtimes", color="green", repeats=2)
     assert instruct(episode, "direct", wordings=identity_of(TWO_SENTENCES)).text
 
@@ -174,7 +177,8 @@ text = "go"
 
 
 def test_a_user_s_sentences_can_serve_a_task_that_has_no_words_of_ours(monkeypatch):
-    """`take_words` removes our words of VideoRepick; the file has *go* for two repetitions."""
+    """`take_words` removes our words of VideoRepick, as if none had been written. The user's file
+    has the sentence *go* for two repetitions."""
     take_words(monkeypatch, "VideoRepick")
     identity = identity_of(SENTENCE_FOR_VIDEOREPICK)
     episode = replace(episode_with("VideoRepick"), goal=Goal.of(repeats=2))
@@ -183,7 +187,8 @@ def test_a_user_s_sentences_can_serve_a_task_that_has_no_words_of_ours(monkeypat
 
 
 def test_a_task_without_words_of_ours_can_be_said_by_whole_sentences_only(monkeypatch):
-    """The setting *direct* would need a scenario or a command."""
+    """`take_words` removes our words of VideoRepick. The user's file has the sentence *go*; the
+    setting *direct* would need a scenario or a command."""
     take_words(monkeypatch, "VideoRepick")
     identity = identity_of(SENTENCE_FOR_VIDEOREPICK)
 
@@ -193,7 +198,9 @@ def test_a_task_without_words_of_ours_can_be_said_by_whole_sentences_only(monkey
 
 @pytest.mark.parametrize("goals_left", [understood_goals, goals_of_command, blind_goals])
 def test_a_sentence_given_for_two_goals_means_both(goals_left):
-    """*Do the usual with the red cube* stands for once and for twice."""
+    """The file gives *do the usual with the red cube* for once and for twice. Whatever finds the
+    goals that a text leaves open must find both: from text and scene, from the command alone, and
+    without the scene."""
     identity = identity_of("""
 name = "hand"
 tasks = ["PickXtimes"]
@@ -224,7 +231,8 @@ def run_check(text, folder, *options):
 
 
 def test_the_example_file_of_the_documentation_passes_the_check(tmp_path):
-    """It has a command for explicit, and two scenarios for direct."""
+    """docs/wording-files.md shows a file with a command, for *explicit*, and the scenarios "fresh
+    paint" and "photos", for *direct*."""
     checked = run_check(COMMAND_FILE_OF_THE_PAGE, tmp_path, "--seeds", "0")
 
     assert checked.exit_code == 0, checked.output
@@ -255,7 +263,8 @@ def test_the_example_file_passes_the_check_where_no_tokenizer_is_installed(
 
 
 def test_the_identity_of_an_open_file_is_its_name_and_a_digest(tmp_path):
-    """The name is that in the file, and not the file's."""
+    """docs/wording-files.md shows a file with the line `name = "workshop"`. The identity has this
+    name, and not that of the file."""
     file = tmp_path / "mine.toml"
     file.write_text(COMMAND_FILE_OF_THE_PAGE)
     assert re.fullmatch("workshop@[0-9a-f]{8}", open_wordings(file))
@@ -305,7 +314,8 @@ def commands_of_the_page():
 
 
 def test_goals_without_a_sentence_are_listed_but_are_no_error(tmp_path):
-    """The file of the page has sentences for two of the five visits of StopCube."""
+    """docs/wording-files.md shows a file with sentences for the first two of the five visits of
+    StopCube; three are left."""
     checked = run_check(SENTENCE_FILE_OF_THE_PAGE, tmp_path, "--seeds", "0")
 
     assert checked.exit_code == 0
@@ -313,15 +323,16 @@ def test_goals_without_a_sentence_are_listed_but_are_no_error(tmp_path):
 
 
 def test_at_most_ten_goals_without_a_sentence_are_listed(tmp_path):
-    """The file has two sentences, and PickXtimes fifteen goals: three colors, once to five
-    times."""
+    """The file has sentences for two of the fifteen goals of PickXtimes: three colors, once to five
+    times. Of the thirteen that are left, ten are named."""
     checked = run_check(TWO_SENTENCES, tmp_path, "--seeds", "0")
     (listed,) = re.findall(r"No sentence of 13 goals, such as: (.*)\. Episodes", checked.output)
     assert len(set(listed.split("; "))) == 10
 
 
 def test_the_check_reports_a_sentence_for_an_impossible_goal(tmp_path):
-    """The cube of StopCube visits its target at most five times."""
+    """docs/wording-files.md shows a file with a sentence for the second visit of StopCube's cube.
+    Here it is for visit 99, and the cube makes at most five."""
     text = SENTENCE_FILE_OF_THE_PAGE.replace("visit = 2", "visit = 99")
 
     checked = run_check(text, tmp_path)
@@ -331,7 +342,8 @@ def test_the_check_reports_a_sentence_for_an_impossible_goal(tmp_path):
 
 
 def test_a_mistake_in_a_command_for_training_and_tests_is_reported_once():
-    """Under `all` a command serves both."""
+    """Under `all` a command serves both training and tests. *Très* has a letter that is not ASCII,
+    which is reported for the command and not for each of the two."""
     with pytest.raises(InvalidValueError) as caught:
         parse_wordings(f"{HEAD}[commands]\nall = ['Très {{color}} {{repeats}}.']", "words.toml")
     assert str(caught.value).count("printable ASCII") == 1
@@ -420,7 +432,8 @@ def test_the_check_reports_a_command_that_does_not_state_the_goal(tmp_path, comm
 
 @each_pool
 def test_a_user_s_spatial_scenario_replaces_ours_in_the_spatial_setting(pool):
-    """The file has one spatial scenario, "dusty"; where it does not fit, the episode is refused."""
+    """DUSTY, a user's file, has the spatial scenario "dusty". Where it fits one of twelve episodes,
+    it is said; where it does not, ours must not step in, and the episode is refused."""
     options = InstructionOptions("spatial", wordings=identity_of(DUSTY))
     said = set()
     for index in range(12):
@@ -458,7 +471,8 @@ def test_a_user_s_spatial_scenario_lets_episodes_be_said_in_the_same_other_setti
 
 
 def test_a_scenario_for_training_is_not_said_in_test_episodes():
-    """`pool = "train"` keeps it out of the words of tests."""
+    """DUSTY, a user's file, has one spatial scenario, here with the line `pool = "train"`, which
+    keeps it out of the words of tests."""
     text = DUSTY.replace("setting", 'pool = "train"\nsetting')
     options = InstructionOptions("spatial", wordings=identity_of(text))
 
@@ -493,7 +507,9 @@ def digest_of(text):
     ids=["other introduction", "one command more", "for training only", "sentences"],
 )
 def test_the_digest_of_a_wording_file_changes_with_what_is_said(text):
-    """Compared with the file DUSTY, and with our words."""
+    """DUSTY has one scenario, *It's dusty on the left …*. Each text says something else: another
+    introduction, one command more, the same for training only, or whole sentences. So it has
+    another digest than DUSTY and than our words: three different ones."""
     ours = words_digest("PickXtimes", "test")
     assert len({ours, digest_of(DUSTY), digest_of(text)}) == 3
 
@@ -508,24 +524,28 @@ def test_the_digest_of_a_wording_file_changes_with_what_is_said(text):
     ids=["one more task", "task named twice", "task needed twice"],
 )
 def test_the_digest_of_a_wording_file_changes_with_nothing_else(before, after):
-    """Each case replaces `before` by `after` in the file DUSTY."""
+    """DUSTY has one scenario of PickXtimes. In each case `after` stands for `before`, which changes
+    nothing of what is said in this task: another task, or the same one named twice."""
     assert digest_of(DUSTY.replace(before, after)) == digest_of(DUSTY)
 
 
 def test_opening_a_wording_file_leaves_the_digest_of_our_words():
+    """The digest of our words is asked for before and after a file of two sentences is opened."""
     ours = words_digest("PickXtimes", "test")
     identity_of(TWO_SENTENCES)
     assert words_digest("PickXtimes", "test") == ours
 
 
 def test_an_instruction_names_the_digest_of_the_words_of_its_wording_file():
+    """DUSTY, a user's file, has one scenario of PickXtimes. `words_of` names task, pool and
+    digest."""
     identity = identity_of(DUSTY)
     said = instruct(EPISODE, wordings=identity)
     assert said.metadata["words"] == words_of("PickXtimes", "test", wordings=identity)
 
 
 def test_a_task_that_the_wording_file_lacks_is_refused_with_the_option_to_use():
-    """The file serves PickXtimes."""
+    """DUSTY, a user's file, has words of PickXtimes only; a run with it has to name that task."""
     identity = identity_of(DUSTY)
     lacking = f"^The wording file {identity} has no words of StopCube; name .*: --tasks PickXtimes"
     with pytest.raises(InvalidValueError, match=lacking):
@@ -694,13 +714,15 @@ remarks.not_latter = "No. "
 
 @pytest.mark.parametrize("pool_of_the_second", ["", 'pool = "test"\n'])
 def test_two_scenarios_of_one_name_and_pool_are_refused(pool_of_the_second):
-    """A scenario without a pool serves both."""
+    """DUSTY has one scenario, "dusty", without a pool, so that it serves both. A second one of this
+    name, for both pools or for tests, is not to be told from it in tests."""
     second = DUSTY.removeprefix(f"\n{HEAD}").replace("setting", f"{pool_of_the_second}setting")
     check_refusal(DUSTY + second, "'dusty' stands twice in the setting spatial, test.")
 
 
 def test_an_empty_table_of_commands_is_refused_and_not_filled_with_ours():
-    """It could be an unfinished file."""
+    """DUSTY is a right file; with an empty table of commands it could be one that is not
+    finished."""
     with pytest.raises(InvalidValueError, match="no commands of PickXtimes in the pool train"):
         parse_wordings(f"{DUSTY}[commands.PickXtimes]\n", "words.toml")
 
@@ -744,7 +766,9 @@ say.color = ["<it color: it>"]
     ids=["5000 unknown fields", "a long text", "a long name of a field", "5000 empty scenarios"],
 )
 def test_error_messages_about_a_huge_file_stay_short(wrong):
-    """The scenario's name is long, too; a message may have 2,000 characters in a line."""
+    """The file has a scenario with a name of 200,000 characters, and a mistake that is repeated
+    5,000 times or 500,000 characters long. Its error may have 2,000 characters in a line, and
+    10,000 in all."""
     text = f'{HEAD}[[scenario]]\nframe = "{"A" * 200_000}"\nsetting = "direct"\n{wrong}'
     with pytest.raises(InvalidValueError) as caught:
         parse_wordings(text, "words.toml")
@@ -801,7 +825,8 @@ text = "fill it"
     ],
 )
 def test_so_before_a_command_lowers_its_first_letter_except_in_i_and_leds(command, begun):
-    """The scenario has ``lead = "So "``, which stands before the command of the file."""
+    """PAINT has one scenario with the line `lead = "So "`, which stands before the command of the
+    file; the blue cube is said as *it*."""
     identity = identity_of(f'{PAINT}[commands]\nall = ["{command}"]\n')
     assert instruct(EPISODE, "direct", wordings=identity).command.startswith(begun)
 
@@ -818,7 +843,10 @@ def test_so_before_a_command_lowers_its_first_letter_except_in_i_and_leds(comman
 def test_a_command_that_names_the_color_leaves_one_goal_even_if_it_also_says_it(
     before, after, goals_left, hidden
 ):
-    """With *it* alone three colors are open, and one value is hidden; named, none is."""
+    """PAINT has one scenario, whose command begins *So* and says *it*; the goal is the blue of
+    three cubes. With *it* alone the command leaves three colors open, and one value is hidden. If
+    `after` takes the place of `before`, the command names the color, too: one goal is left, none is
+    hidden."""
     text = PAINT.replace(before, after)
 
     said = instruct(EPISODE, "direct", wordings=identity_of(text))
@@ -830,7 +858,8 @@ def test_a_command_that_names_the_color_leaves_one_goal_even_if_it_also_says_it(
 @pytest.mark.parametrize("setting", ["explicit", "direct"])
 @pytest.mark.parametrize("task", ["PickXtimes", "BinFill", "VideoUnmask"])
 def test_the_declared_meaning_lists_values_in_the_order_of_the_goal(task, setting):
-    """For example color, then repeats, even if the words say the number first."""
+    """The meaning that an instruction declares has the values of the goal by their fields: color,
+    then repeats, even if the words say the number first."""
     episode = get_episode(task, "test", 3)
     fields = [value.field for value in values_of_goal(episode.goal)]
     assert list(instruct(episode, setting).meaning.terms) == fields
@@ -844,14 +873,16 @@ def test_the_declared_meaning_lists_values_in_the_order_of_the_goal(task, settin
     ],
 )
 def test_a_scenario_with_a_mark_that_has_no_value_is_refused_by_file_and_name(before, after, mark):
-    """`{excluded}` needs a rule that excludes colors, and `{rank}` needs a list."""
+    """PAINT has one scenario, *We painted the blue cube …*. In each case it gets a mark that needs
+    what it does not have: `{excluded}` a rule that excludes colors, and `{rank}` a list."""
     identity = identity_of(PAINT.replace(before, after))
     with pytest.raises(InvalidValueError, match=f"^words.toml, scenario 'paint', lacks {mark}"):
         instruct(EPISODE, "direct", wordings=identity)
 
 
 def test_a_competing_remark_with_a_mark_that_has_no_value_is_refused():
-    """`{list}` needs a list."""
+    """PAINT has one scenario, *We painted the blue cube …*. Its competing remark, about a color
+    that is not wanted, gets the mark `{list}`, which needs a list."""
     identity = identity_of(PAINT.replace("{rival color} one", "{rival color} one {list}"))
     lacking = "^words.toml, scenario 'paint', lacks a competing remark with"
     with pytest.raises(InvalidValueError, match=lacking):
@@ -861,7 +892,8 @@ def test_a_competing_remark_with_a_mark_that_has_no_value_is_refused():
 
 
 def test_a_scenario_that_lists_values_of_another_task_fits_no_episode():
-    """PickXtimes has no visits; the file also serves StopCube, which has."""
+    """PAINT has one scenario, *We painted the blue cube …*. Here its file also serves StopCube, and
+    it lists visits, which only StopCube has; so it does not fit an episode of PickXtimes."""
     text = PAINT.replace('"PickXtimes"', '"PickXtimes", "StopCube"')
     options = InstructionOptions("direct", wordings=identity_of(f'{text}list = "visit"\n'))
 
@@ -884,7 +916,8 @@ texts_of_pieces = st.lists(st.one_of(pieces_of_files, st.text(max_size=3)), max_
 
 @given(pieces=texts_of_pieces)
 def test_any_text_is_read_as_a_wording_file_or_refused(pieces):
-    """Pieces of real files in random order: no error but the refusal may come out."""
+    """Up to 40 pieces of real files, and of strange characters, in random order: no error but the
+    refusal may come out."""
     with contextlib.suppress(InvalidValueError):
         parse_wordings(HEAD + "".join(pieces), "words.toml")
 
