@@ -4,6 +4,7 @@ An open file has an identity, ``hand@1a2b3c4d``: its name and a digest of what i
 """
 
 import contextlib
+import itertools
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -94,13 +95,6 @@ def episode_with(task, **slots):
         if slots.items() <= episode.goal.as_mapping().items():
             return episode
     raise LookupError(slots)
-
-
-def options_of(episode):
-    """Yield options for every setting and form that can express an episode in our words."""
-    for setting in expressible(episode):
-        for form in FORMS:
-            yield InstructionOptions(setting, form)
 
 
 def test_a_sentence_of_a_user_s_file_is_said_in_the_explicit_setting_only():
@@ -357,32 +351,34 @@ all = ["Juggle {color} {repeats}."]
 """
 
 
-def show_words(file, setting):
-    """Return what `roboirg show` prints of the words of PickXtimes/test/3 in a user's file."""
-    words = ["show", "PickXtimes", "3", "--words", "--settings", setting, "--wordings", str(file)]
+def shown_words(file, split, index):
+    """Return what `roboirg show` prints of the words of an episode of PickXtimes in all settings,
+    with those of a user's file."""
+    episode = ["PickXtimes", str(index), "--split", split]
+    words = ["show", *episode, "--words", "--wordings", str(file)]
     return CliRunner().invoke(cli.app, words).output
 
 
 def test_words_outside_our_table_have_an_exact_length_with_a_tokenizer(tmp_path):
-    """The file's command is *Juggle the blue cube four times*. *Juggle* is in no table of token
-    counts, so the tokenizer counts it: 11 tokens, in the check of the file and where the words of
-    an episode are shown."""
+    """JUGGLE, a user's file, has the command *Juggle the blue cube four times*. *Juggle* is in no
+    table of token counts, so the tokenizer counts it: 11 tokens, in the check of the file and where
+    the words of an episode are shown."""
     checked = run_check(JUGGLE, tmp_path, "--seeds", "0")
 
     assert "\n  11 of 64 tokens; states 15 goals." in checked.output
-    assert "explicit (11 tokens)" in show_words(tmp_path / "mine.toml", "explicit")
+    assert "explicit (11 tokens)" in shown_words(tmp_path / "mine.toml", "test", 3)
 
 
 def test_words_outside_our_table_have_an_upper_bound_without_a_tokenizer(
     tmp_path, without_tokenizer
 ):
-    """The file's command is *Juggle the blue cube four times*. *Juggle* is in no table of token
-    counts, so without a tokenizer only an upper bound is known, the same in the check of the file
-    and where the words of an episode are shown."""
+    """JUGGLE, a user's file, has the command *Juggle the blue cube four times*. *Juggle* is in no
+    table of token counts, so without a tokenizer only an upper bound is known, the same in the
+    check of the file and where the words of an episode are shown."""
     checked = run_check(JUGGLE, tmp_path, "--seeds", "0")
 
     (bound,) = re.findall(r"\n  (at most \d+) of 64 tokens; states 15 goals\.", checked.output)
-    assert f"explicit ({bound} tokens)" in show_words(tmp_path / "mine.toml", "explicit")
+    assert f"explicit ({bound} tokens)" in shown_words(tmp_path / "mine.toml", "test", 3)
 
 
 def test_the_check_reports_scenes_that_no_scenario_of_the_file_fits(tmp_path):
@@ -399,13 +395,11 @@ def test_the_check_reports_scenes_that_no_scenario_of_the_file_fits(tmp_path):
 
 def test_the_words_of_a_scene_that_no_scenario_of_the_file_fits_say_why(tmp_path):
     """DUSTY has one scenario, *It's dusty* with words for where the cube is, such as *on the left*.
-    In PickXtimes/train/2 the cube has none. This command is the one that the check of the file
+    In PickXtimes/train/2 the cube has none. The command is the one that the check of the file
     names."""
-    file = tmp_path / "mine.toml"
-    file.write_text(DUSTY)
-    words = ["show", "PickXtimes", "2", "--split", "train", "--words", "--wordings", str(file)]
+    (tmp_path / "mine.toml").write_text(DUSTY)
 
-    shown = CliRunner().invoke(cli.app, words).output
+    shown = shown_words(tmp_path / "mine.toml", "train", 2)
 
     assert "spatial cannot express the episode: " in shown
     assert "mine.toml has no spatial scenario for it in the pool train: nothing has the pl" in shown
@@ -446,28 +440,16 @@ def test_a_user_s_spatial_scenario_replaces_ours_in_the_spatial_setting(pool):
 @each_pool
 def test_a_user_s_spatial_scenario_leaves_the_other_settings_alone(pool):
     """DUSTY, a user's file, has one scenario of the setting *spatial* for PickXtimes, and nothing
-    else. In all other settings and both forms, which `options_of` lists, twelve episodes must be
-    said in the same words as without the file."""
+    else. In twelve episodes, each other setting that can be said with or without the file must be
+    said both with it and without it, in both forms and in the same words."""
     identity = identity_of(DUSTY)
     for index in range(12):
         episode = get_episode("PickXtimes", pool, index)
-        for options in options_of(episode):
-            if options.setting != "spatial":
-                ours = instruct_with(episode, options)
-                said = instruct_with(episode, replace(options, wordings=identity))
-                assert (said.turns, said.mentions) == (ours.turns, ours.mentions), options
-
-
-@each_pool
-def test_a_user_s_spatial_scenario_lets_episodes_be_said_in_the_same_other_settings(pool):
-    """DUSTY, a user's file, has one scenario of the setting *spatial* for PickXtimes. In twelve
-    episodes it changes nothing about which other settings can express them."""
-    identity = identity_of(DUSTY)
-    for index in range(12):
-        episode = get_episode("PickXtimes", pool, index)
-        with_file = {*expressible(episode, wordings=identity)}
-
-        assert with_file - {"spatial"} == {*expressible(episode)} - {"spatial"}, index
+        settings = {*expressible(episode), *expressible(episode, wordings=identity)}
+        for setting, form in itertools.product(settings - {"spatial"}, FORMS):
+            ours = instruct(episode, setting, form)
+            said = instruct(episode, setting, form, wordings=identity)
+            assert (said.turns, said.mentions) == (ours.turns, ours.mentions), (index, setting)
 
 
 def test_a_scenario_for_training_is_not_said_in_test_episodes():
