@@ -80,12 +80,16 @@ def test_every_episode_is_there_but_those_that_robomme_cannot_build():
 
 
 def test_tasks_of_the_real_robot_have_no_published_episodes():
+    """RoboMME published episodes of its own tasks only; PutInBox is a task of the study with a real
+    robot."""
     assert published_episode("PutInBox", "test", 0) is None
 
 
 @pytest.mark.parametrize("task", every_task())
 def test_scenes_survive_the_codec(task):
-    """Through JSON, and the motions are of the same classes."""
+    """Scene and goal of four episodes are encoded, written as JSON, read and decoded. They must be
+    equal to what they were, up to the seven decimals that are written; the motions, of which
+    several classes have the same fields, must be of the same classes."""
     for index in range(4):
         episode = get_episode(task, "test", index)
 
@@ -115,6 +119,7 @@ def test_objects_survive_to_the_seventh_decimal(x, yaw, radius):
 
 
 def test_what_is_no_part_of_a_scene_is_not_written():
+    """A scene has objects, motions and facts; an array of numbers is none of these."""
     with pytest.raises(TypeError, match="no part of a scene"):
         encode(np.zeros(3))
 
@@ -277,8 +282,9 @@ def test_a_recording_replays_to_robomme_s_poses(task, converter):
 
 
 def test_exported_episodes_are_as_stored(tmp_path, snapshot):
-    """The three tasks have hidden cubes and swaps, acts of the video, and yaws and radii. The
-    stored text was looked at once; a change of it is a change of the format."""
+    """Test episode 3 of three tasks, which have hidden cubes and swaps, acts of
+    the video, and yaws and radii between them. The stored text was looked at once; a difference is
+    a change of the format that readers of exported episodes depend on."""
     path = tmp_path / "episodes.jsonl"
     tasks = ("VideoUnmaskSwap", "VideoPlaceOrder", "StopCube")
 
@@ -289,7 +295,8 @@ def test_exported_episodes_are_as_stored(tmp_path, snapshot):
 
 
 def test_the_command_exports_a_split(tmp_path):
-    """One task and the suite *real*, which has two: 50 test episodes of each, a line for each."""
+    """The suite *real* has the two tasks PutInBox and PickByCount. With StopCube these are three
+    tasks of 50 test episodes, and the file has a line for each episode."""
     path = tmp_path / "episodes.jsonl"
 
     said = roboirg("export", "episodes", "--tasks", "StopCube,real", "--out", path)

@@ -72,8 +72,9 @@ def test_failures_with_a_known_cause_get_its_name_in_most_cases(name):
 
 @pytest.mark.parametrize("half", [half for half, path in confusion.HALVES.items() if path.exists()])
 def test_the_documentation_has_the_current_tables_of_attribution(half):
-    """A table counts made causes against found ones, from stored facts of failures, in halves such
-    as *development*. To put the current table into the page must leave the page as it is."""
+    """docs/attribution.md has a table for each half of the stored failures of known cause, such as
+    *development*: how often which kind was made, and found. To put the table of today's rules in
+    its place must leave the page as it is."""
     page = confusion.DOCUMENT.read_text()
 
     table = confusion.table(pairs_of(half))
@@ -243,6 +244,13 @@ def test_a_round_whose_grasp_failed_unseen_in_the_middle_is_not_a_wrong_count():
     assert failure_of(play) == "missed_grasp"
 
 
+def turn_after_one_of_two_placements():
+    """Return an episode in which the blue cube is to be placed twice, after the first time."""
+    play = policy_turn("PickXtimes", color="blue", repeats=2)
+    pick, place, *_ = play.episode.stages
+    return play.perform((pick, place))
+
+
 @pytest.mark.parametrize(
     ("was_above", "failure"),
     [
@@ -258,9 +266,7 @@ def test_a_hand_that_comes_empty_to_the_target_has_missed_the_cube_that_it_was_a
     """The blue cube is to be placed twice, and is placed once. Then the hand is above the given
     cubes for 50 steps (40 count as a visit), opens at the target without holding anything
     ("emptied"), and presses the button, which ends the episode."""
-    play = policy_turn("PickXtimes", color="blue", repeats=2)
-    pick, place, *_ = play.episode.stages
-    play.perform((pick, place))
+    play = turn_after_one_of_two_placements()
 
     play.attempt(*(Fact("above", "robot", cube) for cube in was_above), steps=50)
     play.attempt(Fact("emptied", "robot", "target")).press()
@@ -272,9 +278,7 @@ def test_an_empty_hand_that_opens_at_the_button_has_missed_no_cube():
     """The blue cube is to be placed twice, and is placed once. The hand was above it again, but
     opens, near the target, only when it is over the button ("hovering") to press it: it did not
     want to put anything down there, so it is the count that is wrong."""
-    play = policy_turn("PickXtimes", color="blue", repeats=2)
-    pick, place, *_ = play.episode.stages
-    play.perform((pick, place))
+    play = turn_after_one_of_two_placements()
 
     play.attempt(Fact("above", "robot", "cube_blue"), steps=50).hover()
     play.attempt(Fact("emptied", "robot", "target")).press()
@@ -456,7 +460,8 @@ def test_an_episode_that_ends_during_its_video_counts_as_no_attempt():
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize(("split", "index"), [("test", 0), ("test", 2), ("test", 3), ("train", 1)])
 def test_a_success_has_no_attribution(task, split, index):
-    """Episodes 0 and 1 of a task are easy, 2 is medium, and 3 is hard."""
+    """All stages of an episode are done right. Episodes 0 and 1 of a task are easy, 2 is medium,
+    and 3 is hard."""
     episode = get_episode(task, split, index)
 
     play = Staged(episode).perform(episode.stages)
@@ -471,7 +476,9 @@ episodes = st.builds(get_episode, st.sampled_from(TASKS), st.just("test"), st.in
 @given(episodes, st.floats(0, 1, exclude_max=True))
 @settings(max_examples=80)
 def test_stopping_a_correct_run_at_any_time_is_never_a_grounding_failure(episode, share):
-    """Grounding failures are to act on something that the words do not mean."""
+    """Every stage of any episode is done right, but time is up after a share of the steps that this
+    takes, so only the events until then count. A grounding failure is to act on something that the
+    words do not mean, which never happened; whatever is found, its step is not after the end."""
     play = Staged(episode).perform(episode.stages)
     end = play.policy_start + int(share * (play.step - play.policy_start))
     events = [event for event in play.events if event.step <= end]

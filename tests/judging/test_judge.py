@@ -123,7 +123,9 @@ facts_of_a_step = st.frozensets(st.sampled_from([PICKED, PLACED, PRESSED, STILL]
 
 @given(st.lists(facts_of_a_step, max_size=20))
 def test_the_facts_of_every_step_can_be_rebuilt_from_the_events(history):
-    """An event is a change: a fact begins or ceases to hold."""
+    """`history` has the facts of up to 20 steps, any of four. `changes` returns the events of a
+    step: which facts have begun to hold since the step before, and which have ceased. To add and
+    remove these, from no facts on, must give the facts of each step."""
     before = frozenset()
     rebuilt = set()
     for step, now in enumerate(history):

@@ -141,7 +141,8 @@ def test_putting_down_other_containers_does_not_complete_putting_down_the_first(
 
 @each_button_task
 def test_before_the_button_is_pressed_any_container_may_be_lifted(task):
-    """All containers are lifted before each press, of one button or two. Afterwards the two that
+    """The task is to press its button, or its two buttons, and then to lift two containers in
+    order. All containers are lifted before each press, which is allowed. Afterwards the two that
     are meant are lifted in order, which is a success."""
     episode = episode_with_picks(task, 2)
     up = [lifted(name) for name in (episode.first, episode.second, *episode.others)]

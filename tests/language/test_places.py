@@ -43,7 +43,9 @@ one_to_seven_places = st.lists(
 
 
 def test_an_episode_has_the_places_of_the_frame_whatever_was_said_of_it_before():
-    """The robot's left is on the right of the picture."""
+    """The frame is whose left and right is meant. The camera faces the robot, so the robot's left
+    is on the right of the picture. Both frames are asked for twice in turn: neither may get what
+    was made for the other."""
     episode = get_episode("PickXtimes", "test", 0)
     for _ in range(2):
         of_robot = instruct(episode, "spatial", frame="robot").metadata["landmarks"]
@@ -304,7 +306,9 @@ UNUSUAL_EPISODES = pytest.mark.parametrize(
 
 @UNUSUAL_EPISODES
 def test_an_object_with_unusual_words_only_is_refused_by_the_grounded_setting(task, index, words):
-    """The setting says only words that people would say."""
+    """For the object of the goal only words are left that no one would say, such as *third closest
+    to you*. The setting *grounded* says only words that people would say, so it refuses the
+    episode."""
     episode = get_episode(task, "test", index)
     refusal = find_refusal(episode, InstructionOptions("grounded"))
     assert refusal == "nothing to see in this scene singles out a slot's value"
@@ -314,7 +318,8 @@ def test_an_object_with_unusual_words_only_is_refused_by_the_grounded_setting(ta
 def test_an_object_with_unusual_words_only_is_still_named_by_the_spatial_setting(
     task, index, words
 ):
-    """It has to name a place, so it takes unusual words where there are no others."""
+    """For the object of the goal only words are left that no one would say. The setting *spatial*
+    has to name a place, so it takes them, and the metadata say that they are unusual."""
     said = instruct(get_episode(task, "test", index), "spatial")
 
     assert words in said.text
@@ -339,6 +344,8 @@ def test_everyday_words_for_a_row_of_five(name, phrase):
 
 
 def test_the_camera_sees_the_robot_s_leftmost_thing_on_the_right_of_the_picture():
+    """ROW_OF_FIVE has five containers in a row, container_0 on the robot's right, container_4 on
+    its left; the camera faces the robot."""
     phrases = phrases_after_a_noun(ROW_OF_FIVE, "container_4", frame="camera")
     assert phrases == {"all the way on the right of the picture"}
 
@@ -392,13 +399,15 @@ def test_a_cube_alone_on_the_table_is_not_described_by_comparison(place):
 
 @pytest.mark.parametrize("phrase", ["nearest to the red cube", "next to the red cube"])
 def test_of_two_cubes_one_is_not_said_to_be_near_the_other(phrase):
-    """Where there is no third cube, it says nothing."""
+    """The red and the green cube are all there is. Where there is no third cube, that one is near
+    the other says nothing."""
     scene = cubes((0.0, 0.1), (0.0, 0.0))
     assert phrase not in phrases_after_a_noun(scene, "cube_green", "cube")
 
 
 def test_places_do_not_depend_on_cubes_that_arrive_later():
-    """`Away` keeps the blue cube off the table for the first 100 steps."""
+    """The motion `Away` keeps the blue cube off the table for the first 100 steps. So the scene has
+    the words of one with the red and the green cube alone."""
     two = cubes((0.0, 0.15), (0.0, 0.0))
     three = cubes((0.0, 0.15), (0.0, 0.0), (0.0, -0.15))
     late = replace(three, motions=(Away("cube_blue", 0, 100),))
@@ -408,10 +417,9 @@ def test_places_do_not_depend_on_cubes_that_arrive_later():
 
 @each_task_with_places
 def test_a_clue_leads_to_one_object(task):
-    """A clue is what can be seen of an object: *the cube in the middle*.
-
-    `setdefault` keeps the first object of the words; another one of the same words would fail.
-    """
+    """A clue describes an object by what can be seen: *the cube in the middle*. `setdefault` keeps
+    the first object that its words describe in a scene; another object with the same words
+    fails."""
     for scene in scenes_of(task):
         found = {}
         for thing, clue in thing_clues(scene, get_task(task)):
@@ -420,7 +428,9 @@ def test_a_clue_leads_to_one_object(task):
 
 @each_task_with_places
 def test_a_clue_never_leads_to_an_object_that_it_excludes(task):
-    """Of three cubes, neither the one *on the left* nor the one *next to the button*."""
+    """A clue describes an object by what can be seen. One of three cubes may be described by the
+    two others: neither the one *on the left* nor the one *next to the button*. `clue.aside` has
+    these words; none of them may select the object itself."""
     kind = get_task(task).things.pointed
     for scene in scenes_of(task):
         known = things_at(scene, kind, "robot")
