@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from cause_making import CLOSED, Hands
 from selection import slow_but
 
 import roboirg
+from roboirg.core.conditions import Fact
 from roboirg.core.episode import Goal
 from roboirg.judging import attribute_failure
 from roboirg.language import instruct, mirrored_objects
@@ -125,3 +127,16 @@ def test_a_pick_on_the_opposite_side_is_just_a_wrong_object_if_no_mirrored_one_i
     """The words mean the green cube on the right; the fixture is a play in which the red one on the
     left was picked. Without `mirrored` nobody knows that the red one is its mirror image."""
     assert attribution_of(*pick_of_the_red_cube).failure == "wrong_object"
+
+
+def test_a_closed_hand_that_shoves_a_cube_along_the_table_pushes_it():
+    """The green cube, 4 cm wide, is meant. The hand comes down 10 cm in front of its middle and
+    goes 4 cm past it, so the cube moves by several centimeters without being held."""
+    hands = Hands(get_episode("PickXtimes", "test", 0), 1000)
+    x, y, _ = hands.at("cube_green")
+
+    hands.grip(CLOSED)
+    for point in [(x - 0.1, y, 0.2), (x - 0.1, y, 0.03), (x + 0.04, y, 0.03)]:
+        hands.go(point)
+
+    assert Fact("pushed", "cube_green") in {event.fact for event in hands.env.attempts}

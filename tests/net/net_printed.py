@@ -46,7 +46,7 @@ FILES: dict[str, tuple[str, ...]] = {
     "episodes.jsonl": ("export", "episodes", "--split", "val", "--out", "episodes.jsonl"),
     "instructions.jsonl": (
         *("export", "instructions", "--split", "val", "--out", "instructions.jsonl"),
-        *("--settings", "explicit,direct,reasoning,contextual,spatial,direct-rival,grounded"),
+        *("--settings", "all,direct-rival,grounded"),
     ),
 }
 """Commands whose file is kept as a hash."""

@@ -236,6 +236,14 @@ _TRAITS: dict[FactKind, FactTraits] = {
         past="closed its fingers next to {subject}",
         state="missed",
     ),
+    "pushed": FactTraits(
+        role=FactRole.ATTEMPT,
+        subjects=_GRASPABLE,
+        holds_while="it is not held and has moved by more than 0.025 (xy) since the hand came to "
+        "it: within 0.04 (xy) of its outline and no more than 0.02 above its origin",
+        past="pushed {subject}",
+        state="pushed",
+    ),
     "emptied": FactTraits(
         role=FactRole.ATTEMPT,
         subjects=("robot",),

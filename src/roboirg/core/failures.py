@@ -162,8 +162,8 @@ FAILURES: Mapping[FailureName, FailureMeaning] = {
     "ambiguous_act": FailureMeaning(
         "undecided",
         "did what can be a slip or a choice",
-        "fingers that close between the right cube and another one; a press more than half a pass "
-        "off the right visit",
+        "fingers that close between the right cube and another one; a press half to two thirds "
+        "of a pass off the right visit",
     ),
     "no_answer": FailureMeaning(
         "undecided",

@@ -86,6 +86,13 @@ HAND_LOWERED = 0.08
 """What is held below this height is being put down."""
 HAND_LOW = 0.06
 """Closed fingers press below this height."""
+HAND_AT_SIDE = 0.04
+"""How far from the outline of an object, in the plane, fingers can be that touch it."""
+HAND_AT_TOP = 0.02
+"""How far above the origin of an object fingers can be that touch it."""
+PUSHED = 0.025
+"""How far a hand that does not hold an object moves it, in the plane, to have pushed it. Closing
+fingers move what they grasp by less."""
 FINGERS_SHUT = 0.004
 """Largest position of a finger that has closed on nothing."""
 FINGERS_OPEN = 0.03

@@ -17,7 +17,6 @@ from roboirg.judging.judge import describe_act, describe_expected, describe_obje
 from roboirg.judging.meant_objects import meant_objects
 from roboirg.judging.slips import (
     MISSES,
-    SETTLED_STEPS,
     Slip,
     drop_before,
     find_slips,
@@ -28,9 +27,9 @@ STOPPED_STEPS = 150
 """Control steps for which the hand must linger at the end, seven and a half seconds and the three
 after which it lingers, to count as stopped. A hand five times slower than the oracle's does not."""
 
-_SOON_STEPS = SETTLED_STEPS // 4
-"""Control steps within which an object that moves by itself must come near its place, after a press
-that may have been meant for that moment."""
+_OTHER_VISIT = 2 / 3
+"""Passes off the right moment from which on a press was meant for another visit: the nearest of
+these is then at most half as far off as the right one."""
 _APPROACH_STEPS = 60
 """Control steps for which the hand is above an object to which it went, and not past it."""
 _PAUSE_FACTOR = 1.5
@@ -256,22 +255,20 @@ def judge_moment(replay: EpisodeReplay, step: int) -> FailureName | None:
 
     An object passes its place several times, and the press is to stop it there. The right step is
     that of the oracle's press, the middle of a pass. Within half a pass of it, the press is
-    ``mistimed``; when the object is at its place on another pass, ``wrong_time``; and elsewhere
-    ``ambiguous_act``. Steps count since the world began.
+    ``mistimed``; from `_OTHER_VISIT` on it was meant for another pass, ``wrong_time``; in between
+    it is an ``ambiguous_act``. Steps count since the world began.
     """
     press = replay.stages[-1].primitive
     moving_objects = replay.episode.scene.motions_of(Shuttle)
     if not moving_objects or press.kind != "press_below":
         return None
     (moving_object,) = moving_objects
+    steps_off = abs(step - press.steps)
     # The pass is judged at the end of its last step.
-    if abs(step - press.steps) <= moving_object.interval / 2 + 1:
+    if steps_off <= moving_object.interval / 2 + 1:
         return "mistimed"
-    for facts in replay.facts[step : step + _SOON_STEPS]:
-        for fact in facts:
-            if fact.subject == moving_object.subject and fact.place is not None:
-                return "wrong_time"
-    return "ambiguous_act"
+    is_other_visit = steps_off >= moving_object.interval * _OTHER_VISIT
+    return "wrong_time" if is_other_visit else "ambiguous_act"
 
 
 def _describe_act(

@@ -114,9 +114,10 @@ def is_noticed(replay: EpisodeReplay, slip: Slip) -> bool:
     """Return whether the hands, after they missed something, next tried the same again.
 
     Missed the red cube, then took it: noticed. Missed it, then opened an empty hand at the bin,
-    pressed, or took another object: not noticed. If it took the cube only after `RETRY_STEPS`, it
-    did the rest of the round before. The loss of an object never counts as noticed: where one is
-    handled several times, a new pick may be the next one that is due.
+    pressed, or took another object: not noticed. If it took the cube, or tried to again and never
+    did, only after `RETRY_STEPS`, it did the rest of the round before. The loss of an object never
+    counts as noticed: where one is handled several times, a new pick may be the next one that is
+    due.
     """
     if slip.failure not in MISSES:
         return False
@@ -128,7 +129,7 @@ def is_noticed(replay: EpisodeReplay, slip: Slip) -> bool:
     for lift in replay.started(FactRole.RAISE, after=slip.step):
         if lift.subject in slip.subjects:
             return lift.start - slip.step <= RETRY_STEPS
-    return True
+    return next_act.step - slip.step <= RETRY_STEPS
 
 
 class _Act(NamedTuple):
@@ -154,15 +155,17 @@ def _acts_and_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> Iterator[_A
 def _missed_grasps(replay: EpisodeReplay) -> Iterator[Slip]:
     """Yield the failed tries to take something: it was not lifted.
 
-    The fingers closed on nothing next to it, they held it for a while without lifting it, or they
-    were at what is expected and did not close.
+    The fingers closed on nothing next to it, they held it for a while without lifting it, they
+    were at what is expected and did not close, or they pushed it.
     """
     missed = list(replay.tried("clutched"))
     for hold in _holds_let_go(replay):
         if not _lifts_during(replay, hold):
             missed.append(hold)
     closed = [*missed, *replay.started(FactRole.GRIP, after=0)]
-    missed += _idle_touches(replay, [interval.start for interval in closed])
+    touches = list(_idle_touches(replay, [interval.start for interval in closed]))
+    pushes = _pushes(replay, [interval.start for interval in (*closed, *touches)])
+    missed += [*touches, *pushes]
     # Several objects that were missed at the same step are one try: it is not clear at which.
     names_by_step: dict[int, set[str]] = {}
     for interval in missed:
@@ -184,6 +187,30 @@ def _idle_touches(replay: EpisodeReplay, closing_steps: Sequence[int]) -> Iterat
         is_expected = any(fact.subject == touch.subject for fact in expected)
         if is_expected and not has_closed:
             yield touch
+
+
+def _pushes(replay: EpisodeReplay, other_tries: Sequence[int]) -> Iterator[FactInterval]:
+    """Yield when the hand pushed an object to which it went, instead of taking it.
+
+    A push within `SETTLED_STEPS` of another try, such as fingers that close, belongs to that one.
+    `other_tries` are the steps of all of them.
+    """
+    for push in replay.tried("pushed"):
+        first = push.start - SETTLED_STEPS
+        last = replay.end_of(push) + SETTLED_STEPS
+        is_part_of_try = any(first <= step <= last for step in other_tries)
+        if not is_part_of_try and _is_in_visit(replay, push):
+            yield push
+
+
+def _is_in_visit(replay: EpisodeReplay, push: FactInterval) -> bool:
+    """Return whether the hand went to what it pushed: it stays above it for `VISIT_STEPS`."""
+    for above in replay.tried("above"):
+        end = replay.end_of(above)
+        is_meanwhile = above.start <= push.start <= end
+        if above.fact.place == push.subject and is_meanwhile:
+            return end - above.start >= VISIT_STEPS
+    return False
 
 
 def _holds_let_go(replay: EpisodeReplay) -> Iterator[FactInterval]:

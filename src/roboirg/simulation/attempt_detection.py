@@ -20,11 +20,14 @@ from roboirg.core.object_sizes import (
     BESIDE,
     FINGERS_OPEN,
     FINGERS_SHUT,
+    HAND_AT_SIDE,
+    HAND_AT_TOP,
     HAND_HIGH,
     HAND_LOW,
     HAND_LOWERED,
     HAND_RAISED,
     LINGER_STEPS,
+    PUSHED,
     UNCLEAR,
 )
 from roboirg.simulation.bodies import Body
@@ -66,6 +69,8 @@ class AttemptDetector:
         # The gaps to the objects under the hand when the fingers were open last: closing fingers
         # can push away what they are meant to grasp.
         self._open_gaps: dict[str, float] = {}
+        # Where the objects were to which the hand came, while it stays at them without a hold.
+        self._came_to: dict[str, Point] = {}
         self._lingers_at = Point(0.0, 0.0, 0.0)
         self._lingering_steps = 0
 
@@ -98,6 +103,7 @@ class AttemptDetector:
             if is_shut and not peak:
                 found += self._missed_objects()
             found += self._hand_at_objects(tool)
+            found += self._pushed_objects(tool)
             if peak > HAND_RAISED and is_shut:
                 found += self._missed_buttons(tool, facts)
             if peak > HAND_RAISED and not is_shut:
@@ -137,6 +143,19 @@ class AttemptDetector:
             if is_held:
                 for place in self._next_to(position, "target", "bin", "box"):
                     yield Fact("beside", item.name, place)
+
+    def _pushed_objects(self, tool: Point) -> Iterator[Fact]:
+        """Yield what the hand has moved, without a hold on it, since it came to it."""
+        came_to = {}
+        for item, position, gap, is_held in self.near:
+            is_at_hand = gap <= HAND_AT_SIDE and tool.z - position.z <= HAND_AT_TOP
+            if is_held or not is_at_hand:
+                continue
+            first_position = self._came_to.get(item.name, position)
+            came_to[item.name] = first_position
+            if distance_in_plane(first_position, position) > PUSHED:
+                yield Fact("pushed", item.name)
+        self._came_to = came_to
 
     def _emptied_places(self, tool: Point) -> Iterator[Fact]:
         """Yield where fingers that were closed on nothing have opened, as if to let go."""
