@@ -287,11 +287,8 @@ def test_an_empty_hand_that_opens_at_the_button_has_missed_no_cube():
 
 
 def push(play, name, steps):
-    """The hand is above an object for some steps, in which it pushes it, and goes away."""
-    above = Fact("above", "robot", name)
-    play.tried.add(above)
-    play.attempt(Fact("pushed", name)).wait(steps).tried.remove(above)
-    return play.wait(60)
+    """The hand is above an object and pushes it for some steps, and goes away."""
+    return play.attempt(Fact("above", "robot", name), Fact("pushed", name), steps=steps).wait(60)
 
 
 @pytest.mark.parametrize(
