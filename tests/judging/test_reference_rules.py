@@ -76,15 +76,17 @@ def test_a_repick_goes_on_while_other_cubes_lie():
 
 
 def test_a_repick_goes_on_while_the_cube_is_in_the_air():
-    """There it is neither picked nor lying, as when it is held low."""
+    """The cube is to be picked up once more, put down, and the button pressed. Each list holds the
+    facts of one step. In the air, such as when it is held low, the cube is neither picked nor
+    lying."""
     episode, picked, lying = repick_episode_and_facts(1)
 
     assert status_after(episode, [picked], [], [], [picked], [lying], [PRESSED]) is Status.SUCCESS
 
 
 def test_repick_counts_a_cube_that_was_let_go_as_put_down_wherever_it_lies():
-    """The cube is to be picked up twice, then the button pressed. It only has to lie somewhere; the
-    next lift is the second one."""
+    """The cube is to be picked up twice, then the button pressed. Each list holds the facts of one
+    step. The cube only has to lie somewhere; the next pick is the second one."""
     episode, picked, lying = repick_episode_and_facts(2)
     picks = [[picked], [lying], [picked], [lying]]
 
@@ -154,8 +156,9 @@ def test_the_time_in_which_a_press_is_ignored_starts_after_the_video(elapsed, st
 
 
 def test_a_press_before_the_repick_does_not_replace_the_one_after_it():
-    """The task is to pick a cube up once more and to
-    press the button; early presses are ignored."""
+    """The task is to pick a cube up once more and then to press the button. Each list holds the
+    facts of one step. A press at the first step is too early to fail, but it does not count,
+    either."""
     episode, picked, lying = repick_episode_and_facts(1)
 
     assert status_after(episode, [PRESSED], [picked], [lying]) is Status.ONGOING
@@ -206,9 +209,9 @@ def wrong_placements(episode, number):
 def test_a_place_task_needs_the_right_cube_picked_and_then_placed_on_the_right_disc(
     episode, number
 ):
-    """Each list holds the facts of one step; discs are targets on the table. `number` says which
-    placement of the video the goal refers to. The pick or the placement alone leaves the episode
-    undecided."""
+    """The goal is to put the green cube on the disc of placement `number` of the video; discs are
+    targets on the table. Each list holds the facts of one step. Picked and then placed there it is
+    a success; the pick or the placement alone leaves the episode undecided."""
     placed = right_placement(episode, number)
 
     assert status_after(episode, [GREEN_PICKED], [], [placed, GREEN_LYING]) is Status.SUCCESS
@@ -218,8 +221,9 @@ def test_a_place_task_needs_the_right_cube_picked_and_then_placed_on_the_right_d
 
 @every_place_goal
 def test_placing_the_right_cube_on_a_wrong_disc_fails(episode, number):
-    """`number` says which placement of the video the goal refers to; its disc is the right one. On
-    every other disc the green cube fails, also if it is on the right one at the same time."""
+    """The goal is to put the green cube on the disc of placement `number` of the video, its
+    `right_placement`. Every other disc fails, also if the cube is on the right one at the same
+    time."""
     placed = right_placement(episode, number)
     for wrong in wrong_placements(episode, number):
         assert status_after(episode, [GREEN_PICKED], [], [wrong]) is Status.FAILURE, wrong
@@ -228,8 +232,9 @@ def test_placing_the_right_cube_on_a_wrong_disc_fails(episode, number):
 
 @every_place_goal
 def test_before_it_is_picked_up_the_right_cube_may_be_on_any_disc(episode, number):
-    """The green cube first stands on a wrong disc, as the video may have left it; then it is picked
-    up and placed on the right one, which is a success."""
+    """The goal is to put the green cube on the disc of placement `number` of the video. It first
+    stands on another disc, as the video may have left it; then it is picked up and placed on the
+    right one, which is a success."""
     placed = right_placement(episode, number)
     for wrong in wrong_placements(episode, number):
         assert status_after(episode, [wrong], [GREEN_PICKED], [placed]) is Status.SUCCESS, wrong
@@ -238,8 +243,9 @@ def test_before_it_is_picked_up_the_right_cube_may_be_on_any_disc(episode, numbe
 @every_place_goal
 @pytest.mark.parametrize("other", ["cube_red", "cube_blue"])
 def test_picking_another_cube_fails_unless_the_right_one_was_picked_before(episode, number, other):
-    """The green cube is meant. Another one fails before it, and also together with it in the next
-    step; once the green cube was picked, the next stage is to place it, which forbids no picks."""
+    """The goal is to put the green cube on the disc of placement `number` of the video. A pick of
+    another cube fails before that of the green one, and also together with it at the next step;
+    once the green cube was picked, the next stage is to place it, which forbids no picks."""
     placed = right_placement(episode, number)
     wrong = Fact("picked", other)
 
@@ -250,8 +256,8 @@ def test_picking_another_cube_fails_unless_the_right_one_was_picked_before(episo
 
 @every_place_goal
 def test_other_cubes_may_be_placed_anywhere(episode, number):
-    """The green cube is meant. A red one stands on a disc all the time, which matters neither
-    before the pick nor at the placement."""
+    """The goal is to put the green cube on the disc of placement `number` of the video. A red one
+    stands on a disc all the time, which matters neither before the pick nor at the placement."""
     placed = right_placement(episode, number)
     other = Fact("placed", "cube_red", "target_3")
 

@@ -31,17 +31,16 @@ def instructions_with_a_rival(task, split="test", count=12):
 
 
 def test_the_row_of_an_instruction_has_its_rival_and_says_none_without_one():
-    """The first instruction of PickXtimes with two values on equal terms, of which one, the rival,
-    is not meant. Its row for export has four columns about the rival, as its metadata have them.
-    The explicit instruction of the same episode has no rival, and "none" in all four."""
-    episode, said = next(instructions_with_a_rival("PickXtimes"))
+    """*Nora says once is enough, and my aunt says three times. Nora isn't in charge …*: three is
+    right, and one is its rival, the first of the two, which the command excludes. The row for
+    export has this in four columns; that of the explicit instruction, without a rival, "none"."""
+    episode = get_episode("PickXtimes", "test", 0)
     columns = ("rival", "rival_slot", "rival_position", "rival_reference")
 
-    of_rival = row(episode, said)
+    of_rival = row(episode, instruct(episode, "direct-rival"))
     of_explicit = row(episode, instruct(episode))
 
-    assert [of_rival[name] for name in columns] == [str(said.metadata[name]) for name in columns]
-    assert "none" not in [of_rival[name] for name in columns]
+    assert [of_rival[name] for name in columns] == ["1", "repeats", "first", "not_former"]
     assert [of_explicit[name] for name in columns] == ["none"] * 4
 
 
