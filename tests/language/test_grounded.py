@@ -46,7 +46,9 @@ def test_a_grounded_instruction_describes_the_cube_instead_of_naming_its_color()
 
 @each_task
 def test_every_grounded_instruction_hides_at_least_one_value(task):
-    """Otherwise it could be followed without looking."""
+    """`grounded_instructions` has what the setting *grounded* says of random episodes. It describes
+    what can be seen instead of naming a value of the goal; the metadata "touched" list the slots
+    that are hidden so. Without any, it could be followed without looking."""
     for _, said in grounded_instructions(task):
         assert said.metadata["touched"], said.text
         assert said.metadata["hidden_slots"] >= 1, said.text
@@ -54,28 +56,29 @@ def test_every_grounded_instruction_hides_at_least_one_value(task):
 
 @each_task
 def test_only_values_that_must_be_seen_are_replaced_by_pointers(task):
-    """A pointer is a word that refers back, such as *it*: a mention with the role "anaphor".
-
-    A pointer may also stand for one of several colors, or for a value that only leads to the goal,
-    the slot "reference".
-    """
+    """`grounded_instructions` has what the setting *grounded* says of random episodes. A pointer is
+    a word that refers back, such as *it*: a mention with the role "anaphor". It may stand for a
+    hidden slot (metadata "touched"), for one of several colors, or for a value that only leads to
+    the goal, the slot "reference"."""
     for _, said in grounded_instructions(task):
         pointed = {mention.slot for mention in said.mentions if mention.role == "anaphor"}
         assert pointed <= {*said.metadata["touched"], "colors", "reference"}, said.text
 
 
 def test_an_exported_grounded_instruction_lists_its_hidden_slots():
-    """In the column `touched`, separated by commas if there are several."""
+    """The goal is the blue cube, of which the setting *grounded* says *the cube nearest to the back
+    left corner*: its color is hidden. The column `touched` has hidden slots, separated by
+    commas."""
     episode = get_episode("PickXtimes", "test", 2)
     assert row(episode, instruct(episode, "grounded"))["touched"] == "color"
 
 
 @each_task
 def test_grounded_instructions_never_name_the_hidden_color(task):
-    """*The red cube on the left* would tell the color to a policy that does not look.
-
-    A goal with two colors is left out, since the words state one of them.
-    """
+    """`grounded_instructions` has what the setting *grounded* says of random episodes; the metadata
+    "touched" list the slots that are hidden. *The red cube on the left* would tell the color to a
+    policy that does not look. A goal with two colors is left out, since the words state one of
+    them."""
     for episode, said in grounded_instructions(task):
         if len(episode.goal.as_mapping().get("colors", ())) > 1:
             continue
@@ -144,13 +147,16 @@ def test_stopcube_has_no_grounded_setting():
 
 @pytest.mark.parametrize("task", ["PickXtimes", "SwingXtimes"])
 def test_the_color_is_hidden_only_in_scenes_with_several_colors(task):
-    """Easy scenes have one cube, so that its color is no choice."""
+    """`grounded_instructions` has what the setting *grounded* says of random episodes; the metadata
+    "touched" list the slots that are hidden. Easy scenes have one cube, so that its color is no
+    choice, and nothing could be hidden."""
     for episode, said in grounded_instructions(task):
         assert said.metadata["touched"] == ["color"]
         assert episode.difficulty != "easy"
 
 
 def test_grounded_videorepick_hides_the_number_of_repetitions():
-    """*As often as the cubes switched places*: the number is seen in the video."""
+    """*As often as the cubes switched places*: the setting *grounded* describes the number by what
+    is seen in the video; the metadata "touched" list the slots that are hidden."""
     for _, said in grounded_instructions("VideoRepick"):
         assert said.metadata["touched"] == ["repeats"]

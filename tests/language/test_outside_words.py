@@ -172,10 +172,9 @@ def package(tmp_path_factory):
 
 
 def test_the_setting_of_the_documentation_page_speaks_the_words_of_its_own_file(package):
-    """The page's file has the scenarios "new coat" for training and "loan" for tests.
-
-    An instruction names the digest of the words.
-    """
+    """`package` is an installed package with the code of docs/add-setting.md; the program runs in a
+    process that imports it. The page's file of words has the scenarios "new coat" for training and
+    "loan" for tests, for two tasks. An instruction names the digest of the words."""
     found = package.run("""
 for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
     said = instruct(get_episode(task, "test", 1), "colored", wordings=pool)
@@ -192,6 +191,9 @@ for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
 
 
 def test_the_setting_of_the_documentation_page_means_the_goal(package):
+    """`package` is an installed package with the code of docs/add-setting.md; the program runs in a
+    process that imports it, and notes whether what the setting *colored* says leaves exactly the
+    goal of the episode, in two tasks and both pools of words."""
     found = package.run("""
 for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
     episode = get_episode(task, "test", 1)
@@ -205,7 +207,9 @@ for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
 def test_the_setting_of_the_documentation_page_ends_with_the_explicit_command_when_resolved(
     package,
 ):
-    """The resolved form has the same introduction."""
+    """`package` is an installed package with the code of docs/add-setting.md; the program runs in a
+    process that imports it. The resolved form of the setting *colored* has the same introduction as
+    the implicit one, and then the command of the setting *explicit*."""
     (turns,) = package.run("""
 episode = get_episode("PickXtimes", "test", 1)
 resolved = instruct(episode, "colored", "resolved").turns
@@ -217,6 +221,9 @@ found.append([resolved, instruct(episode, "colored").turns, instruct(episode).te
 
 
 def test_the_words_of_the_setting_of_the_documentation_page_break_no_rule(package):
+    """`package` is an installed package with the code of docs/add-setting.md; the program runs in a
+    process that imports it. The checker for authors collects the rules that the page's words break
+    in every 20th scene."""
     found = package.run("""
 for task, words in setting_scenarios("colored").items():
     for report in check_scenarios(words, None, scenes_of(task, 0)[::20]):
@@ -248,8 +255,9 @@ for task, pool, setting in itertools.product(all_tasks(), POOLS, all_settings())
 
 
 def test_the_language_label_names_an_installed_setting_after_the_words_of_its_task(package):
-    """A label has the version, the words of the task, and those of a setting with a file of
-    its own."""
+    """`package` is an installed package with the setting *colored*. A label has the version of the
+    language, the words of the task, and those of a setting with a file of its own, each as task,
+    pool and digest."""
     (label,) = package.run("""
 found.append(language_label(["PickXtimes"], "test", ["direct", "colored"]))
 """)
@@ -269,12 +277,17 @@ found.append(language_label(["PickXtimes"], "test", ["direct", "colored"]))
 def test_the_task_of_the_documentation_page_speaks_the_words_of_its_own_file(
     package, setting, pattern
 ):
-    """The page's file has no scenario for *reasoning*, and the refusal names that file."""
+    """`package` is an installed package with the task PlaceAndPress of docs/add-task.md. Its file
+    words.toml has a command, and the scenario *… wants a photo …* for *direct*, which *contextual*
+    says, too. It has none for *reasoning*, and the refusal names that file. `said_or_refused`
+    returns the text or the refusal."""
     (text,) = package.run(f'found.append(said_or_refused("PlaceAndPress", "{setting}"))')
     assert re.fullmatch(pattern, text)
 
 
 def test_the_words_of_the_task_of_the_documentation_page_break_no_rule(package):
+    """`package` is an installed package with the task PlaceAndPress of docs/add-task.md. The
+    checker for authors collects the rules that the page's words break in every 20th scene."""
     found = package.run("""
 words = task_scenarios("PlaceAndPress")
 for report in check_scenarios(words, None, scenes_of("PlaceAndPress", 0)[::20]):
@@ -292,7 +305,9 @@ def complete_package(tmp_path_factory):
 
 
 def test_a_task_of_another_package_can_be_commanded_in_every_setting(complete_package):
-    """In the words of training and of tests."""
+    """`complete_package` is an installed package with the task PlaceAndPress and scenarios for
+    every setting. In at least one of twelve episodes, each setting must be possible in the words of
+    training and of tests."""
     found = complete_package.run("""
 for split, setting in itertools.product(("train", "test"), settings_of(get_task("PlaceAndPress"))):
     for index in range(12):
@@ -312,7 +327,9 @@ for split, setting in itertools.product(("train", "test"), settings_of(get_task(
 
 
 def test_the_words_of_a_task_of_another_package_mean_the_goal_in_both_forms(complete_package):
-    """Collects the texts that mean another goal, or several."""
+    """`complete_package` is an installed package with the task PlaceAndPress and scenarios for
+    every setting. The program collects the texts that mean another goal than the episode's, or
+    several."""
     wrong = complete_package.run("""
 for split, index in itertools.product(("train", "test"), range(12)):
     episode = get_episode("PlaceAndPress", split, index)
@@ -328,10 +345,9 @@ for split, index in itertools.product(("train", "test"), range(12)):
 
 
 def test_a_task_of_another_package_has_every_control_run(complete_package):
-    """A control run ("arm") says other words, or those of another goal.
-
-    Only a paraphrase may lack, where a setting has one text for an episode.
-    """
+    """`complete_package` is an installed package with the task PlaceAndPress and scenarios for
+    every setting. A control run ("arm") says other words, or those of another goal. The program
+    collects refusals; only a paraphrase may lack, where a setting has one text for an episode."""
     refusals = complete_package.run("""
 arms = ("paraphrase-1", "other-goal", "silent", "scrambled", "again")
 for split, setting in itertools.product(("train", "test"), settings_of(get_task("PlaceAndPress"))):

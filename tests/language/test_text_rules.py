@@ -44,7 +44,8 @@ def check_that_a_rule_is_broken(rule, text, task="PickXtimes", every=20):
     ],
 )
 def test_a_grammar_mistake_is_reported_with_the_wrong_words(sentence, rule):
-    """Each sentence takes the place of one in a scenario without a mistake, a birthday story."""
+    """Each sentence takes the place of *{he} keeps talking about <it color: it>.* in a scenario
+    without a mistake, a birthday story. The checker must report the rule with the wrong words."""
     right = "{he} keeps talking about <it color: it>."
     assert right in BIRTHDAY
     check_that_a_rule_is_broken(rule, BIRTHDAY.replace(right, sentence))
@@ -126,10 +127,9 @@ def test_a_sentence_that_begins_in_lower_case_is_found(text, is_wrong):
     ],
 )
 def test_sentences_that_could_be_false_in_some_scene_are_reported_with_the_reason(words, reason):
-    """Fixed words for a color or a place, or *as I said*, are not true of all episodes.
-
-    Each sentence is added to the introduction of the birthday story.
-    """
+    """Each sentence is added to the introduction of a good scenario, a birthday story. With fixed
+    words for a color or a place, or *as I said*, it is not true of all episodes, and the checker
+    must say why."""
     text = BIRTHDAY.replace("the {color} cube.", f"the {{color}} cube. {words}.")
     broken = list(report_on(text, every=150).broken)
     assert any(
@@ -152,8 +152,8 @@ def test_sentences_that_could_be_false_in_some_scene_are_reported_with_the_reaso
     ],
 )
 def test_a_misused_place_is_reported(before, after, rule):
-    """Each case replaces `before` by `after` in a good scenario: *The table wobbles on the left.
-    Lift the cube there.*"""
+    """Each case replaces `before` by `after` in WOBBLY, a good scenario: *The table wobbles on the
+    left. Lift the cube there.*"""
     assert before in WOBBLY
     check_that_a_rule_is_broken(rule, WOBBLY.replace(before, after), every=3)
 
@@ -168,13 +168,17 @@ def test_a_misused_place_is_reported(before, after, rule):
 def test_a_place_or_color_that_no_longer_tells_which_container_it_is_is_reported(
     introduction, rule
 ):
-    """The containers cover the cubes and then change places."""
+    """MOVING_CONTAINERS is a scenario of VideoUnmaskSwap, whose introduction is replaced here. In
+    this task containers cover the cubes and then change places: where something was, or a color
+    that was seen, does not tell which container is meant."""
     text = MOVING_CONTAINERS.replace("The table wobbles {place:spot}.", introduction)
     check_that_a_rule_is_broken(rule, text, "VideoUnmaskSwap", every=3)
 
 
 def test_a_place_of_containers_that_move_is_right_with_at_the_start():
-    """*At the start, a fly sat on the left. Lift the container there.*"""
+    """MOVING_CONTAINERS is a scenario of VideoUnmaskSwap, where containers change places; its
+    introduction begins *The table wobbles* and a place. *At the start, a fly sat on the left. Lift
+    the container there* is right, as it says when."""
     text = MOVING_CONTAINERS.replace("The table wobbles", "At the start, a fly sat")
     broken = report_on(text, "VideoUnmaskSwap", every=3).broken
     assert not [rule for rule in broken if "says" in rule]
@@ -188,13 +192,16 @@ def test_a_place_of_containers_that_move_is_right_with_at_the_start():
     ],
 )
 def test_a_word_that_chooses_from_a_list_of_another_length_is_reported(sizes, pointer, rule):
-    """*The former* needs two values; `sizes` are the lengths that a scenario allows."""
+    """The birthday story gets a list of colors; `sizes` are the lengths that it allows. *The first
+    one* needs two values or more, and *the former* exactly two."""
     text = BIRTHDAY.replace("{color} cube", "{list} cubes")
     text = text.replace('["<it color: it>"]', f'["{pointer}"]')
     check_that_a_rule_is_broken(rule, f'{text}list = "color"\nneeds.list = {sizes}\n', every=3)
 
 
 def test_a_correct_scenario_about_a_place_breaks_no_rule():
+    """WOBBLY is *The table wobbles on the left. Lift the cube there.* Other tests put a mistake
+    into it."""
     assert not report_on(WOBBLY).broken
 
 
@@ -205,7 +212,8 @@ IN_BOTH_POOLS = BIRTHDAY.replace('"birthday"', '"doubter"').replace(
 
 
 def test_a_name_or_sentence_of_the_other_pool_in_a_user_s_file_is_reported():
-    """What is in both pools, those of training and of tests, would leak into training."""
+    """IN_BOTH_POOLS is a scenario for training with the name "doubter" and a sentence of one of
+    ours that is for tests. What is in both pools would leak from tests into training."""
     assert sorted(report_on(IN_BOTH_POOLS).broken) == [
         "the other pool has 'frame doubter', too",
         "the other pool has 'this happens to me every time.', too",
@@ -213,7 +221,8 @@ def test_a_name_or_sentence_of_the_other_pool_in_a_user_s_file_is_reported():
 
 
 def test_a_name_or_sentence_of_the_same_pool_is_no_leak():
-    """The same scenario, for tests, as StopCube's is."""
+    """IN_BOTH_POOLS has the name "doubter" and a sentence of one of our scenarios, which is for
+    tests. Here it is for tests, too."""
     assert not report_on(IN_BOTH_POOLS.replace('pool = "train"', 'pool = "test"')).broken
 
 
