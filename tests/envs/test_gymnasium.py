@@ -134,8 +134,9 @@ def test_a_fork_before_drawing_works():
 
 
 def test_a_fork_after_drawing_fails_at_once_with_the_reason():
-    """A picture was drawn in this process, and the driver does not survive a fork; "async" forks by
-    default."""
+    """The first line draws a picture in this process. The graphics driver does not survive a fork,
+    and Gymnasium's "async" vector environment forks by default; so it must fail, and name the
+    context that works."""
     roboirg.make("PickXtimes", **OPTIONS).reset()
     vector = gymnasium.make_vec(NAME, 2, "async", **OPTIONS)
     warnings.simplefilter("ignore")  # Gymnasium repeats the worker's traceback

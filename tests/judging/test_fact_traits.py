@@ -158,7 +158,9 @@ def test_a_registered_kind_of_fact_can_be_forbidden_and_is_judged(registered_top
 
 
 def test_a_registered_kind_of_fact_is_described_in_the_words_it_brings(registered_toppled):
-    """*Toppled* brings "knocked {subject} over" for events and "knocked over" for a state."""
+    """The fixture has registered *toppled*, a kind of fact, with the words "knocked {subject} over"
+    for an event and "knocked over" for a state. The names of objects are a dictionary from names to
+    words; without any, the name itself stands there. TOPPLED is that the pillar is toppled."""
     begins = EventRecord(step=3, kind="toppled", subject="pillar", place=None, holds=True)
     ends = EventRecord(step=9, kind="toppled", subject="pillar", place=None, holds=False)
 

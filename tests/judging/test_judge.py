@@ -45,8 +45,8 @@ def test_doing_what_each_stage_expects_in_order_is_a_success():
 
 
 def test_doing_what_the_second_stage_expects_does_not_complete_the_first():
-    """A pick is due, then a placement. The placement alone leaves the first stage, of index 0,
-    due."""
+    """Two stages, a pick and then a placement. Only the facts of one moment are seen: the
+    placement. It leaves the first stage, of index 0, due."""
     after = judge_of(stage(PICKED), stage(PLACED))
 
     assert after([PLACED]).index == 0
@@ -61,7 +61,9 @@ def test_one_control_step_completes_at_most_one_stage():
 
 
 def test_a_forbidden_fact_fails_even_if_the_expected_one_holds_too():
-    """The stage expects a pick and forbids to press the button; both hold at the same moment."""
+    """`stage(expected, forbidden)` is a step of the plan, with the words *do it*. It expects a pick
+    and forbids to press the button; at the only moment both hold, and what is forbidden is tested
+    first."""
     after = judge_of(stage(PICKED, PRESSED))
 
     judge = after([PICKED, PRESSED])

@@ -44,8 +44,9 @@ def repick_episode_and_facts(repeats, difficulty="medium"):
 
 @pytest.mark.parametrize("repeats", [1, 2, 3])
 def test_repick_succeeds_after_the_wanted_number_of_picks_and_a_press(repeats):
-    """Each list holds the facts of one step: the cube
-    lies, is picked up, is in the air, lies again."""
+    """A cube is to be picked up and put down `repeats` times, and then the button pressed. Each
+    list holds the facts of one step: the cube lies, is picked up, is in the air, lies again.
+    Without the press the episode goes on."""
     episode, picked, lying = repick_episode_and_facts(repeats)
     picks = [[lying], [picked], [], [lying]] * repeats
 

@@ -32,7 +32,9 @@ def grounded_instructions(task):
 
 
 def test_a_grounded_instruction_describes_the_cube_instead_of_naming_its_color():
-    """The goal is the blue cube. *It* in the command refers back to the described cube."""
+    """The goal is to place the blue cube once. The setting *grounded* says where it stands instead
+    of *blue*, and *it* in the command refers back to it; the metadata "touched" list the slots of
+    the goal that are hidden so."""
     episode = get_episode("PickXtimes", "test", 2)
 
     said = instruct(episode, "grounded")

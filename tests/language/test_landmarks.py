@@ -316,7 +316,8 @@ def test_containers_that_appear_during_the_video_can_be_named_by_place(phrase):
 
 
 def test_cubes_can_be_named_by_their_distance_to_the_bin():
-    """The red cube stands 10 cm from the bin, the green one 30 cm."""
+    """A point is (x, y, z) in meters. The red cube stands 10 cm from the bin, the green one 30
+    cm."""
     scene = Scene(
         (
             SceneObject("bin", "bin", Point(-0.2, 0.0, 0.0)),

@@ -129,7 +129,9 @@ def test_in_binfill_the_mirrored_objects_are_cubes_of_the_color_on_the_other_sid
 @each_frame
 @each_task_with_places
 def test_a_mirrored_object_is_never_a_right_one(task, frame):
-    """Otherwise picking it up would not show that left was taken for right."""
+    """`mirrored_objects` maps each object that is right to pick up to those that would be right
+    with left and right exchanged. In 24 episodes none may be both: picking it up would not show
+    that left was taken for right."""
     for index in range(24):
         episode = get_episode(task, "test", index)
 
@@ -141,7 +143,9 @@ def test_a_mirrored_object_is_never_a_right_one(task, frame):
 @each_frame
 @each_task_with_places
 def test_the_mirrored_object_is_the_same_in_both_forms_of_an_instruction(task, frame):
-    """The form *resolved* names what *implicit* points at; both say the same places."""
+    """`mirrored_objects` maps each object that is right to pick up to those that would be right
+    with left and right exchanged. The form *resolved* names what *implicit* points at; both say the
+    same places, so the result is the same."""
     for index in range(24):
         episode = get_episode(task, "test", index)
         implicit = instruct(episode, "spatial", "implicit", frame=frame)

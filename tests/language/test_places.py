@@ -222,7 +222,10 @@ def test_closest_is_said_where_depth_and_distance_from_the_robot_agree(frame, ph
     ids=["in the same quarter", "hardly outside of it", "far away"],
 )
 def test_nothing_is_in_a_corner_if_another_thing_is_near_that_corner(other, words):
-    """container_0 stands in the back left quarter; `other` is where container_1 stands."""
+    """Places are (x, y) in meters: x grows away from the robot, y to its left. container_0 stands
+    in the back left quarter; `other` is where container_1 stands. In the same quarter, only
+    *nearest to the corner* is right; hardly outside of it, nothing is said; far away, container_0
+    is in the corner."""
     scene = containers([(0.1, 0.1), other, (-0.3, 0.0), (0.2, -0.2)])
     of_the_corner = {
         "nearest to the back left corner", "at the back left", "in the back left corner",
@@ -339,7 +342,8 @@ ROW_OF_FIVE = containers([(0.0, -0.16), (0.0, -0.08), (0.0, 0.0), (0.0, 0.08), (
     ],
 )
 def test_everyday_words_for_a_row_of_five(name, phrase):
-    """container_0 stands on the robot's right, container_4 on its left."""
+    """ROW_OF_FIVE has five containers in a row: container_0 stands on the robot's right,
+    container_2 in the middle, container_4 on its left."""
     assert phrase in phrases_after_a_noun(ROW_OF_FIVE, name)
 
 
@@ -355,7 +359,8 @@ def test_the_camera_sees_the_robot_s_leftmost_thing_on_the_right_of_the_picture(
     [("container_2", "in the back left corner"), ("container_1", "at the front right")],
 )
 def test_everyday_words_for_the_corners_of_a_square(name, phrase):
-    """container_2 stands in the back on the left, container_1 in the front on the right."""
+    """Places are (x, y) in meters: x grows away from the robot, y to its left. So container_2
+    stands in the back on the left, container_1 in the front on the right."""
     square = containers([(-0.15, 0.15), (-0.15, -0.15), (0.15, 0.15), (0.15, -0.15)])
     assert phrase in phrases_after_a_noun(square, name)
 
@@ -389,7 +394,9 @@ def test_what_is_more_behind_the_button_than_beside_it_is_not_to_its_left():
 
 @pytest.mark.parametrize("place", [(0.1, 0.1), (-0.08, 0.0), (-0.2, 0.04)])
 def test_a_cube_alone_on_the_table_is_not_described_by_comparison(place):
-    """Something happens *on the left*, but there is no *leftmost cube*, and no corner."""
+    """The place is (x, y) in meters. Of a cube that is alone on the table may be said that
+    something happens *on the left*, a spot; but no words after a noun (*the leftmost cube*), as
+    there is nothing to compare it with, and no corner."""
     places = spoken_places(cubes(place), "cube", "robot")
 
     assert places

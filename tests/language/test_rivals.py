@@ -65,7 +65,8 @@ def test_the_metadata_about_a_rival_value_agree_with_the_text(task):
 
 @each_task
 def test_the_candidates_are_the_right_value_and_its_rival_at_its_position(task):
-    """*Four or five times*, of which four is right: the rival is five, its position "second"."""
+    """*Four or five times*, of which four is right: its rival is five, the position of the rival
+    "second". The metadata "candidates" have the two values in order, ``{"repeats": [4, 5]}``."""
     for episode, said in instructions_with_a_rival(task):
         slot = said.metadata["rival_slot"]
         right_value = values_of(episode.goal, slot)[0]
@@ -78,7 +79,9 @@ def test_the_candidates_are_the_right_value_and_its_rival_at_its_position(task):
 
 @each_task
 def test_the_command_points_at_the_value_that_is_not_the_rival(task):
-    """*The former* and *not the latter* point at the first value, so that the rival is second."""
+    """Two values are introduced, of which one, the rival, is not meant. *The former* and *not the
+    latter* point at the first value, so that the rival is the second; the others the other way
+    round."""
     position_of = {
         "former": "second", "not_latter": "second", "latter": "first", "not_former": "first"
     }  # fmt: skip

@@ -300,7 +300,9 @@ def test_the_checker_finds_nothing_wrong_with_a_good_scenario(text):
     ],
 )
 def test_the_checker_for_authors_names_the_rule_that_a_scenario_breaks(before, after, rule):
-    """Each case replaces `before` by `after` in a scenario that breaks none, a birthday story."""
+    """Each case replaces `before` by `after` in BIRTHDAY, a scenario that breaks no rule: *Leo
+    turns two today and wants to see the red cube. … The cake is at the baker's. … Lift it … once
+    for each year.* The checker must report the rule."""
     assert before in BIRTHDAY
 
     broken = report_on(BIRTHDAY.replace(before, after), every=10).broken
@@ -691,8 +693,9 @@ def test_a_resolved_command_ends_with_the_explicit_command(some_instructions):
     ],
 )
 def test_of_two_containers_only_one_has_to_be_found_out(setting, turns):
-    """The goal is the red cube, then the blue one. The introduction names the other one, or both;
-    the command names neither."""
+    """The goal is the red cube, and then the blue one, each under a container. The introduction
+    names one color and describes the other, or names both with their order; the command names
+    neither. The texts were read once: in each setting one of the two has to be found out."""
     episode = get_episode("VideoUnmask", "random", 3)
 
     assert instruct(episode, setting, wordings="train").turns == turns
@@ -848,8 +851,8 @@ def test_one_file_of_words_gives_a_task_its_own_phrase_for_a_number():
     ("task", "frames"), [("PickXtimes", ["here"]), ("SwingXtimes", ["here", "there"])]
 )
 def test_a_scenario_that_needs_a_task_is_said_in_that_task_only(task, frames):
-    """The file serves both tasks; its scenario "there" has the line `needs.tasks =
-    ["SwingXtimes"]`."""
+    """FILE_FOR_TWO_TASKS has the scenarios "here" and "there" for PickXtimes and SwingXtimes;
+    "there" has the line `needs.tasks = ["SwingXtimes"]`."""
     words = read_scenario_file(FILE_FOR_TWO_TASKS, task)
     assert [scenario.fields.frame for scenario in words.scenarios] == frames
 

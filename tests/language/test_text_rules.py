@@ -62,7 +62,9 @@ def test_a_grammar_mistake_is_reported_with_the_wrong_words(sentence, rule):
     ],
 )
 def test_a_grammar_mistake_with_a_value_of_the_goal_is_reported(introduction, rule):
-    """``{repeats}`` can be one, ``{list}`` two colors."""
+    """The introduction of BIRTHDAY, a story without a mistake, is replaced. ``{repeats}`` may be
+    one, which takes a singular; ``{repeats:try}`` makes a plural of *try*; ``{repeats:times}`` is
+    *once* or *two times* already; ``{list}`` are two colors, for which the file gets a list."""
     text = re.sub('introduction = ".*"', f'introduction = "{introduction}"', BIRTHDAY)
     if "{list}" in introduction:
         text = text.replace("setting =", 'list = "color"\nneeds.list = [2]\nsetting =')
@@ -82,7 +84,8 @@ def test_a_grammar_mistake_with_a_value_of_the_goal_is_reported(introduction, ru
     ids=["no space", "on the target on", "too long"],
 )
 def test_a_mistake_in_the_command_is_reported(line, rule):
-    """Each line is added to the birthday story, which has no mistake."""
+    """Each line is added to BIRTHDAY, a story without a mistake. `lead` stands before the command;
+    `resolved.color` is what the form *resolved* says of the color."""
     check_that_a_rule_is_broken(rule, f"{BIRTHDAY}{line}\n")
 
 
@@ -100,7 +103,8 @@ def pattern_of(rule):
     ],
 )
 def test_on_the_left_may_follow_on_the_target_but_on_the_next_one_may_not(sentence, is_wrong):
-    """*Put it on the target on the next one* leaves open what stands on what."""
+    """*Put it on the target on the next one* leaves open what stands on what; *on the left* only
+    says which target. `pattern_of` returns the pattern by which the checker finds what is wrong."""
     pattern = pattern_of("what points back must not follow 'on the target'")
     assert bool(re.search(pattern, sentence)) == is_wrong
 

@@ -419,8 +419,10 @@ def test_the_words_of_a_scene_that_no_scenario_of_the_file_fits_say_why(tmp_path
     ids=["no number", "no color", "too long"],
 )
 def test_the_check_reports_a_command_that_does_not_state_the_goal(tmp_path, commands, complaint):
-    """A command of PickXtimes has to say color and number; `stated.all.color` are the words
-    for a color."""
+    """HEAD has the file's name and its task PickXtimes, whose commands have to say color and
+    number; `stated.all.color` are the words for a color. The first command lacks the number, the
+    second says every color as *a cube*, and the third is longer than the 64 tokens that policies
+    hear."""
     checked = run_check(f"{HEAD}[commands]\n{commands}\n", tmp_path)
     assert complaint in checked.output
 
@@ -465,7 +467,8 @@ def test_a_scenario_for_training_is_not_said_in_test_episodes():
 
 
 def test_a_user_s_phrase_for_the_color_leaves_the_one_for_the_number():
-    """The file has `color = "our {color} cube"`, and nothing else."""
+    """The goal of EPISODE is the blue cube, four times. The user's file has `color = "our {color}
+    cube"` and no phrase for the number, which is then said as in our words."""
     identity = identity_of(f'{HEAD}[stated.PickXtimes]\ncolor = "our {{color}} cube"\n')
 
     said = instruct(EPISODE, wordings=identity).text
@@ -571,7 +574,8 @@ text = "x"
     ],
 )
 def test_a_bad_name_task_or_value_in_a_wording_file_is_refused_in_one_line(text, complaint):
-    """Each case is a whole file, or its beginning."""
+    """Each case is a whole wording file, or its beginning, with one mistake. `check_refusal` checks
+    that it is refused in one line that names the file and has the complaint."""
     check_refusal(text, complaint)
 
 
@@ -601,7 +605,9 @@ def check_refusal(text, complaint):
     ],
 )  # fmt: skip
 def test_a_bad_command_or_phrase_in_a_wording_file_is_refused_in_one_line(lines, complaint):
-    """The lines follow a right head with the name of the file and the task PickXtimes."""
+    """The lines, with one mistake, follow HEAD, a right beginning with the name and the task
+    PickXtimes. `check_refusal` checks that the file is refused in one line that names it and has
+    the complaint."""
     check_refusal(HEAD + lines, complaint)
 
 
@@ -618,7 +624,9 @@ def test_a_bad_command_or_phrase_in_a_wording_file_is_refused_in_one_line(lines,
     ids=["no number", "text as number", "mark in the sentence", "blank sentence"],
 )  # fmt: skip
 def test_a_bad_sentence_in_a_wording_file_is_refused_in_one_line(when, text, complaint):
-    """A sentence has the values of its goal under `when`, and its words under `text`."""
+    """HEAD is a right beginning with the name and the task PickXtimes. A whole sentence has the
+    values of its goal under `when`, color and repeats, and its words under `text`. `check_refusal`
+    checks that the file is refused in one line with the complaint."""
     lines = f"[[literal]]\ntask = 'PickXtimes'\nwhen = {{ {when} }}\ntext = '{text}'"
 
     check_refusal(HEAD + lines, complaint)
@@ -633,7 +641,9 @@ def test_a_bad_sentence_in_a_wording_file_is_refused_in_one_line(when, text, com
     ids=["goal stated twice", "task of no words"],
 )
 def test_a_sentence_of_a_goal_that_has_one_or_of_another_task_is_refused(before, after, complaint):
-    """Each case replaces `before` by `after` in a right file with two sentences."""
+    """Each case replaces `before` by `after` in TWO_SENTENCES, a right file with a sentence for the
+    red cube, twice, and one for the blue cube, twice. So both are for the red cube, or for a task
+    that the file does not name."""
     text = TWO_SENTENCES.replace(before, after)
     with pytest.raises(InvalidValueError, match=complaint):
         parse_wordings(text, "words.toml")
@@ -656,7 +666,8 @@ def test_a_sentence_of_a_goal_that_has_one_or_of_another_task_is_refused(before,
 def test_a_bad_part_of_a_scenario_in_a_wording_file_is_refused_in_one_line(
     before, after, complaint
 ):
-    """Each case replaces `before` by `after` in a good scenario: *It's dusty on the left …*"""
+    """Each case replaces `before` by `after` in DUSTY, a right file with one scenario: *It's dusty
+    on the left …* `check_refusal` checks that it is refused in one line with the complaint."""
     assert before in DUSTY
     check_refusal(DUSTY.replace(before, after), complaint)
 
@@ -673,7 +684,8 @@ def test_a_bad_part_of_a_scenario_in_a_wording_file_is_refused_in_one_line(
     ],
 )
 def test_a_bad_line_in_a_scenario_of_a_wording_file_is_refused_in_one_line(line, complaint):
-    """The line is added to a good scenario."""
+    """DUSTY is a right file that ends with its only scenario, to which the line is added.
+    `check_refusal` checks that it is refused in one line with the complaint."""
     check_refusal(DUSTY + line, complaint)
 
 
@@ -760,7 +772,8 @@ def test_error_messages_about_a_huge_file_stay_short(wrong):
 
 
 def test_a_byte_order_mark_does_not_change_the_identity_of_a_file(tmp_path):
-    """Editors on Windows add such a mark to the beginning of a text file."""
+    """Editors on Windows add such a mark to the beginning of a text file. The same file is written
+    without it and with it ("utf-8-sig"); the words, and so the identity, are the same."""
     path = tmp_path / "words.toml"
     path.write_text(TWO_SENTENCES)
     usual = open_wordings(path)
