@@ -1,6 +1,5 @@
 """The listener that learns: labels, what it reads and sees, its file, and its command."""
 
-import itertools
 import json
 import re
 import sys
@@ -229,7 +228,11 @@ def test_a_loaded_listener_knows_its_words_and_what_it_was_trained_on(trained_li
 
 
 def test_training_sentences_by_place_cover_several_goals_of_a_scene(torch):
-    """With three goals a scene: one explicit sentence, and three that name places."""
+    """A reader learns from one scene with three different goals, its own and two others of it.
+
+    What *explicit* words mean does not depend on the scene, so there is one such sentence, for its
+    own goal. *Spatial* words name places of the scene: a sentence for each of the three goals.
+    """
     from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.listener.reader_training import instructions_of
 
@@ -238,11 +241,11 @@ def test_training_sentences_by_place_cover_several_goals_of_a_scene(torch):
 
     told = list(instructions_of([episode], plan))
 
-    explicit, *by_place = [told_episode.goal for told_episode, _ in told]
-    assert explicit == by_place[0] == episode.goal
-    assert len(set(by_place)) == 3
-    assert set(by_place) <= set(get_task("ButtonUnmask").goals(episode.scene))
-    assert len({text for _, text in told}) == 4
+    explicit_goal, own_goal, *others = [told_episode.goal for told_episode, _ in told]
+    assert explicit_goal == own_goal == episode.goal
+    assert len({own_goal, *others}) == 3
+    assert set(others) <= set(get_task("ButtonUnmask").goals(episode.scene))
+    assert len({text for _, text in told}) == 1 + 3
 
 
 def test_training_on_a_task_that_no_sentence_speaks_of_is_refused(torch, monkeypatch):
@@ -280,33 +283,46 @@ def test_a_trained_listener_plays_an_episode_with_the_oracle_s_hands(trained_lis
     assert read_policy(f"learned:{path}").is_privileged
 
 
-@pytest.mark.sim
-def test_the_documentation_s_own_encoder_is_trained_saved_and_loaded(
-    few_episodes, torch, tmp_path, monkeypatch
-):
-    """Its encoder sees shades of pictures: a darker one is read differently."""
+@pytest.fixture
+def encoder_of_the_documentation(monkeypatch):
+    """Execute the Python example of the page, which registers the encoder "shades" for a while."""
     from roboirg_learn.listener import encoders
+
+    monkeypatch.setitem(encoders.ENCODERS, "shades", None)  # so that it is taken away in the end
+    (example,) = re.findall(r"```python\n(.*?class .*?)```", PAGE.read_text(), re.DOTALL)
+    exec(example, {})  # noqa: S102 - the page's example
+
+
+def scores_of(listener, picture):
+    """Return the scores of all goals for "Stop it." and this picture."""
+    seen = listener.see([picture])._replace(task="StopCube", text="Stop it.")
+    return listener.reader([seen])[0]
+
+
+@pytest.mark.sim
+@pytest.mark.usefixtures("few_episodes", "encoder_of_the_documentation")
+def test_a_listener_with_the_documentation_s_own_encoder_is_trained_saved_and_loaded(
+    torch, tmp_path
+):
+    """The encoder "shades" reads the mean colors of fields of a picture, here of 4 x 4.
+
+    The loaded listener has it, too: it gives a picture the same scores as before, and other ones to
+    the picture at half its brightness.
+    """
     from roboirg_learn.listener.learned_model import load_model, save_model
     from roboirg_learn.listener.listener_training import train_listener
 
-    monkeypatch.setitem(encoders.ENCODERS, "shades", None)  # which takes it away in the end
-    (block,) = re.findall(r"```python\n(.*?class .*?)```", PAGE.read_text(), re.DOTALL)
-    exec(block, {})  # noqa: S102 - the page's example
-    plan = plan_of(reader_epochs=2, encoders={"shades": {"size": 4}, "words": {}})
+    encoders = {"shades": {"size": 4}, "words": {}}
+    plan = plan_of(reader_epochs=2, encoders=encoders)
+    picture = views_at_start(get_episode("StopCube", "val", 0))[0].picture
 
     trained = train_listener(plan, tmp_path, "own", 0, lambda *_: None)
     save_model(trained, tmp_path / "own.safetensors")
     loaded = load_model(tmp_path / "own.safetensors")
 
-    def scores(listener, picture):
-        seen = listener.see([picture])._replace(task="StopCube", text="Stop it.")
-        with torch.no_grad():
-            return listener.reader([seen])[0]
-
-    picture = views_at_start(get_episode("StopCube", "val", 0))[0].picture
-    assert loaded.about["encoders"] == {"shades": {"size": 4}, "words": {}}
-    assert torch.equal(scores(trained, picture), scores(loaded, picture))
-    assert not torch.equal(scores(loaded, picture), scores(loaded, picture // 2))
+    assert loaded.about["encoders"] == encoders
+    assert torch.equal(scores_of(loaded, picture), scores_of(trained, picture))
+    assert not torch.equal(scores_of(loaded, picture), scores_of(loaded, picture // 2))
 
 
 @pytest.mark.parametrize(
@@ -392,16 +408,20 @@ def short_study(few_episodes, tmp_path):
 
 @pytest.mark.sim
 def test_the_study_writes_every_listener_its_answers_and_tables(short_study):
+    """The fixture trained two kinds of listener, *all* and *explicit*, with seeds 0 and 1 each.
+
+    Each of the four has a file of its weights, and one of its answers, a line each: what it
+    understood of StopCube, that is the visit at which to stop, and whether that is right. The page
+    has three tables: for two pools of words, and for commands with a rival object.
+    """
     folder, _ = short_study
 
-    expected = set()
-    for variant, seed in itertools.product(VARIANTS[:2], (0, 1)):
-        name = f"{variant.name}-{seed}"
-        expected |= {f"{name}.safetensors", f"{name}.jsonl"}
-    assert {path.name for path in folder.glob("*-?.*")} == expected
-    text = (folder / "study.md").read_text()
-    assert text.count("## ") == 3
-    assert "2 training seeds" in text
+    listeners = {"all-0", "all-1", "explicit-0", "explicit-1"}
+    assert {path.stem for path in folder.glob("*.safetensors")} == listeners
+    assert {path.stem for path in folder.glob("*-?.jsonl")} == listeners
+    page = (folder / "study.md").read_text()
+    assert page.count("## ") == 3
+    assert "2 training seeds" in page
     for line in (folder / "all-1.jsonl").read_text().splitlines():
         answer = json.loads(line)
         goal = get_episode("StopCube", "test", answer["episode"]).goal

@@ -403,13 +403,16 @@ def test_a_learned_planner_can_ask_scripted_hands(saved_policy):
 @pytest.mark.sim
 @pytest.mark.parametrize(
     ("options", "kind", "actions"),
-    [("", "LearnedHands", "waypoint"), ("%26actions=joint_angle", "JointChunks", "joint_angle")],
+    [
+        ("", "LearnedHands", "waypoint"),
+        ("%26actions=joint_angle", "JointChunksOfHands", "joint_angle"),
+    ],
 )
 def test_the_oracle_can_ask_learned_hands(saved_policy, options, kind, actions):
     """The oracle names the right subgoals, and the saved policy, as its hands, carries them out.
 
     It acts in waypoints. With the option actions=joint_angle (%26 is an escaped &) it is wrapped in
-    `JointChunks`, which turns waypoints into joint angles.
+    `JointChunksOfHands`, which turns waypoints into joint angles.
     """
     from roboirg.policies.by_name.finding import make_policy
 
