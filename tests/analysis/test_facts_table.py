@@ -115,7 +115,7 @@ FACTS_OF_A_NETWORK = InferenceFacts(
 @pytest.mark.parametrize(
     ("fields", "metadata", "expected"),
     [
-        pytest.param(
+        (
             {},
             {},
             {
@@ -124,9 +124,8 @@ FACTS_OF_A_NETWORK = InferenceFacts(
                 ),
                 "reads the simulator's state": "no",
             },
-            id="nothing is declared",
         ),
-        pytest.param(
+        (
             {
                 "needs": {"cameras": ["front"], "actions": "ee_pose", "lowers_prompt": True},
                 "inference": FACTS_OF_A_NETWORK,
@@ -144,23 +143,20 @@ FACTS_OF_A_NETWORK = InferenceFacts(
                 "libraries": "torch 2.9",
                 "python": "3.12.1",
             },
-            id="declared and reported",
         ),
         # The client's process of a server has libraries, too, but computes nothing.
-        pytest.param(
+        (
             {"inference": FACTS_OF_A_NETWORK},
             {"server": "openpi://host:8000", "dtype": "float16"},
             {"dtype": "float16", "python": NOT_REPORTED, "libraries": NOT_REPORTED},
-            id="on a server",
         ),
-        pytest.param(
+        (
             {},
             {"network": "none"},
             {"dtype": NO_NETWORK, "preprocessing": NO_NETWORK, "device": NOT_REPORTED},
-            id="no network",
         ),
         # The policy behind a planner does not speak for the planner.
-        pytest.param(
+        (
             {},
             {
                 "planner": {"model": "large"},
@@ -173,8 +169,14 @@ FACTS_OF_A_NETWORK = InferenceFacts(
                 "dtype": NOT_REPORTED,
                 "device": "a card",
             },
-            id="behind a planner",
         ),
+    ],
+    ids=[
+        "nothing is declared",
+        "declared and reported",
+        "on a server",
+        "no network",
+        "behind a planner",
     ],
 )
 def test_the_facts_of_a_policy_are_what_it_declares_and_what_its_process_reports(

@@ -129,12 +129,6 @@ def test_rates_of_implicit_and_resolved_instructions_are_refused_if_nothing_keep
         roboirg.measure(frame_of_two_forms, ["policy", "setting"])
 
 
-def test_implicit_and_resolved_instructions_have_rates_of_their_own(frame_of_two_forms):
-    found = roboirg.measure(frame_of_two_forms, ["policy", "setting", "form"])
-
-    assert {(row.key[-1], row.rate) for row in found} == {("implicit", 1), ("resolved", 0)}
-
-
 def test_implicit_and_resolved_instructions_are_pooled_if_the_call_asks_for_it(frame_of_two_forms):
     pool = ["form", "instruction_options"]
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+from collections import namedtuple
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 from flat_jobs import frame_of, make_result, make_results
@@ -36,36 +36,23 @@ from roboirg.stats.rates import points, whole_percent
 
 TASKS = ("PickXtimes", "BinFill")
 
-
-class ResultConditions(NamedTuple):
-    """What no rate is over two of, unless it is asked for."""
-
-    policy: str
-    policy_version: str
-    setting: str
-    form: str
-    delivery: str
-    arm: str
-    wordings: str | None
-    split: str
-    max_steps: int
-    language_version: str
-    environment_version: int
-
-
-ANY_CONDITIONS = st.builds(
-    ResultConditions,
-    policy=st.sampled_from(["one", "other"]),
-    policy_version=st.sampled_from(["a", "b"]),
-    setting=st.sampled_from(["explicit", "direct"]),
-    form=st.sampled_from(["implicit", "resolved"]),
-    delivery=st.sampled_from(["prompt", "turns"]),
-    arm=st.sampled_from(["told", "silent", "silent-empty", "scrambled"]),
-    wordings=st.sampled_from([None, "test"]),
-    split=st.sampled_from(["test", "val"]),
-    max_steps=st.sampled_from([40, 1300]),
-    language_version=st.sampled_from(["1", "2"]),
-    environment_version=st.sampled_from([1, 2]),
+CHOICES = {
+    "policy": ("one", "other"),
+    "policy_version": ("a", "b"),
+    "setting": ("explicit", "direct"),
+    "form": ("implicit", "resolved"),
+    "delivery": ("prompt", "turns"),
+    "arm": ("told", "silent", "silent-empty", "scrambled"),
+    "wordings": (None, "test"),
+    "split": ("test", "val"),
+    "max_steps": (40, 1300),
+    "language_version": ("1", "2"),
+    "environment_version": (1, 2),
+}
+"""Values of what no rate is over two of, unless it is asked for."""
+ResultConditions = namedtuple("ResultConditions", CHOICES)
+ANY_CONDITIONS = st.fixed_dictionaries(
+    {name: st.sampled_from(values) for name, values in CHOICES.items()}
 )
 USUAL_CONDITIONS = ResultConditions(
     "one", "a", "direct", "implicit", "prompt", "told", None, "test", 40, "1", 1
@@ -82,8 +69,8 @@ def conditions_that_nearly_agree(draw):
         draw(st.sampled_from([USUAL_CONDITIONS, USUAL_CONDITIONS._replace(setting="explicit")]))
     ]
     for other in draw(st.lists(ANY_CONDITIONS, min_size=1, max_size=5)):
-        changed = draw(st.lists(st.sampled_from(ResultConditions._fields), min_size=1, max_size=2))
-        found.append(found[-1]._replace(**{name: getattr(other, name) for name in changed}))
+        changed = draw(st.lists(st.sampled_from(list(CHOICES)), min_size=1, max_size=2))
+        found.append(found[-1]._replace(**{name: other[name] for name in changed}))
     return list(dict.fromkeys(found))
 
 
@@ -230,19 +217,19 @@ def all_intervals_of(outcomes):
     Args:
         outcomes: a letter for each episode, 1 if it is won and 0 if it is lost.
     """
-    told = [
-        *make_results(outcomes, "explicit"),
-        *make_results(outcomes, "direct"),
-        *make_results(outcomes, "reasoning"),
-    ]
-    frame = frame_of(told, make_results(outcomes, arm="silent"))
+    frame = frame_of(
+        make_results(outcomes, "explicit"),
+        make_results(outcomes, "direct"),
+        make_results(outcomes, "reasoning"),
+        make_results(outcomes, arm="silent"),
+    )
     data = RunData(frame)
     measured = [*data.summaries.values(), *arm_figures(frame)]
     measured += break_down(frame, BREAKDOWNS["difficulty"])
     for ends in measure_ends(data, {ALL_TASKS}).values():
         measured += ends
-    (policy_run,) = frame_of(told).names
-    found = [measure_headline(data.cells, policy_run, ("direct", "reasoning")).interval]
+    _, told_run = frame.names  # after that of the arm silent
+    found = [measure_headline(data.cells, told_run, ("direct", "reasoning")).interval]
     for row in measured:
         found += intervals_of(row)
     return [interval for interval in found if interval is not None]

@@ -11,12 +11,9 @@ from plan_files import plan_file
 from typer.testing import CliRunner
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.envs.factory import make
 from roboirg.extension.sight import ExpertRecording, record_expert
 from roboirg.language.settings import plain_settings
 from roboirg.main import app
-from roboirg.policies import play
-from roboirg.policies.builtin.waypoint_expert import WaypointExpert
 from roboirg.policies.by_name.finding import make_policy, read_policy
 from roboirg.records.store import read_records
 from roboirg.runs.plan.plan_maker import make_plan
@@ -54,13 +51,6 @@ def test_a_wrong_name_of_a_learned_policy_is_refused_with_the_reason(spec, words
     pytest.importorskip("torch")
     with pytest.raises(InvalidValueError, match=words):
         make_policy(spec, 0)
-
-
-@pytest.mark.sim
-def test_the_waypoint_expert_solves_an_episode():
-    """The expert knows the goal and moves by waypoints; policies learn from its recordings."""
-    env = make(get_episode("PickXtimes", "train", 0), actions="waypoint", cameras=())
-    assert play(env, WaypointExpert())["status"] == "success"
 
 
 @pytest.fixture(scope="module")
@@ -496,15 +486,6 @@ def test_a_trained_policy_plays_and_its_records_say_what_memory_it_has(folder_of
     first, second = read_records(next(tmp_path.rglob("records.jsonl")).parent)
     assert first.error is second.error is None
     assert first.policy_metadata["trained"]["body"]["memory"] == "recurrent"
-
-
-@pytest.mark.sim
-@pytest.mark.slow
-def test_training_a_body_writes_a_line_of_its_curve_for_each_pass(folder_of_policy):
-    """A command trained it in two passes over its recordings."""
-    curve = json.loads((folder_of_policy / "body-recurrent-0.json").read_text())
-
-    assert [line["epoch"] for line in curve] == [1, 2]
 
 
 @pytest.mark.sim
