@@ -195,6 +195,10 @@ def test_rates_of_arms_are_rounded_half_up():
 
 
 def test_sentences_that_compare_the_language_use_of_two_policies_are_as_stored(snapshot):
+    """*mine* mostly follows the words; *knows* does the same whatever is said.
+
+    The sentence has the difference of their language use, its interval and p-value.
+    """
     mine = frame_of(results_of_a_policy_that_mostly_listens())
     knows = frame_of(results_of_policy("knows", SAME_GOAL_IN_EVERY_ARM))
 
@@ -202,6 +206,7 @@ def test_sentences_that_compare_the_language_use_of_two_policies_are_as_stored(s
 
 
 def test_a_run_without_control_arms_has_neither_their_table_nor_a_sentence_about_them():
+    """Control arms play a scene again, for example without words; here is the usual arm alone."""
     mine = run_data_of(results_of_policy("mine", DOES_WHAT_IT_HEARS))
     told = run_data_of(results_of_policy("knows", {"told": "own"}))
 

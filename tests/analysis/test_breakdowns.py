@@ -171,6 +171,7 @@ def test_two_policies_are_compared_on_the_episodes_of_each_label():
 
 
 def test_compare_prints_the_breakdowns_that_were_asked_for_and_no_other(folder_of_two_policies):
+    """Two policies of one run are compared by the pattern of reasoning, and by the rival object."""
     sides = call(
         "compare",
         f"{folder_of_two_policies}:listener",

@@ -57,6 +57,10 @@ def test_the_chance_level_of_several_jobs_is_their_mean():
 
 
 def test_an_episode_counts_once_however_many_policies_and_seeds_play_it():
+    """Chance is 1 / 2 in episode 2 and 1 / 4 in episode 3, a mean of 3 / 8.
+
+    If the three jobs of episode 2 counted three times, it would be 7 / 16.
+    """
     first = job_in("StopCube", "reasoning", 2)
     again = job_in("StopCube", "reasoning", 2, policy="else", policy_seed=3)
     other = job_in("StopCube", "reasoning", 3)

@@ -89,6 +89,10 @@ def test_errors_and_planned_trials_without_a_result_are_named():
 
 
 def test_a_planned_trial_counts_as_played_although_policy_and_words_came_from_another_place():
+    """The 50 episodes were planned for a policy on a server, with the words of a file elsewhere.
+
+    None of them is reported as still to be played.
+    """
     results = results_like_the_papers()
     elsewhere = {"ref": unknown_policy("openpi://other:1"), "wordings_file": "elsewhere.toml"}
     planned = [replace(result.identity, **elsewhere) for result in results]

@@ -227,6 +227,7 @@ def test_types_and_devices_of_a_network_are_found_wherever_the_policy_keeps_it(
 
 
 def test_of_a_policy_without_a_network_only_its_python_is_known(networks_are_modules_of_torch):
+    """The policy is an object without attributes; the fixture stands in for PyTorch."""
     found = inference_facts(object())
 
     assert (found.dtypes, found.devices) == ((), ())

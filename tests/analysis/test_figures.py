@@ -260,6 +260,7 @@ def test_own_rates_that_cannot_be_compared_with_the_papers_have_a_sign(
 
 
 def test_a_figure_without_published_rates_does_not_mention_them():
+    """Results with the rates of the paper's MemER in one task are drawn alone."""
     found = [result for result in like_published("main", "MemER") if result.task == "PickXtimes"]
 
     figure = drawn_figure("gaps", run_data(found))
@@ -286,6 +287,7 @@ def test_rates_of_each_context_length_are_drawn_from_those_of_the_shortest():
 
 
 def test_there_is_no_figure_of_the_shortest_context_alone():
+    """The figure shows how success changes with more stages of context than 1 and 5."""
     found = like_published("context")
     shortest = [result for result in found if result.options.stages == (1, 5)]
     assert draw_figure("context", run_data(shortest)) is None

@@ -130,6 +130,7 @@ def test_rates_of_implicit_and_resolved_instructions_are_refused_if_nothing_keep
 
 
 def test_implicit_and_resolved_instructions_are_pooled_if_the_call_asks_for_it(frame_of_two_forms):
+    """In each policy and setting 12 implicit trials are won and 12 resolved ones lost: 12 of 24."""
     pool = ["form", "instruction_options"]
 
     found = roboirg.measure(frame_of_two_forms, ["policy", "setting"], pool=pool)
@@ -187,6 +188,7 @@ def test_two_rows_about_the_same_trial_are_refused(frame_of_two_policies):
 def test_an_unknown_outcome_is_refused_rather_than_counted_as_a_failure(
     frame_of_two_policies, outcome, reason
 ):
+    """The first of 72 rows has it. Known outcomes are success, failure and error."""
     frame = frame_of_two_policies.astype({"outcome": object})
     frame.loc[0, "outcome"] = outcome
 

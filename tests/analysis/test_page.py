@@ -278,6 +278,10 @@ def test_a_word_that_refers_back_and_what_it_refers_to_have_the_same_number(page
 
 
 def test_a_screen_reader_finds_one_heading_no_skipped_level_and_names_of_all_controls(page):
+    """The page has one main part and one title; headings go down by one level at a time.
+
+    Every button, list and field has a text or a label, and no two elements have the same id.
+    """
     assert page.locator("main").count() == page.locator("h1").count() == 1
 
     levels = page.locator("h1,h2,h3,h4").evaluate_all("all => all.map(one => +one.tagName[1])")

@@ -98,6 +98,10 @@ def test_no_path_or_link_leads_out_of_the_folder_that_is_served(server, path):
 def test_report_serve_prints_its_address_serves_the_page_and_ends_with_ctrl_c(
     run_with_a_film_and_a_link, wait_s
 ):
+    """The command is started as a process; the address that it prints is opened.
+
+    Ctrl-C (SIGINT) ends it with exit code 0.
+    """
     pytest.importorskip("jinja2")
     command = [
         sys.executable,

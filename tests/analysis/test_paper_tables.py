@@ -270,6 +270,7 @@ def test_a_task_that_the_paper_lacks_has_a_table_of_its_own():
 
 
 def test_a_task_that_the_paper_lacks_is_not_in_the_papers_table():
+    """The policy also played the task *Outside*; the main table is the same without it."""
     outside = make_results("1", policy="a", task="Outside")
 
     with_it = table_of("main", results_of_all_tasks(), outside)
@@ -312,6 +313,10 @@ def test_the_note_on_averages_counts_the_tasks_of_the_run_next_to_published_rows
     ids=["split", "step limit", "language", "episodes"],
 )
 def test_no_rate_is_bold_against_one_of_another_split_limit_version_or_other_episodes(difference):
+    """A policy wins both episodes (1), another one loses its only episode under other conditions.
+
+    Bold is the best of rates that can be compared; ** is bold in Markdown.
+    """
     good = make_results("11", policy="good")
     other = [make_result("failure", policy="poor", **difference)]
 
@@ -319,6 +324,7 @@ def test_no_rate_is_bold_against_one_of_another_split_limit_version_or_other_epi
 
 
 def test_the_best_rate_of_the_same_episodes_is_bold():
+    """One policy wins episodes 0 and 1, the other loses both; ** is bold in Markdown."""
     good = make_results("11", policy="good")
     poor = make_results("00", policy="poor")
 

@@ -283,6 +283,7 @@ def test_a_gap_in_a_breakdown_has_an_interval_or_the_reason_why_there_is_none(
 
 
 def test_the_note_of_a_cell_says_if_there_are_too_few_episodes_for_an_interval():
+    """One episode was played, and won (1). The note is that of the mean over all tasks."""
     data = RunData(frame_of(make_results("1")))
 
     (whole,) = (summary for key, summary in data.summaries.items() if key.scope == ALL_TASKS)
@@ -319,6 +320,7 @@ def test_a_gap_that_rounds_to_zero_has_no_sign_of_its_own():
 
 
 def test_what_several_seeds_played_is_counted_in_trials_below_the_terminals_table():
+    """One episode was played with policy seeds 0 and 1: two trials of one cell."""
     results = [make_result(policy_seed=seed) for seed in (0, 1)]
 
     (table,) = make_run_tables(frame_of(results))

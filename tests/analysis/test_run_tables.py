@@ -210,6 +210,7 @@ def test_a_run_without_failures_has_no_list_of_them():
 
 
 def test_the_legend_explains_privileged_policies_if_there_are_any():
+    """A policy that reads the simulator's state, or one that does not, loses an episode (0)."""
     legend = "success rate in %; privileged policies and scripted hands use the simulator's"
 
     assert legend in printed(frame_of(play("0", privileged=True)))
@@ -249,6 +250,10 @@ def test_a_rate_is_green_from_75_percent_and_red_below_50(outcomes, color):
 
 
 def test_each_split_step_limit_and_robot_has_a_table_of_its_own():
+    """The first episode is a usual one, on the test split and with a limit of 1300 steps.
+
+    The others are on another split, with another limit, and on a real robot; all are won (1).
+    """
     results = [
         *play("1"),
         *play("1", split="val"),

@@ -115,6 +115,7 @@ def test_the_parts_of_an_answer_identify_its_goal(task):
 
 
 def test_digits_are_read_as_words():
+    """ "3rd" and "third", or "2" and "two", are the same words to a reader; 57 has no word."""
     said = "Pick up the 3rd cube 2 times, then 57."
     assert split_words(said) == split_words("pick up the third cube two times, then 57.")
     assert "57" in split_words(said)
@@ -142,6 +143,7 @@ def test_the_interval_of_trainings_that_differ_contains_each_of_their_rates():
 
 
 def test_a_rate_of_one_has_an_interval_below_it():
+    """Three trainings are right in all of 50 episodes; the next episode may still be wrong."""
     certain = trained_rate([np.ones((3, 50))])
     assert certain.rate == 1.0
     assert 0.9 < certain.interval[0] < certain.interval[1] == 1.0
@@ -214,6 +216,10 @@ def test_a_trained_listener_understands_stopcube_also_after_loading(
 
 @pytest.mark.sim
 def test_a_loaded_listener_knows_its_words_and_what_it_was_trained_on(trained_listener):
+    """The fixture trained it on StopCube, in two settings, and saved it.
+
+    After loading it has the same vocabulary, and refuses BinFill, on which it was not trained.
+    """
     from roboirg_learn.listener.learned_model import load_model
 
     model, path = trained_listener
@@ -334,6 +340,10 @@ def test_a_listener_with_the_documentation_s_own_encoder_is_trained_saved_and_lo
     ids=["misspelled", "without such an option"],
 )
 def test_a_wrong_encoder_is_refused_before_pictures_are_drawn(torch, tmp_path, encoders, words):
+    """The plan of a training misspells the encoder "words", or gives it a size, which it has not.
+
+    The command stops at once: it leaves no file.
+    """
     plan = plan_file(tasks="StopCube", training={"encoders": encoders})
 
     done = CliRunner().invoke(
@@ -383,6 +393,7 @@ def test_variants_of_the_listener_get_no_words_no_pictures_or_no_video(
 
 
 def test_a_listener_without_a_video_sees_a_scene_that_has_none(torch):
+    """StopCube shows no video, so to hide the video hides nothing."""
     from roboirg_learn.listener.learned_model import hide_inputs
     from roboirg_learn.listener.vocabulary import ListenerInput
 

@@ -292,6 +292,10 @@ def test_a_recording_is_read_as_it_was_written(recorded, tmp_path):
     ids=["no description", "earlier format", "a reader", "no plan"],
 )
 def test_a_wrong_file_of_a_body_is_refused_with_the_reason(tmp_path, description, words):
+    """The description in a file has its kind, the version of its format (1), and the plan.
+
+    Each of the given descriptions lacks one of them, or has another one.
+    """
     torch = pytest.importorskip("torch")
     from safetensors.torch import save_file
 
@@ -305,6 +309,7 @@ def test_a_wrong_file_of_a_body_is_refused_with_the_reason(tmp_path, description
 
 
 def test_a_file_that_was_never_a_trained_one_is_refused(tmp_path):
+    """The file has the seven bytes "nothing"."""
     pytest.importorskip("torch")
     from roboirg_learn.trained_file import load_trained
 
@@ -353,6 +358,7 @@ def test_another_plan_weight_or_table_is_another_version(version_of):
 
 
 def test_the_same_numbers_in_another_shape_are_another_version():
+    """Two zeros in a row or in a column: a version is of weights and their shapes."""
     torch = pytest.importorskip("torch")
     from roboirg_learn.trained_file import TrainedFile
 

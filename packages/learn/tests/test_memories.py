@@ -236,6 +236,7 @@ def test_an_update_changes_fast_weights_by_a_norm_of_at_most_five():
 
 
 def test_an_update_of_fast_weights_with_a_rate_of_zero_changes_nothing():
+    """The rate is the size of a step of learning; keys and values are drawn."""
     fast, norm, keys, values, rates = fast_numbers(seed=0)
 
     updated = fast.updated(keys, values, 0 * rates, norm)

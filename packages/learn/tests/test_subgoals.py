@@ -350,6 +350,7 @@ def test_learned_hands_name_their_own_subgoal_if_none_is_given(learned_hands):
 
 @pytest.mark.sim
 def test_learned_hands_follow_a_given_subgoal_and_ignore_words_that_are_none(learned_hands):
+    """ "sing" is no subgoal that can be carried out, so the one before stays."""
     learned_hands.follow("press the button at <100, 90>")
     learned_hands.act(observation_of())
     learned_hands.follow("sing")
@@ -369,6 +370,7 @@ def test_learned_hands_that_were_given_nothing_but_nonsense_stand_still(learned_
 
 @pytest.mark.sim
 def test_a_new_episode_forgets_the_subgoal(learned_hands):
+    """A subgoal of the last episode would point to where nothing stands any more."""
     learned_hands.follow("press the button at <100, 90>")
 
     learned_hands.reset("pick the cube", NO_VIDEO)
@@ -381,6 +383,7 @@ def test_a_new_episode_forgets_the_subgoal(learned_hands):
 def test_a_learned_policy_is_hosted_unless_hands_read_the_simulator(
     saved_policy, options, is_privileged
 ):
+    """A hosted policy has a process of its own, out of which scripted hands could not read."""
     from roboirg.policies.by_name.finding import read_policy
 
     ref = read_policy(saved_policy.spec + options)
@@ -391,6 +394,7 @@ def test_a_learned_policy_is_hosted_unless_hands_read_the_simulator(
 
 @pytest.mark.sim
 def test_a_learned_planner_can_ask_scripted_hands(saved_policy):
+    """The planner looks through the front camera; scripted hands need no picture."""
     from roboirg.policies.by_name.finding import make_policy
     from roboirg_learn.policy.subgoal_following import LearnedPlanner
 
@@ -432,6 +436,7 @@ def test_the_oracle_can_ask_learned_hands(saved_policy, options, kind, actions):
     ids=["joint angles of scripted hands", "a planner that waits for reports"],
 )
 def test_a_combination_that_cannot_act_is_refused(saved_policy, spec, reason):
+    """Scripted hands act in one way only, and learned hands never report that a subgoal is done."""
     from roboirg.core.errors import InvalidValueError
     from roboirg.policies.by_name.finding import make_policy
 
