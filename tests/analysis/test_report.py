@@ -237,7 +237,7 @@ def test_an_episode_shows_when_each_stage_of_its_task_was_completed():
 
 
 def test_an_episode_shows_the_subgoals_of_a_planner_and_what_was_wrong_with_them():
-    """Three were named, at steps 0, 8 and 9; what was due then, and how each was judged, is known."""
+    """Three were named, at steps 0, 8 and 9; each has what was due then, and how it was judged."""
     subgoals = (
         SubgoalRecord(step=0, text="pick it up", due="pick it up", verdict="right", ended="done"),
         SubgoalRecord(

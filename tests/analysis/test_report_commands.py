@@ -100,7 +100,7 @@ def test_tables_of_a_packed_run_are_those_of_its_folder(
 def test_policies_of_a_pack_and_of_a_folder_are_compared_alike(
     run_of_two_policies, pack_of_the_run
 ):
-    """The pack has the folder's records. The listener wins all, the other policy nothing in direct."""
+    """The pack has the folder's records. The listener wins all, the other one nothing in direct."""
     listener_of_pack = call(
         "compare", f"{pack_of_the_run}:listener", f"{run_of_two_policies}:forgetful"
     )
