@@ -79,7 +79,8 @@ def test_a_rival_is_labeled_with_the_words_that_single_it_out(records_of_two_pol
 def test_an_episode_is_labeled_with_the_expressions_of_its_command_alone(records_of_two_policies):
     """A contextual instruction also has turns before the command, such as a reinforcement.
 
-    These turns refer with expressions of their own, which must not become labels.
+    These turns refer with expressions of their own, such as *it*, which must not become labels. So
+    the labels are some of the expressions that were said in all turns, and not all of them.
     """
     read = record_columns()["expression"].read
     labels = set()

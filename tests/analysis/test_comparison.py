@@ -151,7 +151,10 @@ def test_a_comparison_explains_an_interval_that_excludes_0_although_the_gap_is_n
 
 
 def test_episodes_without_instruction_do_not_count_in_a_comparison():
-    """The arm *silent* is a control: it would drag down the policy that played it."""
+    """The listener wins both episodes (1) with the instruction, and loses both (0) without it.
+
+    The second is a control (the arm *silent*): it would drag down the policy that played it.
+    """
     listener = make_results("11")
     silent = make_results("00", arm="silent")
     forgetful = forgetful_results("01")

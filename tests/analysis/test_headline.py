@@ -97,7 +97,10 @@ def test_the_headline_number_is_the_mean_gap_of_the_settings_each_a_mean_over_it
 
 
 def test_the_headline_number_is_positive_if_implicit_instructions_are_won_more_often():
-    """Reasoning wins one of two more than explicit, spatial none: a mean of 1/4."""
+    """Of two episodes explicit wins none (0), reasoning one (1), and spatial none.
+
+    The gaps to explicit are 1/2 and 0: a mean of 1/4.
+    """
     results = [
         *make_results("00", "explicit"),
         *make_results("10", "reasoning"),

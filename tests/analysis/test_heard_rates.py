@@ -65,7 +65,10 @@ def test_a_table_has_rates_over_prompts_that_were_read_whole_next_to_rates_over_
 
 
 def test_a_note_below_the_table_of_a_policy_says_how_many_of_its_prompts_were_cut():
-    """3 to 4 of the listener's 8; the table of the other policy has no such note."""
+    """Of the listener's 8 prompts 3 were cut, and of one it is not known: 3 to 4, 38 to 50 %.
+
+    The table of the other policy, of whose only prompt it is not known, has no such note.
+    """
     listener, other = make_run_tables(frame_of(results_with_cut_and_unknown_prompts()))
 
     note = (

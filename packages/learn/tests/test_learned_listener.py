@@ -269,9 +269,11 @@ def test_training_on_a_task_that_no_sentence_speaks_of_is_refused(torch, monkeyp
 
 @pytest.mark.sim
 def test_a_trained_listener_plays_an_episode_with_the_oracle_s_hands(trained_listener):
-    """It understands the episode's own goal and answers with actions of eight numbers.
+    """The fixture trained a listener on explicit StopCube; the episode is one of its training.
 
-    It is privileged, as the hands know the state of the simulator.
+    It understands the episode's own goal, and the oracle's hands act on it: actions have eight
+    numbers, seven joint angles and the gripper. As these hands read the simulator, the policy is
+    privileged.
     """
     import roboirg
 
@@ -380,7 +382,12 @@ def scene_of(*views):
 def test_variants_of_the_listener_get_no_words_no_pictures_or_no_video(
     torch, hidden, text, objects
 ):
-    """A variant shows what an input is worth; the cube and the container are seen in a video."""
+    """A variant of the listener lacks an input, which shows what that is worth.
+
+    Given are the sentence "Stop it." and two pictures, a cube and later a container: two objects.
+    Without words the sentence is empty, without pictures nothing is seen. Nor is anything seen
+    without the video of a scene that has one, which is known by its two pictures.
+    """
     from roboirg_learn.listener.learned_model import hide_inputs
     from roboirg_learn.listener.vocabulary import ListenerInput
 
@@ -441,7 +448,11 @@ def test_the_study_writes_every_listener_its_answers_and_tables(short_study):
 
 @pytest.mark.sim
 def test_a_study_trains_again_only_the_listener_that_is_lost(short_study):
-    """One listener of the study is deleted; running it again writes this one and its answers."""
+    """The fixture ran a study with four listeners, of which the file of one is deleted.
+
+    Running it again writes only this file and that of its answers (by the times of change). The
+    page of results is the same: a training can be repeated to the bit.
+    """
     folder, run = short_study
     times = {path: path.stat().st_mtime_ns for path in folder.glob("*-?.*")}
     text = (folder / "study.md").read_text()

@@ -140,18 +140,24 @@ def test_a_repeated_waypoint_is_labeled_with_the_gripper_command_that_follows():
 
 
 def test_passes_of_a_moving_cube_over_its_target_are_counted_at_each_look():
-    """The cube moves along x: -3, -1, 2, 1, -1, with the target at 0.
+    """A moving cube is of the class *shuttle*. It moves along x, and the target stays at 0.
 
-    It passes between the second and third look, and back between the last two. Without a moving
-    cube nothing is counted.
+    At five looks it is at -3, -1, 2, 1 and -1: it passes between the second and third look, and
+    back between the last two.
     """
-    recorded = recording_with_actions([np.zeros(7)], [4])
-    assert (passes_so_far(recorded) == NO_LABEL).all()
-    things = np.zeros((5, 2, 4))
+    things = np.zeros((5, 2, 4))  # looks, objects, and x, y, z, yaw of each
     things[:, 0, 0] = [-3, -1, 2, 1, -1]
+    recorded = recording_with_actions([np.zeros(7)], looks=[4])
     moving = recorded._replace(classes=("shuttle", "target"), things=things)
 
     assert passes_so_far(moving).tolist() == [0, 0, 1, 1, 2]
+
+
+def test_without_a_moving_cube_no_passes_are_counted():
+    """At each of five looks there is no label, as opposed to no pass."""
+    recorded = recording_with_actions([np.zeros(7)], looks=[4])
+
+    assert passes_so_far(recorded).tolist() == [NO_LABEL] * 5
 
 
 def test_the_time_of_a_wait_is_counted_down_to_the_next_move():
@@ -257,7 +263,10 @@ def test_a_recording_notes_how_many_stages_are_done(recorded):
 
 @pytest.mark.sim
 def test_a_recording_notes_which_objects_are_visible(recorded):
-    """At first only the cubes, and from step 40 on only the containers that cover them."""
+    """The expert was recorded in ButtonUnmask, where containers come down over cubes.
+
+    At the first look only the cubes are visible, from control step 40 on only the containers.
+    """
     cubes = np.array([name.startswith("cube") for name in recorded.classes])
     containers = np.array([name == "container" for name in recorded.classes])
     covered = int(np.flatnonzero(recorded.steps >= 40)[0])
@@ -270,13 +279,20 @@ def test_a_recording_notes_which_objects_are_visible(recorded):
 
 @pytest.mark.sim
 def test_a_recording_is_read_as_it_was_written(recorded, tmp_path):
-    """A file that is cut off after 100 bytes is refused, with what to do."""
-    path = tmp_path / "one.npz"
-    save_recording(recorded, path)
-    for name, value in load_recording(path)._asdict().items():
+    """All its fields are equal, arrays value by value."""
+    save_recording(recorded, tmp_path / "one.npz")
+
+    loaded = load_recording(tmp_path / "one.npz")
+
+    for name, value in loaded._asdict().items():
         np.testing.assert_equal(value, getattr(recorded, name), err_msg=name)
 
-    path.write_bytes(path.read_bytes()[:100])
+
+def test_a_recording_that_is_cut_off_is_refused_with_what_to_do(tmp_path):
+    """The file has only the first bytes of an archive, as after a full disk."""
+    path = tmp_path / "one.npz"
+    path.write_bytes(b"PK\x03\x04")
+
     with pytest.raises(InvalidValueError, match="delete it to make it again"):
         load_recording(path)
 
