@@ -81,11 +81,11 @@ def test_the_table_of_facts_counts_what_was_planned_played_and_begun_again(tmp_p
 
 
 def test_the_table_of_facts_lists_each_version_of_the_code_once(tmp_path):
-    """Two records have our code; that of the third has another one and does not say who judged."""
+    """One record has our code; the other has another one and does not say what code judged it."""
     ours = record_of(0)
     other = record_of(2, code="0a", verdict_code=None)
 
-    facts = facts_of_run(tmp_path, ours, record_of(1), other)
+    facts = facts_of_run(tmp_path, ours, other)
 
     assert facts["the run"]["package code"] == f"{ours.code}; 0a"
     assert facts["the run"]["verdict code"] == ours.verdict_code

@@ -242,7 +242,7 @@ def test_published_rows_stand_below_a_line(figure_of_one_episode_next_to_the_pap
     (line,) = [line for line in panel.lines if [*line.get_xdata()] == [0, 1]]
 
     assert labels[:2] == ["MemER, n = 1 ≠", "published, n = 50 × 3"]
-    assert len(labels) == 2 + 5
+    assert len(labels) == 7
     place_of_ours, place_of_heading, *_ = panel.get_yticks()
     assert place_of_ours < line.get_ydata()[0] < place_of_heading
 

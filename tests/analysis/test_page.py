@@ -408,8 +408,7 @@ def test_a_click_on_the_track_below_a_film_goes_to_its_moment(served_page):
     wait_until(film, "one => one.currentTime > 0 && !one.seeking")
     lowered_at = film.evaluate("one => one.currentTime")
 
-    first_event = row.locator(".track button.done, .track button.event").first
-    first_event.click()
+    row.locator(".track button.done, .track button.event").first.click()
 
     wait_until(film, f"one => one.currentTime < {lowered_at} - 0.1")
     assert row.locator(".head").is_visible()
