@@ -78,6 +78,7 @@ def written_film(folder, name="x"):
 
 
 def test_the_page_loads_nothing_from_elsewhere():
+    """It has no address of the web, imports no style, and forbids the browser to load anything."""
     text = render(records_with_an_error_last(), PLAN_OF_ONE_TASK)
 
     assert not re.search(r"https?:|@import|url\(", text)
@@ -149,6 +150,7 @@ def test_records_of_other_versions_are_shown_without_what_cannot_be_derived(chan
 
 
 def test_a_record_of_an_unknown_task_is_shown_with_its_events():
+    """Nothing is known of the task *Homemade*: neither its stages nor its words spelled out."""
     turn = UtteranceRecord(stage="command", text="Do it.")
     mention = MentionSpan(
         utterance=0, start=3, end=5, role="anaphor", expression="it", slot="x", value=1
@@ -235,6 +237,7 @@ def test_an_episode_shows_when_each_stage_of_its_task_was_completed():
 
 
 def test_an_episode_shows_the_subgoals_of_a_planner_and_what_was_wrong_with_them():
+    """Three were named, at steps 0, 8 and 9; each has what was due then, and how it was judged."""
     subgoals = (
         SubgoalRecord(step=0, text="pick it up", due="pick it up", verdict="right", ended="done"),
         SubgoalRecord(
@@ -268,6 +271,7 @@ def test_an_episode_shows_how_much_of_each_turn_the_model_read():
 
 
 def test_an_episode_shows_the_conditions_under_which_it_was_played():
+    """It was played behind a server of version 9, and begun on 2 January 2026 at 03:04."""
     page = Page(render([replace(listener_record("explicit", 1), server_version="9")]))
 
     shown = page.string(page.details[0]["conditions"])
@@ -415,6 +419,7 @@ def test_two_policies_are_paired_on_a_scene_only_with_equal_words_seed_and_split
     ("changes", "scenes"), [({"policy_seed": 1}, [2]), ({"split": "val"}, [1, 1])]
 )
 def test_results_of_the_same_episode_belong_to_one_scene(changes, scenes):
+    """Episode 0 of another split is another scene; played with two policy seeds it is the same."""
     record = listener_record("direct", 0)
 
     page = Page(render([record, replace(record, **changes)]))

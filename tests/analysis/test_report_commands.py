@@ -52,6 +52,7 @@ def test_tables_out_writes_a_file_for_each_table_into_a_new_folder(run_of_two_po
 
 
 def test_published_tables_need_no_run(tmp_path):
+    """29.11 is a rate of the paper's table of contexts; our row stands in that of benchmarks."""
     words = ("--format", "latex", "--out", tmp_path, "--published", "--which", "context")
 
     call("tables", *words)
@@ -99,6 +100,7 @@ def test_tables_of_a_packed_run_are_those_of_its_folder(
 def test_policies_of_a_pack_and_of_a_folder_are_compared_alike(
     run_of_two_policies, pack_of_the_run
 ):
+    """The pack has the folder's records. The listener wins all, the other one nothing in direct."""
     listener_of_pack = call(
         "compare", f"{pack_of_the_run}:listener", f"{run_of_two_policies}:forgetful"
     )
@@ -127,6 +129,7 @@ def test_report_writes_the_page_into_a_run_or_next_to_a_pack(run_of_two_policies
 
 
 def test_report_writes_the_page_of_two_runs_to_out(run_of_two_policies, pack_of_the_run, tmp_path):
+    """One is the listener of the packed run, the other the whole folder."""
     out = tmp_path / "page.html"
 
     call("report", f"{pack_of_the_run}:listener", "--against", run_of_two_policies, "--out", out)
@@ -135,6 +138,7 @@ def test_report_writes_the_page_of_two_runs_to_out(run_of_two_policies, pack_of_
 
 
 def test_run_colon_policy_shows_the_results_of_that_policy_alone(run_of_two_policies):
+    """RUN:forgetful gives those lines of the whole run's table that are about *forgetful*."""
     options = ("--which", "main", "--format", "csv")
     head, *rows = call("tables", run_of_two_policies, *options).splitlines()
 
@@ -160,6 +164,7 @@ def test_two_policies_named_apart_are_shown_as_their_whole_run_is(
 
 @pytest.mark.parametrize("command", ["tables FIRST SECOND", "compare FIRST SECOND"])
 def test_a_command_on_two_runs_warns_if_they_were_rendered_on_different_devices(tmp_path, command):
+    """llvmpipe draws on processors; the same scene may look a little different on a GPU."""
     first = write_run(tmp_path / "listener", ("listener",), device="llvmpipe")
     second = write_run(tmp_path / "forgetful", ("forgetful",), device="NVIDIA H100")
     words = command.replace("FIRST", str(first)).replace("SECOND", str(second)).split()
@@ -168,6 +173,7 @@ def test_a_command_on_two_runs_warns_if_they_were_rendered_on_different_devices(
 
 
 def test_merging_runs_and_the_page_of_the_merged_run_warn_of_different_devices(tmp_path):
+    """The runs were drawn on a processor (llvmpipe) and on a GPU."""
     first = write_run(tmp_path / "listener", ("listener",), device="llvmpipe")
     second = write_run(tmp_path / "forgetful", ("forgetful",), device="NVIDIA H100")
     warning = "Mixed render devices: NVIDIA H100, llvmpipe. Their pictures"
