@@ -1,6 +1,7 @@
 """Inspect and our scores give the same verdict on the same answers."""
 
 import functools
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -107,55 +108,80 @@ def run_inspect(data, replies_of, logs, question="slots", stop_reason="stop", **
     return log
 
 
-def test_inspect_and_our_scores_agree(data, tmp_path):
-    """A scripted model answers right, wrong and unusably by turns (`replies`).
+class ScriptedRun(NamedTuple):
+    """A run in Inspect of a model that gives `replies`: right, wrong and unusable ones by turns.
 
-    Inspect and `score_answers` agree on each item. An unusable reply is asked for once more, so
-    that its conversation has four messages instead of two.
+    Attributes:
+        log: Inspect's.
+        lengths: how many messages each request had.
     """
-    pytest.importorskip("inspect_ai")
-    from roboirg.apps.grounding.inspect_grounding import log_answers
 
+    log: object
+    lengths: list
+
+
+@pytest.fixture(scope="module")
+def scripted_run(data, tmp_path_factory):
     lengths = []
 
-    def scripted(messages):
+    def reply(messages):
         texts = [part.text for part in messages[1].content if part.type == "text"]
         lengths.append(len(messages))
         return replies()[texts[0], texts[-1]]
 
-    verdicts = own_verdicts()
-    ours = {name: verdict.right for name, verdict in verdicts.items()}
-    unusable = sum(verdict.understood is None for verdict in verdicts.values())
+    return ScriptedRun(run_inspect(data, reply, tmp_path_factory.mktemp("logs")), lengths)
 
-    log = run_inspect(data, scripted, tmp_path)
 
-    assert {str(sample.id): bool(sample.scores["right"].value) for sample in log.samples} == ours
-    given = {answer.id: answer.reply for answer in log_answers(log)}
-    assert given == {item.id: replies()[asked(item)] for item in items()}
-    assert lengths.count(4) == unusable > 0  # each of them was asked once more
+def test_inspect_and_our_scores_have_the_same_verdict_on_each_reply(scripted_run):
+    """In `scripted_run`, Inspect judged right, wrong and unusable replies; `own_verdicts` are those
+    of `score_answers` on the same replies, by the items' ids. The accuracy is the share of right
+    ones; a third of them is right in *direct*, which has an accuracy of its own."""
+    expected = {name: verdict.right for name, verdict in own_verdicts().items()}
+
+    log = scripted_run.log
+
+    found = {str(sample.id): bool(sample.scores["right"].value) for sample in log.samples}
     metrics = log.results.scores[0].metrics
-    assert metrics["accuracy"].value == pytest.approx(sum(ours.values()) / len(ours))
+    assert found == expected
+    assert metrics["accuracy"].value == pytest.approx(np.mean(list(expected.values())))
     assert metrics["direct"].value > 0
+
+
+def test_the_answers_of_an_inspect_log_are_the_replies_of_the_model(scripted_run):
+    """`replies` has what the scripted model says about each item."""
+    from roboirg.apps.grounding.inspect_grounding import log_answers
+
+    given = {answer.id: answer.reply for answer in log_answers(scripted_run.log)}
+
+    assert given == {item.id: replies()[asked(item)] for item in items()}
+
+
+def test_inspect_asks_for_an_unusable_reply_once_more(scripted_run):
+    """A question has two messages: the system's and the user's. With the reply and a second
+    request, there are four. A verdict without an understood answer is of an unusable reply."""
+    unusable = [name for name, verdict in own_verdicts().items() if verdict.understood is None]
+
+    assert unusable
+    assert scripted_run.lengths.count(4) == len(unusable)
 
 
 @pytest.mark.parametrize("question", ["choice", "points"])
 def test_inspect_asks_the_other_questions(data, tmp_path, question):
-    """The model gets one picture and gives the right reply, so that all are right: accuracy 1.
+    """The first text of a request is the instruction, its last the question, which tell the item;
+    between them is one picture, as the dataset has no video here.
 
-    Options of the task leave the setting direct and two tasks.
+    A scripted model gives the right reply, so the accuracy is 1. Options leave of the dataset the
+    items of one task in *direct*.
     """
     pytest.importorskip("inspect_ai")
-    right = {item.question(question) + item.said: item for item in items()}
+    item_by_texts = {(item.said, item.question(question)): item for item in items()}
 
-    def scripted(messages):
-        content = messages[1].content
-        assert sum(part.type == "image" for part in content) == 1
-        item = right[content[-1].text + content[0].text]
-        return right_reply(item, question)
+    def reply(messages):
+        said, *between, asked_last = messages[1].content
+        assert [part.type for part in between].count("image") == 1
+        return right_reply(item_by_texts[said.text, asked_last.text], question)
 
-    log = run_inspect(
-        data, scripted, tmp_path, question, settings="direct", tasks="PickXtimes,StopCube"
-    )
+    log = run_inspect(data, reply, tmp_path, question, settings="direct", tasks="PickXtimes")
 
     assert {sample.metadata["setting"] for sample in log.samples} == {"direct"}
     assert log.results.scores[0].metrics["accuracy"].value == 1
