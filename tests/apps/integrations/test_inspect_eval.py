@@ -115,29 +115,20 @@ def test_a_success_scores_1_and_a_failure_0_and_inspect_reports_the_accuracy(ins
     assert any("accuracy" in result.metrics for result in inspect_log.results.scores)
 
 
-def test_a_record_has_the_setting_of_the_command_and_the_tokens_that_the_server_counted(
-    inspect_log,
-):
-    """The documented command says `setting=contextual`; the scripted server of `inspect_log`
-    reports 100 input tokens with each reply, and an episode is one question."""
-    records = records_in(inspect_log)
-
-    assert records
-    for record in records:
-        assert record["options"]["setting"] == "contextual"
-        assert record["usage"]["input_tokens"] == 100
-
-
 def test_the_model_is_asked_once_an_episode_and_told_neither_setting_nor_seed(model, inspect_log):
-    """`model` is the scripted server that kept the requests of the command behind `inspect_log`.
+    """`model` is the scripted server that kept the requests of the command behind `inspect_log`;
+    it counts 100 input tokens for each reply, and a record has those of its episode.
 
-    With the name of the setting or the seed, a model could know more than it was told in words.
+    The command says `setting=contextual`. With this name or the seed, a model could know more than
+    it is told in words.
     """
     told = "\n".join(words_of(request) for request in model.requests)
 
     assert len(model.requests) == len(inspect_log.samples)
-    assert "contextual" not in told
     for record in records_in(inspect_log):
+        assert record["usage"]["input_tokens"] == 100
+        assert record["options"]["setting"] == "contextual"
+        assert "contextual" not in told
         assert str(record["seed"]) not in told
 
 

@@ -23,13 +23,8 @@ def reset_to_episode_1(**options):
     return env, *env.reset(seed=51)
 
 
-def hold(observation):
-    """Return the action that keeps the seven joints where they are, with an open gripper."""
-    return np.append(observation["agent_pos"][:7], 1.0)
-
-
 def watch_video(env, observation):
-    """Step through the video that begins with an observation.
+    """Step through the video that begins with an observation; actions have no effect until its end.
 
     Returns:
         its pictures, and the first observation after it.
@@ -38,7 +33,7 @@ def watch_video(env, observation):
     info = {"is_video_demo": True}
     while info["is_video_demo"]:
         pictures.append(observation["pixels"]["front"])
-        observation, *_, info = env.step(hold(observation))
+        observation, *_, info = env.step(HOME_ACTION)
     return pictures, observation
 
 
@@ -69,13 +64,14 @@ def test_after_the_video_the_policy_sees_what_it_sees_at_once_without_a_video():
 
 
 def test_the_limit_of_two_steps_counts_from_the_end_of_the_video():
-    """The second step after it truncates the episode, and later steps repeat that end."""
+    """An environment of `reset_to_episode_1` has two steps: the second after the video truncates
+    the episode, and later steps repeat that end."""
     env, first, _ = reset_to_episode_1(video=True)
-    _, observation = watch_video(env, first)
+    watch_video(env, first)
 
     is_truncated = []
     for _ in range(3):
-        _, _, terminated, truncated, _ = env.step(hold(observation))
+        _, _, terminated, truncated, _ = env.step(HOME_ACTION)
         assert not terminated
         is_truncated.append(truncated)
 
@@ -85,9 +81,9 @@ def test_the_limit_of_two_steps_counts_from_the_end_of_the_video():
 def test_a_reset_without_options_gives_the_end_of_an_ended_episode_again():
     """Gymnasium resets an environment by itself when its episode ends; LeRobot still reads the end
     until it begins a new rollout."""
-    env, observation, _ = reset_to_episode_1()
-    env.step(hold(observation))
-    end, _, _, _, info = env.step(hold(observation))
+    env, *_ = reset_to_episode_1()
+    env.step(HOME_ACTION)
+    end, *_, info = env.step(HOME_ACTION)
 
     assert env.reset() == (end, info)
 

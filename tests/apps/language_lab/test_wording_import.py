@@ -86,7 +86,6 @@ def test_the_command_writes_a_file_that_is_read_again(one_task, tmp_path):
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [([], "give it another name"), (["--name", "a b"], "the name 'a b'")],
-    ids=["robomme", "a b"],
 )
 def test_a_name_that_is_bad_or_robomme_s_is_refused_and_nothing_is_written(
     one_task, tmp_path, options, complaint
@@ -115,7 +114,11 @@ ASKED = r"RoboMME's get_language_goal, asked for a goal of VideoRepick \((?:once
     ],
 )
 def test_a_sentence_that_cannot_be_used_is_named(one_task, tmp_path, body, complaint):
-    """`body` is what RoboMME's function returns for each goal."""
+    """RoboMME's sentences come from a function of its repository, `get_language_goal`; a clone has
+    it in one file. Here that file has a function that returns `body`, a Python expression, for
+    each goal: an error, no list, a sentence with a placeholder or a foreign letter, or one that
+    depends on more than the goal. `complaint` is a pattern of the message.
+    """
     clone = make_clone(tmp_path)
     file = clone / robomme_import.FILE
     file.write_text(f"def get_language_goal(self, env):\n    return {body}\n")

@@ -220,7 +220,6 @@ def test_a_privileged_policy_is_noted():
         ("openpi://127.0.0.1:9?conect=0.1", "Did you mean 'connect'?"),
         (object(), "Expected reset() and act(), got no reset()."),
     ],
-    ids=["unknown", "no server", "unknown option", "no policy"],
 )
 def test_a_policy_that_cannot_be_tried_fails_with_the_reason(spec, words):
     """One check fails, with these words: nothing else can be checked."""

@@ -75,7 +75,6 @@ def test_the_server_listens_on_this_machine_alone(served):
 @pytest.mark.parametrize(
     "fault",
     [{"key": "wrong"}, {"key": ""}, {"host": "evil.example"}, {"origin": "http://evil.example"}],
-    ids=["wrong key", "no key", "another host", "another page"],
 )
 def test_a_score_from_elsewhere_is_refused_and_does_not_show_the_key(served, fault):
     """The form is right, and the request has a wrong key or none, or comes from another page.
@@ -195,7 +194,12 @@ def test_a_record_has_the_path_of_a_video_inside_the_folder(served):
 
 
 def test_a_kill_between_two_clicks_costs_nothing(small):
-    """Each of two trials is scored by a server that is killed at once; the next goes on."""
+    """The command `roboirg real score` serves the page of a study of four trials. It prints an
+    address, which has a key that becomes a cookie; what is sent to /score is a verdict.
+
+    Each of two trials is scored through a server of its own, which is killed as soon as it has
+    answered. The second server knows of the first trial, and both verdicts are in the records.
+    """
     plan, folder = small
     command = [sys.executable, "-u", "-c", CLI, "score", str(folder), "--operator", "ann"]
 
@@ -277,6 +281,10 @@ def test_the_page_fits_narrow_screens(page):
 
 @pytest.mark.browser
 def test_everything_on_the_page_has_a_name_and_can_be_reached_by_keys(page):
+    """Screen readers need names: the drawing of the table has a title, and each of five groups of
+    verdicts (success, three kinds of failure, none) a legend. Each verdict has a key, and each
+    field for text a label; the first thing that Tab reaches is a verdict.
+    """
     assert page.locator("svg[role=img] title").count() == 1
     assert page.locator("fieldset legend").count() == 5
     for button in page.locator("main button").all():
@@ -289,9 +297,11 @@ def test_everything_on_the_page_has_a_name_and_can_be_reached_by_keys(page):
 
 
 def test_the_page_says_what_is_meant_and_what_was_scored(small, snapshot):
-    """Before and after a failure, a success, and a void trial with a note; the last is open.
+    """The stored pages are of a study of four trials: the first before it is scored, then all after
+    a failure, a success and a void trial, each with a note and a video; the last is still open.
 
-    Without its style, its script and its drawing.
+    Each says what the instruction means, what can be chosen, and what was chosen. Styles, scripts
+    and drawings are left out.
     """
     plan, folder = small
     trial_log = TrialLog.read(plan, folder)
