@@ -189,7 +189,10 @@ def test_events_tell_equal_cubes_apart_by_number_and_leave_out_what_ends_by_itse
 
 
 def test_missing_episodes_and_errors_are_named_at_the_top_of_the_page():
-    """Five records before the last, which is an error, are lost."""
+    """Of the planned records of two policies, the five before the last are lost, and the last one
+    is an error of the policy; notes at the top of the page say so. Cells of the table count five
+    missing episodes in all.
+    """
     records = records_with_an_error_last()
     kept = [*records[:-6], records[-1]]
 
@@ -291,6 +294,9 @@ def test_an_episode_shows_how_much_of_each_turn_the_model_read():
 
 
 def test_an_episode_shows_the_conditions_under_which_it_was_played():
+    """The record is of the test split, of our own words, and of a policy whose server says that its
+    version is "9". Each record began on 2026-01-02 at 03:04, which the page says, too.
+    """
     page = Page(render([replace(listener_record("explicit", 1), server_version="9")]))
 
     shown = page.string(page.details[0]["conditions"])
@@ -391,7 +397,12 @@ def test_a_failed_episode_shows_the_goal_that_the_policy_understood_next_to_the_
     ("outcome", "text"), [("failure", "“dance”; due was “pick it up”"), ("success", None)]
 )
 def test_a_failed_episode_of_a_planner_shows_its_last_subgoal_up_to_the_failure(outcome, text):
-    """It failed at step 60. An episode that succeeded shows none."""
+    """Subgoals were given at steps 51, 60 and 61; the failed record has its first wrong act at step
+    60, so the second subgoal, "dance", is shown with what was due. An episode that succeeded shows
+    none.
+
+    The other text is the true goal.
+    """
     subgoals = tuple(
         SubgoalRecord(step=step, text=text, due="pick it up", verdict="lost")
         for step, text in ((51, "sing"), (60, "dance"), (61, "rest"))

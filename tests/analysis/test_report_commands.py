@@ -38,7 +38,9 @@ def pack_of_the_run(run_of_two_policies):
 
 
 def test_tables_out_writes_a_file_for_each_table_into_a_new_folder(run_of_two_policies, tmp_path):
-    """And prints their paths."""
+    """With the published results, a run has five tables. The folder does not exist before; the
+    command prints the path of each file.
+    """
     out = tmp_path / "new" / "tables"
 
     printed = call(
@@ -51,6 +53,9 @@ def test_tables_out_writes_a_file_for_each_table_into_a_new_folder(run_of_two_po
 
 
 def test_published_tables_need_no_run(tmp_path):
+    """29.11 is a rate that RoboMME's paper publishes in its table of contexts; which settings a
+    task has is our own table, `coverage`.
+    """
     words = ("--format", "latex", "--out", tmp_path, "--published", "--which", "context")
 
     call("tables", *words)
@@ -90,7 +95,9 @@ def test_several_tables_in_json_or_csv_are_one_document_that_pandas_reads(run_of
 def test_tables_of_a_packed_run_are_those_of_its_folder(
     run_of_two_policies, pack_of_the_run, options
 ):
-    """But for the path, which the facts have."""
+    """A pack is a zip file of the run. The tables of facts name the path of the run or of its pack,
+    which is the only difference.
+    """
     of_folder = call("tables", *options, run_of_two_policies)
     of_pack = call("tables", *options, pack_of_the_run)
 
@@ -100,6 +107,10 @@ def test_tables_of_a_packed_run_are_those_of_its_folder(
 def test_policies_of_a_pack_and_of_a_folder_are_compared_alike(
     run_of_two_policies, pack_of_the_run
 ):
+    """The pack holds the run of the folder, so it makes no difference which of two policies comes
+    from where. The listener wins all episodes, the forgetful policy none in *direct*: +100 points.
+    *Privileged* are policies that read the simulator's state.
+    """
     listener_of_pack = call(
         "compare", f"{pack_of_the_run}:listener", f"{run_of_two_policies}:forgetful"
     )
@@ -118,7 +129,9 @@ def test_figures_of_a_pack_are_drawn_and_their_paths_printed(pack_of_the_run, tm
 
 
 def test_report_writes_the_page_into_a_run_or_next_to_a_pack(run_of_two_policies, pack_of_the_run):
-    """Both pages are equal but for the name of the run."""
+    """The page of the folder is report.html in it; that of shipped.roboirg.zip is shipped.html next
+    to it. Both are equal but for the name of the run, which is that of the folder or of the pack.
+    """
     call("report", run_of_two_policies)
     call("report", pack_of_the_run)
 
@@ -136,6 +149,9 @@ def test_report_writes_the_page_of_two_runs_to_out(run_of_two_policies, pack_of_
 
 
 def test_run_colon_policy_shows_the_results_of_that_policy_alone(run_of_two_policies):
+    """The run has a listener and a forgetful policy. `RUN:forgetful` gives the header and those
+    lines of the whole table that are of the forgetful policy.
+    """
     options = ("--which", "main", "--format", "csv")
     head, *rows = call("tables", run_of_two_policies, *options).splitlines()
 
@@ -167,6 +183,9 @@ def test_a_policy_of_a_folder_and_one_of_its_pack_are_shown_as_the_whole_run_is(
 
 @pytest.mark.parametrize("command", ["tables FIRST SECOND", "compare FIRST SECOND"])
 def test_a_command_on_two_runs_warns_if_they_were_rendered_on_different_devices(tmp_path, command):
+    """A software renderer (llvmpipe) and a graphics card draw slightly different pictures, so that
+    results of the two may differ for this reason alone.
+    """
     first = write_run(tmp_path / "listener", ("listener",), device="llvmpipe")
     second = write_run(tmp_path / "forgetful", ("forgetful",), device="NVIDIA H100")
     words = command.replace("FIRST", str(first)).replace("SECOND", str(second)).split()
@@ -175,6 +194,9 @@ def test_a_command_on_two_runs_warns_if_they_were_rendered_on_different_devices(
 
 
 def test_merging_runs_and_the_page_of_the_merged_run_warn_of_different_devices(tmp_path):
+    """A software renderer (llvmpipe) and a graphics card draw slightly different pictures, so that
+    results of the two may differ for this reason alone.
+    """
     first = write_run(tmp_path / "listener", ("listener",), device="llvmpipe")
     second = write_run(tmp_path / "forgetful", ("forgetful",), device="NVIDIA H100")
     warning = "Mixed render devices: NVIDIA H100, llvmpipe. Their pictures"

@@ -311,7 +311,11 @@ def test_tables_of_policies_stand_in_the_order_of_the_plan_and_the_legend_below_
 
 
 def test_a_suite_that_was_played_in_part_is_marked_in_the_table_of_forms():
-    """One of the four tasks of counting was played in both forms."""
+    """A suite is a group of tasks, of which the table shows the mean. Only one of the four tasks of
+    counting was played, so the mean is marked by a star, which a note explains. The table needs
+    both forms of instructions: the implicit one, and the one with references spelled out
+    (resolved).
+    """
     results = [*play("10", "direct"), *play("11", "direct", form="resolved")]
 
     table = diagnostic_tables()["forms"].make(RunData(frame_of(results)))

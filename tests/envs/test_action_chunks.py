@@ -114,7 +114,9 @@ def test_infos_of_sub_environments_have_the_steps_and_the_video_of_each(vector):
     ids=["two poses", "one pose", "not finite", "a text"],
 )
 def test_what_is_not_a_chunk_of_finite_numbers_is_refused_before_anything_moves(wrong):
-    """Here three poses of seven numbers are a chunk."""
+    """A chunk is three actions here, each a pose of six numbers and the gripper. An array of two
+    actions or of one, of numbers that are not finite, and a text are refused.
+    """
     env = ActionChunks(roboirg.make("PickXtimes", cameras=(), actions="ee_pose"), 3)
     env.reset()
 

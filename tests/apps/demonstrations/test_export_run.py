@@ -235,7 +235,9 @@ def test_failures_are_exported_only_on_request(export, options, statuses):
 
 
 def test_the_mean_of_next_success_is_the_share_of_steps_that_end_in_success(export):
-    """Four of six episodes succeed, each in its last step."""
+    """Four of six synthetic episodes succeed, each in the last of its seven steps; `next.success`
+    is 1 there and 0 in all other frames. With failures (`outcomes`), there are 6 * 7 frames.
+    """
     root = export(outcomes="all")
 
     stats = json.loads((root / "meta/stats.json").read_text())["next.success"]
@@ -301,6 +303,7 @@ def test_a_complete_export_is_not_overwritten(export, make_plan):
 
 
 def test_a_folder_of_something_else_is_not_written_to(tmp_path, make_plan):
+    """A folder with a file that is no part of an export is refused before anything is written."""
     (tmp_path / "thesis.tex").touch()
 
     with pytest.raises(InvalidValueError, match="is not empty and no export"):
@@ -365,6 +368,10 @@ def test_the_card_of_version_3_has_the_command_that_trains(export):
 
 
 def test_the_card_of_version_2_1_has_a_configuration_that_trains(export):
+    """Version 2.1 of the format is for openpi, which is configured in Python. The card's block of
+    Python has to compile, and maps the wrist's picture to the name that openpi's policies have for
+    it.
+    """
     card = (export(format="lerobot-v2.1") / "README.md").read_text()
 
     config = card.split("```python\n")[1].split("```")[0]

@@ -235,7 +235,9 @@ def test_version_3_has_statistics_of_all_frames(export, name):
 
 
 def test_version_3_has_statistics_of_pictures_between_0_and_1(export):
-    """The mean of a color is that of all pixels, divided by 255."""
+    """LeRobot divides pixels of 0 to 255 by 255, so the mean of a color is that of all pixels of
+    all frames, divided by 255. Texts such as subgoals have no statistics.
+    """
     root = export()
 
     stats = read_json(root / "meta/stats.json")
@@ -344,7 +346,9 @@ def test_a_film_of_an_episode_shows_the_video_too(export_with_video):
 
 
 def test_version_2_1_has_a_file_and_statistics_for_each_episode_and_no_videos(export):
-    """Two tasks and two settings of two episodes that succeed."""
+    """Two tasks in two settings, with two successful episodes each, are eight episodes. A chunk is
+    a folder of up to 1,000 files; pictures are in tables here, not in videos.
+    """
     root = export(format="lerobot-v2.1")
 
     assert len(list((root / "data").rglob("*.parquet"))) == 8

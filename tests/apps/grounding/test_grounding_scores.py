@@ -327,7 +327,7 @@ def test_shortcuts_are_right_as_often_as_the_listeners_that_use_them(rule, setti
     jobs = []
     for task in ("PickXtimes", "VideoPlaceButton"):
         for episode in range(24):
-            jobs.append(Job(rule, task=task, split="test", episode=episode, options=options))
+            jobs.append(Job(policy=rule, task=task, split="test", episode=episode, options=options))
 
     _, rows = rows_of(floor_answers(rule, dataset), "slots", dataset)
 

@@ -136,6 +136,9 @@ def test_places_of_the_right_choice_are_balanced():
 
 
 def test_no_two_items_have_the_same_id():
+    """An item is a question about an instruction. Here are those of one episode of each task, in
+    all settings and forms.
+    """
     ids = []
     for task in BENCHMARK:
         _, items = items_of(task, 1, forms=FORMS, every_variant=True)
@@ -188,7 +191,9 @@ def test_options_that_a_setting_does_not_read_keep_their_defaults(name):
 @settings(max_examples=30)
 @given(mask=arrays(bool, array_shapes(min_dims=2, max_dims=2, max_side=9)))
 def test_a_mask_is_read_back_from_its_run_lengths(mask):
-    """None but the first may be 0."""
+    """A mask is stored as numbers of equal pixels in a row: first of those outside (which may be
+    0), then inside, and so on. Any mask of up to 9 × 9 pixels is the same after it was stored.
+    """
     counts = encode_mask(mask)
 
     assert all(counts[1:])
@@ -363,6 +368,10 @@ def test_a_task_without_a_video_has_no_film(exported):
 
 @pytest.mark.sim
 def test_the_table_has_every_item_with_its_pictures(exported):
+    """The dataset is written as JSON lines with paths of pictures, and as a table (Parquet) that
+    holds the pictures themselves. The table has all items in the same order, and says to the
+    library `datasets` that picture and frames are images.
+    """
     parquet = pytest.importorskip("pyarrow.parquet")
     _, folder, facts = exported
     items = read_items(folder)

@@ -89,6 +89,9 @@ def test_a_reset_without_options_gives_the_end_of_an_ended_episode_again():
 
 
 def test_an_action_of_nan_ends_the_episode_without_success():
+    """The action has eight numbers, as it should, but they are not finite. The episode is
+    terminated (not truncated) without a reward.
+    """
     env, *_ = reset_to_episode_1()
 
     _, reward, terminated, truncated, info = env.step(np.full(8, np.nan))

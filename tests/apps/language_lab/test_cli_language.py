@@ -62,6 +62,7 @@ def test_a_task_that_a_user_s_file_lacks_is_refused(stopcube_wordings):
 
 
 def test_two_exports_of_instructions_have_the_same_bytes_and_leave_nothing_else(tmp_path):
+    """Words are drawn by the number of the episode, not at random, and temporary files are removed."""
     first = tmp_path / "one.jsonl"
     second = tmp_path / "two.jsonl"
 
@@ -73,7 +74,9 @@ def test_two_exports_of_instructions_have_the_same_bytes_and_leave_nothing_else(
 
 
 def test_exported_instructions_are_those_of_the_asked_tasks_settings_and_split(tmp_path):
-    """StopCube has no spatial setting, and `all` may lack it."""
+    """Two tasks of the split `val` in all settings. StopCube has no spatial setting; with `all`,
+    that is no error.
+    """
     rows = exported_rows(
         tmp_path / "rows.jsonl", "--tasks", "ButtonUnmask,StopCube", "--split", "val",
         "--settings", "all",
@@ -123,14 +126,18 @@ def test_a_wrong_option_of_an_export_is_one_sentence_and_nothing_is_written(
 
 
 def test_stats_print_tables(monkeypatch, snapshot):
-    """Counts of words and patterns, 150 characters wide."""
+    """The stored text has the tables of three tasks: counts of words, of lengths and of referring
+    expressions, 150 characters wide.
+    """
     monkeypatch.setenv("COLUMNS", "150")
     printed = call("language", "stats", "--tasks", "VideoPlaceButton,VideoUnmask,PickXtimes")
     assert printed == snapshot
 
 
 def test_stats_of_all_splits_leave_out_empty_tables():
-    """StopCube has sequential relations, and no places."""
+    """StopCube's instructions relate visits in time, so there is a table of relations; they name no
+    places, so there is none of landmarks.
+    """
     printed = call("language", "stats", "--split", "all", "--tasks", "StopCube")
     assert "Relations" in printed
     assert "Landmark" not in printed
@@ -197,6 +204,9 @@ def test_raters_get_one_text_of_each_scenario(rating):
 
 
 def test_three_raters_get_the_texts_of_the_key_in_other_orders(rating):
+    """`rating` is a folder with the key, which tells the scenario of each numbered text, and three
+    sheets with the same texts, each in an order of its own, so that no text is always the last.
+    """
     texts = {number: row["text"] for number, row in rate_words.read_key(rating / "key.csv").items()}
     first, second, third = read_sheets(rating)
 

@@ -33,7 +33,9 @@ def test_expressions_are_counted_once_per_scene():
 
 
 def test_an_expression_is_counted_in_50_scenes_of_a_task_at_most():
-    """Three of the five tasks have a spatial setting."""
+    """The instructions are those of the 50 test episodes of five tasks, of which three have a
+    spatial setting. A word may occur twice in an instruction and still counts once for its scene.
+    """
     counts = corpus_statistics.expression_counts(implicit_instructions())
 
     for setting, count_by_expression in counts.items():

@@ -53,7 +53,9 @@ def test_each_goal_has_the_sentence_of_the_source(task):
 
 @each_task
 def test_the_explicit_setting_says_the_sentence_of_the_source(task):
-    """Two published training episodes of each task."""
+    """Sentences are imported from a stand-in of RoboMME's repository. In two training episodes of
+    each task, the explicit instruction is the sentence that the stand-in has for the goal.
+    """
     for episode in train_episodes(task, 0, 2):
         said = instruct(episode, wordings=imported(task).identity)
         assert said.text == sentence(task, episode.goal, episode.difficulty)
@@ -74,7 +76,9 @@ def import_command(folder, *options):
 
 
 def test_the_command_writes_a_file_that_is_read_again(one_task, tmp_path):
-    """The name and a digest make the identity of the words."""
+    """The stand-in of RoboMME's repository has three sentences for the goals of VideoRepick. The
+    name that was given and a digest of the words make their identity.
+    """
     outcome = import_command(tmp_path, "--name", "stand-in")
 
     out = tmp_path / "out.toml"

@@ -291,6 +291,7 @@ def test_the_page_embeds_nothing_from_outside(name, run):
 
 
 def test_the_page_follows_no_circle_of_links(run):
+    """A video of the run is a link to itself, which could be followed for ever."""
     video = next(run.glob("videos/*.mp4"))
     video.unlink()
     video.symlink_to(video.name)
@@ -376,6 +377,7 @@ def test_plan_files_are_regular_files(make, tmp_path):
     },
 )
 def test_plan_files_with_other_content_are_refused_by_name(content, complaint, tmp_path):
+    """Each content is YAML that would start code, use up memory or raise an error that is not ours."""
     path = tmp_path / "plan.yaml"
     path.write_text(content)
 

@@ -107,6 +107,9 @@ def test_the_page_is_refused_with_a_wrong_key(served, key_in_address):
 
 
 def test_the_page_runs_no_foreign_scripts_and_tells_others_no_address(served):
+    """The address has the key with which verdicts are stored; browsers send it to no other page,
+    and load nothing from elsewhere.
+    """
     status, headers, _ = ask(served, "/")
 
     assert status == 200
@@ -143,7 +146,10 @@ def test_a_malformed_score_leads_back_to_the_page_with_a_message(served, changes
 
 
 def test_a_page_that_is_out_of_date_scores_nothing(served):
-    """Another page has scored the trial in the meantime."""
+    """A form names the revision of the trial that its page showed. Two forms of the same revision
+    are sent, as from two pages: the first one stores a success, the second is refused with a
+    message.
+    """
     trial = served.plan.trials[0]
     form = form_of(served, trial, "success")
     ask(served, "/score", form)
@@ -155,6 +161,9 @@ def test_a_page_that_is_out_of_date_scores_nothing(served):
 
 
 def test_what_an_operator_types_is_text_and_no_part_of_the_page(served):
+    """A note, and a message in the address, have HTML in them. The note is stored as it was typed,
+    and on the page neither is a script or markup.
+    """
     trial = served.plan.trials[0]
     note = "<script>alert(1)</script> \"quoted\" & 'so'"
     ask(served, "/score", form_of(served, trial, "success", note=note))
@@ -184,6 +193,7 @@ def test_a_video_outside_the_folder_is_not_noted(served):
 
 
 def test_a_record_has_the_path_of_a_video_inside_the_folder(served):
+    """The operator names a file by its path in the study's folder, where it is."""
     trial = served.plan.trials[0]
     (served.folder / "films").mkdir()
     (served.folder / "films" / "a.mp4").write_bytes(b"film")
@@ -316,7 +326,9 @@ def test_the_page_says_what_is_meant_and_what_was_scored(small, snapshot):
 
 
 def test_the_page_does_not_name_the_policy(small):
-    """The operator must not know which policy acts."""
+    """The study compares the policies "listener" and "forgetful"; who scores must not know which
+    one acts, so that nobody is judged by a name.
+    """
     plan, folder = small
     page = render_trial(TrialLog.read(plan, folder), plan.trials[0], nonce="n")
     assert not re.search("listener|forgetful", page)

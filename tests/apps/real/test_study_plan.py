@@ -95,6 +95,9 @@ def test_the_arrangements_of_each_condition_are_balanced(study):
 @settings(max_examples=15)
 @given(study=studies)
 def test_demonstrations_have_balanced_arrangements_and_none_is_shown_twice(study):
+    """Demonstrations show the tasks to a policy before the study. An arrangement is how the table
+    is laid; `check_balance` counts how often each occurs, and each color, number and side.
+    """
     plan = make_study(**study)
 
     for task in {demonstration.task for demonstration in plan.demonstrations}:
@@ -290,6 +293,9 @@ def test_operators_choose_among_the_failures_of_the_task(task, grounding):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_each_failure_has_a_key_of_its_own_and_wrong_things_are_not_the_one_meant(task):
+    """Operators choose among failures by keys. A failure "wrong place" or "wrong object" names a
+    color, which must not be that of the goal.
+    """
     for trial in make_study(("a",), tasks=(task,), trials=8, demonstrations=0).trials:
         choices = failure_choices(trial.episode)
         assert len({choice.key for choice in choices}) == len(choices)

@@ -84,7 +84,9 @@ def test_no_word_leaves_the_strip(caption):
 
 @pytest.mark.parametrize("caption", ["done: pick", "done: pick up the container " * 30])
 def test_no_word_is_drawn_over_another(caption):
-    """Boxes may touch by two pixels."""
+    """The boxes around all texts of a strip are compared two by two. Boxes may touch by two pixels,
+    as letters do not fill them.
+    """
     boxes = [text.get_window_extent().padded(-2) for text in drawn(12, caption).texts]
 
     for first, second in itertools.combinations(boxes, 2):
@@ -190,7 +192,9 @@ def test_a_fact_without_a_place_is_described_in_two_words():
 
 
 def test_the_video_is_described_by_its_stages_and_facts():
-    """Going home is not in the video."""
+    """In test episode 0 of VideoPlaceButton the video shows a cube that is dropped onto a target,
+    and then a press of the button. The arm going home is no part of the video.
+    """
     lines = describe_video(get_episode("VideoPlaceButton", "test", 0))
 
     assert lines[:2] == ["1. pick up the cube", "2. drop the cube onto target"]
