@@ -71,11 +71,12 @@ def vector():
 
 
 def test_sub_environments_that_take_chunks_equal_single_ones(vector):
-    """Seed 50 starts the test episodes 0 and 1 of 50 in the sub-environments of `vector`; after
-    its end, the second one goes on with episode 2. A single environment with the same options
-    plays the same episodes with the same chunks, and gives the same, bit for bit.
+    """`vector` has two sub-environments. Seed 50 starts test episode 0 of 50 in the first and 1 in
+    the second, which goes on with episode 2 after its end. A single environment with the same
+    options plays these two with the same chunks, and gives the same, bit for bit (`check_second`).
 
-    An episode ends after ten steps: in the middle of the third of three chunks of four.
+    `THREE_CHUNKS` are random, each of four actions for each sub-environment. An episode ends after
+    ten steps, so in the middle of the third chunk.
     """
     single = roboirg.make("VideoUnmaskSwap", **OPTIONS)
 
@@ -88,24 +89,18 @@ def test_sub_environments_that_take_chunks_equal_single_ones(vector):
         check_second(batch, infos, observation, info)
         assert [rewards[1], terminated[1], truncated[1]] == ending
     assert truncated.all()
+    assert infos["steps"].tolist() == [10, 10]
 
     batch, *_, infos = vector.step(THREE_CHUNKS[0])
 
     check_second(batch, infos, *single.reset(options={"episode": 2}))
 
 
-def test_infos_of_sub_environments_have_the_steps_and_the_video_of_each(vector):
-    """The demonstrations of test episodes 0 and 1 have 114 and 168 frames, as they always had.
-
-    Three chunks of four actions are 12, but an episode here ends after ten.
-    """
+def test_a_reset_of_sub_environments_gives_the_demonstration_of_each(vector):
+    """Those of test episodes 0 and 1 have 114 and 168 frames, as long as the episodes' motions."""
     _, infos = vector.reset(seed=50)
 
     assert [video.length for video in infos["demonstration"]] == [114, 168]
-
-    for chunks in THREE_CHUNKS:
-        *_, infos = vector.step(chunks)
-    assert infos["steps"].tolist() == [10, 10]
 
 
 @pytest.mark.parametrize(

@@ -97,9 +97,10 @@ def test_a_stopped_export_goes_on_and_records_each_trajectory_once(
 def test_progress_counts_recorded_trajectories_with_their_size_and_written_episodes(
     tmp_path, synthetic, make_plan
 ):
-    """Of six trajectories four succeed, so four are written at the end.
+    """Progress is told as what is done ("record" or "write"), how many, of how many, and the bytes
+    until then. Six trajectories are recorded, of which four succeed and are written.
 
-    Sizes are of all trajectories up to then, so they grow.
+    Sizes are of all trajectories up to then, so each is larger than the one before.
     """
     progress = []
     export_run.run_export(make_plan(), tmp_path, 0, lambda *now: progress.append(now))
@@ -110,9 +111,10 @@ def test_progress_counts_recorded_trajectories_with_their_size_and_written_episo
 
 
 def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, monkeypatch):
-    """The second export, in another format and setting, must record nothing: it can't.
+    """Trajectories of the first export are kept in a folder of their own. The second export, in
+    another format and setting, must record nothing: `record_trajectory` is None by then.
 
-    `record_trajectory` is None by then. Two tasks with two successes each are four episodes.
+    Two tasks with two successes each are four episodes.
     """
     kept = tmp_path / "kept"
     export_run.run_export(make_plan(), tmp_path / "v3", 0, quiet, kept)

@@ -150,11 +150,10 @@ def test_every_frame_has_the_words_of_its_episode(export, version):
         assert {texts[frame["task_index"]] for frame in frames} == {recording["text"]}
 
 
-@pytest.mark.parametrize("version", VERSIONS)
-def test_the_words_of_a_recording_are_its_instruction(export, version):
+def test_the_words_of_a_recording_are_its_instruction(export):
     """Each row of the table has the text in its own setting, made here anew, and the same command
     with nothing left implicit. Texts that differ are the dataset's tasks."""
-    root = export(format=version)
+    root = export()
 
     recordings = read_rows(root / "meta/demonstrations.parquet")
 

@@ -114,7 +114,9 @@ def disturbed(tmp_path, make_plan, request):
 
 
 def test_a_disturbed_expert_is_labeled_by_what_it_meant_and_replays_exactly(disturbed):
-    """Labels differ from what was executed in some steps but not in all (by more than 1e-6).
+    """A disturbed expert moves a little elsewhere than it meant to, now and then. The label
+    `action` is what it meant: in some steps it differs from what was executed (by more than 1e-6),
+    but not in all.
 
     The replay executes what was executed, so it ends with the same verdict and no difference.
     """

@@ -6,30 +6,10 @@ import numpy as np
 import pytest
 import synthetic_trajectories as synthetic
 
-from roboirg.core.observations import PICTURE_SIZE
 from roboirg.language import instruct
 from roboirg.tasks.splits.splits import get_episode
 
 h5py = pytest.importorskip("h5py")
-
-SHAPES = {
-    "obs/front_rgb": ("uint8", (PICTURE_SIZE, PICTURE_SIZE, 3)),
-    "obs/wrist_rgb": ("uint8", (PICTURE_SIZE, PICTURE_SIZE, 3)),
-    "obs/front_depth": ("int16", (PICTURE_SIZE, PICTURE_SIZE, 1)),
-    "obs/wrist_depth": ("int16", (PICTURE_SIZE, PICTURE_SIZE, 1)),
-    "obs/front_camera_extrinsic": ("float32", (3, 4)),
-    "obs/wrist_camera_extrinsic": ("float32", (3, 4)),
-    "obs/joint_state": ("float32", (7,)),
-    "obs/eef_state": ("float32", (6,)),
-    "obs/gripper_state": ("float32", (2,)),
-    "obs/is_gripper_close": ("bool", ()),
-    "action/joint_action": ("float64", (8,)),
-    "action/eef_action": ("float64", (7,)),
-    "action/waypoint_action": ("float64", (7,)),
-    "info/is_video_demo": ("bool", ()),
-    "info/is_subgoal_boundary": ("bool", ()),
-    "info/is_completed": ("bool", ()),
-}
 
 
 def time_steps(file, name):
@@ -39,21 +19,42 @@ def time_steps(file, name):
 
 
 def test_time_steps_have_robommes_fields(export):
-    """`SHAPES` has the type and shape of each field of a time step; the first one is looked at.
+    """RoboMME documents the type and the shape of each field of a time step; depths are in mm.
 
-    A choice of action is always empty JSON here.
+    A choice of action is always empty JSON here. The first time step of an export is looked at.
     """
     root = export(format="robomme-hdf5", video=True, settings=("explicit",))
 
     with h5py.File(root / "record_dataset_VideoUnmask.h5", "r") as file:
         step = file["episode_0/timestep_0"]
-        for name, (kind, shape) in SHAPES.items():
+        for name, (kind, shape) in {
+            "obs/front_rgb": ("uint8", (256, 256, 3)),
+            "obs/wrist_rgb": ("uint8", (256, 256, 3)),
+            "obs/front_depth": ("int16", (256, 256, 1)),
+            "obs/wrist_depth": ("int16", (256, 256, 1)),
+            "obs/front_camera_extrinsic": ("float32", (3, 4)),
+            "obs/wrist_camera_extrinsic": ("float32", (3, 4)),
+            "obs/joint_state": ("float32", (7,)),
+            "obs/eef_state": ("float32", (6,)),
+            "obs/gripper_state": ("float32", (2,)),
+            "obs/is_gripper_close": ("bool", ()),
+            "action/joint_action": ("float64", (8,)),
+            "action/eef_action": ("float64", (7,)),
+            "action/waypoint_action": ("float64", (7,)),
+            "info/is_video_demo": ("bool", ()),
+            "info/is_subgoal_boundary": ("bool", ()),
+            "info/is_completed": ("bool", ()),
+        }.items():
             assert (step[name].dtype, step[name].shape) == (np.dtype(kind), shape), name
         assert json.loads(step["action/choice_action"][()]) == {"choice": "", "point": []}
 
 
 def test_an_episode_has_its_seed_goal_difficulty_and_camera(export):
-    """Synthetic episodes 0 and 2 of three succeed; episode 1 fails and is not there."""
+    """The setup of an episode has the seed and the difficulty of its scene, the instruction as its
+    goal, and the matrix of the front camera.
+
+    Synthetic episodes 0 and 2 of three succeed; episode 1 fails and is not there.
+    """
     episode = get_episode("VideoUnmask", "train", 0)
     root = export(format="robomme-hdf5", video=True, settings=("explicit",))
 

@@ -72,9 +72,11 @@ def test_the_oracle_is_always_right(kind):
 
 @pytest.mark.parametrize("kind", ["slots", "choice"])
 def test_random_answers_are_at_chance(kind):
-    """Random answers are right as often as `guess_chance` says of their items.
+    """The floor `chance` answers each item at random. It has to be right as often as `guess_chance`
+    computes for the items, in the mean.
 
-    Over 3,000 answers a rate has a standard error of at most 0.0091, so 0.03 is more than three.
+    At least 3,000 answers, with as many seeds as that takes, have a standard error of at most
+    sqrt(0.25 / 3000) = 0.0091, so a deviation of 0.03 is more than three of these.
     """
     known = {item.id: item for item in items()}
     right = []

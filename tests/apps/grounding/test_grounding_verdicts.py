@@ -1,7 +1,6 @@
 """Inspect and our scores give the same verdict on the same answers."""
 
 import functools
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -57,9 +56,12 @@ def own_verdicts():
 
 
 def test_the_listener_is_asked_what_the_dataset_asks_and_takes_its_answer():
-    """A vision-language listener is served the item's right answer and decides the right goal.
+    """A vision-language listener plays: a model reads the instruction and names the goal. Here the
+    model is a server that always replies with the right answer of an item of the dataset, so the
+    goal is right.
 
-    The request that the server got has the texts of the dataset's item in their order.
+    The request that the server got has the texts of the item in their order: what was said, what
+    the pictures show, and the question.
     """
     item = next(item for item in items() if item.setting == "direct")
     episode = get_episode(item.task, item.split, item.episode)
@@ -108,61 +110,52 @@ def run_inspect(data, replies_of, logs, question="slots", stop_reason="stop", **
     return log
 
 
-class ScriptedRun(NamedTuple):
-    """A run in Inspect of a model that gives `replies`: right, wrong and unusable ones by turns.
-
-    Attributes:
-        log: Inspect's.
-        lengths: how many messages each request had.
-    """
-
-    log: object
-    lengths: list
-
-
 @pytest.fixture(scope="module")
-def scripted_run(data, tmp_path_factory):
-    lengths = []
+def scripted_log(data, tmp_path_factory):
+    """Inspect's log of a model that gives `replies`: right, wrong and unusable ones by turns."""
 
     def reply(messages):
         texts = [part.text for part in messages[1].content if part.type == "text"]
-        lengths.append(len(messages))
         return replies()[texts[0], texts[-1]]
 
-    return ScriptedRun(run_inspect(data, reply, tmp_path_factory.mktemp("logs")), lengths)
+    return run_inspect(data, reply, tmp_path_factory.mktemp("logs"))
 
 
-def test_inspect_and_our_scores_have_the_same_verdict_on_each_reply(scripted_run):
-    """In `scripted_run`, Inspect judged right, wrong and unusable replies; `own_verdicts` are those
+def test_inspect_and_our_scores_have_the_same_verdict_on_each_reply(scripted_log):
+    """In `scripted_log`, Inspect judged right, wrong and unusable replies; `own_verdicts` are those
     of `score_answers` on the same replies, by the items' ids. The accuracy is the share of right
     ones; a third of them is right in *direct*, which has an accuracy of its own."""
     expected = {name: verdict.right for name, verdict in own_verdicts().items()}
 
-    log = scripted_run.log
+    found = {}
+    for sample in scripted_log.samples:
+        found[str(sample.id)] = bool(sample.scores["right"].value)
 
-    found = {str(sample.id): bool(sample.scores["right"].value) for sample in log.samples}
-    metrics = log.results.scores[0].metrics
+    metrics = scripted_log.results.scores[0].metrics
     assert found == expected
     assert metrics["accuracy"].value == pytest.approx(np.mean(list(expected.values())))
     assert metrics["direct"].value > 0
 
 
-def test_the_answers_of_an_inspect_log_are_the_replies_of_the_model(scripted_run):
+def test_the_answers_of_an_inspect_log_are_the_replies_of_the_model(scripted_log):
     """`replies` has what the scripted model says about each item."""
     from roboirg.apps.grounding.inspect_grounding import log_answers
 
-    given = {answer.id: answer.reply for answer in log_answers(scripted_run.log)}
+    given = {answer.id: answer.reply for answer in log_answers(scripted_log)}
 
     assert given == {item.id: replies()[asked(item)] for item in items()}
 
 
-def test_inspect_asks_for_an_unusable_reply_once_more(scripted_run):
-    """A question has two messages: the system's and the user's. With the reply and a second
-    request, there are four. A verdict without an understood answer is of an unusable reply."""
-    unusable = [name for name, verdict in own_verdicts().items() if verdict.understood is None]
+def test_inspect_asks_for_an_unusable_reply_once_more(scripted_log):
+    """A conversation has three messages: the system's, the question and the reply. With a second
+    request and its reply, it has five. A verdict in which nothing was understood is of an unusable
+    reply."""
+    verdicts = own_verdicts()
 
-    assert unusable
-    assert scripted_run.lengths.count(4) == len(unusable)
+    asked_twice = {str(sample.id) for sample in scripted_log.samples if len(sample.messages) == 5}
+
+    assert asked_twice
+    assert asked_twice == {name for name in verdicts if verdicts[name].understood is None}
 
 
 @pytest.mark.parametrize("question", ["choice", "points"])

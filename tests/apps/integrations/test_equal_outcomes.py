@@ -58,9 +58,11 @@ def verdicts(table, request, tmp_path):
 
 @pytest.mark.slow
 def test_gymnasium_and_our_runner_agree_on_success_and_steps_of_each_episode(verdicts, ours):
-    """`verdicts` is what the documented program wrote: a policy of recorded actions, some of them
-    cut short, played in `gymnasium.make_vec`. `ours` are outcomes of our runner with the same
-    actions in the same episodes.
+    """`verdicts` is what the documented program wrote: it plays a policy of recorded actions, some
+    of them cut short so that they fail, in `gymnasium.make_vec`, in the setting "contextual".
+
+    `ours` are outcomes of our runner with the same actions in the same episodes: task, episode,
+    whether it succeeded, and its steps.
     """
     found = []
     for verdict in verdicts:

@@ -62,7 +62,7 @@ def test_a_task_that_a_user_s_file_lacks_is_refused(stopcube_wordings):
 
 
 def test_two_exports_of_instructions_have_the_same_bytes_and_leave_nothing_else(tmp_path):
-    """Words are drawn by the number of the episode, not at random, and temporary files are removed."""
+    """Words are drawn by the number of the episode, not at random; no temporary file stays."""
     first = tmp_path / "one.jsonl"
     second = tmp_path / "two.jsonl"
 

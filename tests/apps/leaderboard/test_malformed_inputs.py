@@ -377,7 +377,7 @@ def test_plan_files_are_regular_files(make, tmp_path):
     },
 )
 def test_plan_files_with_other_content_are_refused_by_name(content, complaint, tmp_path):
-    """Each content is YAML that would start code, use up memory or raise an error that is not ours."""
+    """Each content is YAML that starts code, fills the memory or raises an error of the reader."""
     path = tmp_path / "plan.yaml"
     path.write_text(content)
 

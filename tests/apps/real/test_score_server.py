@@ -203,31 +203,44 @@ def test_a_record_has_the_path_of_a_video_inside_the_folder(served):
     assert served.read_trial_log().newest(trial.name).video == "films/a.mp4"
 
 
-def test_a_kill_between_two_clicks_costs_nothing(small):
-    """The command `roboirg real score` serves the page of a study of four trials. It prints an
-    address, which has a key that becomes a cookie; what is sent to /score is a verdict.
+def score_and_kill(folder, trial):
+    """Score a trial as a success on the page of a new server, and kill the server at once.
 
-    Each of two trials is scored through a server of its own, which is killed as soon as it has
-    answered. The second server knows of the first trial, and both verdicts are in the records.
+    The command prints an address, whose key becomes a cookie; verdicts are sent to /score.
+
+    Returns:
+        the page that the server showed before.
+    """
+    command = [sys.executable, "-u", "-c", CLI, "score", str(folder), "--operator", "ann"]
+    server = subprocess.Popen(command, text=True, stdout=subprocess.PIPE)
+    try:
+        url = re.search(r"http\S+", server.stdout.readline())[0]
+        browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+        page = browser.open(url, timeout=600).read().decode()
+        form = {"trial": trial.name, "revision": "0", "choice": "success"}
+        address = url.partition("/?")[0] + "/score"
+        browser.open(address, urllib.parse.urlencode(form).encode(), timeout=600)
+    finally:
+        server.kill()
+        server.wait(timeout=600)
+    return page
+
+
+def test_a_kill_between_two_clicks_costs_nothing(small):
+    """Each of two trials of four is scored through a server that is killed when it has answered.
+
+    The second server knows that one trial is scored and shows the next one, and both verdicts are
+    in the records.
     """
     plan, folder = small
-    command = [sys.executable, "-u", "-c", CLI, "score", str(folder), "--operator", "ann"]
+    first, second, *_ = plan.trials
 
-    for number, trial in enumerate(plan.trials[:2]):
-        server = subprocess.Popen(command, text=True, stdout=subprocess.PIPE)
-        try:
-            url = re.search(r"http\S+", server.stdout.readline())[0]
-            browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
-            page = browser.open(url, timeout=600).read().decode()
-            assert f"{number} of 4 scored" in page
-            assert f"<h1>{number + 1}. {trial.name}</h1>" in page
-            form = {"trial": trial.name, "revision": "0", "choice": "success"}
-            address = url.partition("/?")[0] + "/score"
-            browser.open(address, urllib.parse.urlencode(form).encode(), timeout=600)
-        finally:
-            server.kill()
-            server.wait(timeout=600)
+    first_page = score_and_kill(folder, first)
+    second_page = score_and_kill(folder, second)
 
+    assert "0 of 4 scored" in first_page
+    assert "1 of 4 scored" in second_page
+    assert f"<h1>2. {second.name}</h1>" in second_page
     assert [record.outcome for record in read_records(folder)] == ["success", "success"]
 
 
