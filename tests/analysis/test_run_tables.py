@@ -122,64 +122,94 @@ def test_other_tables_are_as_stored(snapshot, name, kind):
     assert get_format(kind).draw(table) == snapshot
 
 
-END_OF_LETTER = {
-    "s": ("success", None),
-    "g": ("failure", GROUNDING),
-    "x": ("failure", EXECUTION),
-    "u": ("failure", UNDECIDED),
-    "-": ("failure", None),
-    "!": ("error", None),
+ENDINGS = {
+    "success": ("success", None),
+    "grounding": ("failure", GROUNDING),
+    "execution": ("failure", EXECUTION),
+    "undecided": ("failure", UNDECIDED),
+    "unattributed": ("failure", None),
+    "error": ("error", None),
 }
+"""How an episode can end: its outcome, and the kind of its failure."""
 
 
-def results_that_ended(letters, setting):
-    """Return an episode for each letter, which ended as `END_OF_LETTER` says."""
-    found = []
-    for episode, letter in enumerate(letters):
-        outcome, attribution = END_OF_LETTER[letter]
-        result = make_result(outcome, episode, setting=setting, attribution=attribution)
-        found.append(result)
-    return found
+def line_of_failures(explicit, direct):
+    """Return the line of *direct* in the table of failures: texts without intervals, by column.
+
+    Both name the ending of each episode (`ENDINGS`), from episode 0 on.
+    """
+    results = []
+    for setting, endings in (("explicit", explicit), ("direct", direct)):
+        for episode, ending in enumerate(endings.split()):
+            outcome, attribution = ENDINGS[ending]
+            results.append(make_result(outcome, episode, setting=setting, attribution=attribution))
+    table = make_failure_table(RunData(frame_of(results)))
+    _, line = table.rows
+    names = [column.name for column in table.columns]
+    return dict(zip(names, [entry.text.split(" (")[0] for entry in line.entries], strict=True))
+
+
+def test_success_and_three_kinds_of_failure_add_up_to_100_percent():
+    """One of four episodes ends in each way, the last one in a failure without a known kind, which
+    counts as undecided. Nothing fails in explicit, so no share of failures is known there."""
+    line = line_of_failures("success", direct="success grounding execution unattributed")
+
+    for kind in ("success", "grounding", "execution", "undecided"):
+        assert line[kind] == "25.00", kind
+    assert line["the same in explicit"] == "–"
+
+
+def test_changes_of_success_and_of_three_kinds_of_failure_add_up_to_0():
+    """Of four episodes, success falls from 3 to 1, which is -50 points; grounding rises from 0 to
+    1, execution stays at 1, and undecided rises from 0 to 1."""
+    explicit = "success success success execution"
+    direct = "success grounding undecided execution"
+
+    line = line_of_failures(explicit, direct)
+
+    assert line["gap to explicit"] == "−50.0"
+    assert line["grounding, change"] == line["undecided, change"] == "+25.0"
+    assert line["execution, change"] == "±0.0"
+
+
+def test_changes_are_of_the_episodes_that_have_no_error_in_either_setting():
+    """The first two of six episodes have an error in one of the settings.
+
+    In the other four, success rises from 1 to 2 and grounding falls from 2 to 1. The rate is of
+    five episodes, three of them successes.
+    """
+    explicit = "error success grounding grounding execution success"
+    direct = "success error success grounding execution success"
+
+    line = line_of_failures(explicit, direct)
+
+    assert line["success"] == "60.00"
+    assert line["gap to explicit"] == "+25.0"
+    assert line["grounding, change"] == "−25.0"
 
 
 @pytest.mark.parametrize(
-    ("explicit", "direct", "rates", "changes", "shares"),
+    ("failures", "share"),
     [
-        (
-            "ssssssssgx", "sssssgggxu", "50 30 10 10", "−30 +20 ±0 +10", "60–80 50"
-        ),
-        (
-            "ssssssssgx", "sssssggg-u", "50 30 0 20", "−30 +20 −10 +20", "60–100 50",
-        ),
-        (
-            "gg!sssxxss", "x!ssssssss", "89 0 11 0", "+25 −12 −12 ±0", "0 50"
-        ),
-        (
-            "ssssssssss", "sssssssssg", "90 10 0 0", "−10 +10 ±0 ±0", "100 –"
-        ),
-    ], ids=["each kind", "not attributed", "errors", "one failure"],
-)  # fmt: skip
-def test_success_and_three_kinds_of_failure_add_up_to_100_and_their_changes_to_0(
-    explicit, direct, rates, changes, shares
-):
-    """A letter is how an episode ended: s success, g grounding, x execution, u or - undecided.
+        ("grounding grounding grounding execution undecided", "60–80"),
+        ("grounding grounding grounding unattributed undecided", "60–100"),
+        ("execution", "0"),
+        ("grounding", "100"),
+    ],
+)
+def test_the_share_of_grounding_leaves_open_what_undecided_failures_are(failures, share):
+    """At most all undecided ones are failures of grounding, too: 3 of five failures and 1 that is
+    undecided are 60 to 80 %."""
+    line = line_of_failures("success", direct=failures)
 
-    Rates are the percentages of s, g, x and undecided in direct: in the first case 5, 3, 1 and 1 of
-    ten. Changes are those less the ones of explicit (8, 1, 1 and 0 of ten), over the same episodes:
-    in the third case, errors (!) leave eight of ten. Shares are those of grounding among failures,
-    in direct and in explicit: from 60 to 80 % if 3 of 5 are g and one is undecided.
-    """
-    data = RunData(
-        frame_of(results_that_ended(explicit, "explicit"), results_that_ended(direct, "direct"))
-    )
+    assert line["grounding of failures"] == share
 
-    _, row = make_failure_table(data).rows
 
-    # The row has trials, failures, four rates, four changes, and two shares.
-    texts = [entry.text.split(".")[0] for entry in row.entries]
-    assert [f"{entry.percent:.0f}" for entry in row.entries[2:6]] == rates.split()
-    assert texts[6:10] == changes.split()
-    assert texts[10:] == shares.split()
+def test_the_share_of_grounding_in_explicit_stands_next_to_it():
+    """Explicit names every object, so a failure of grounding there is not due to references."""
+    line = line_of_failures(explicit="grounding execution", direct="success success")
+
+    assert line["the same in explicit"] == "50"
 
 
 def test_a_failure_whose_name_this_version_does_not_know_counts_as_not_attributed():
@@ -293,11 +323,12 @@ def test_tables_of_policies_stand_in_the_order_of_the_plan_and_the_legend_below_
 
 
 def test_a_suite_that_was_played_in_part_is_marked_in_the_table_of_forms():
-    """One of the four tasks of counting was played, implicit and resolved: two episodes each.
-
-    A letter is an episode, 1 won and 0 lost.
+    """A suite is a group of tasks, of which the table shows the mean. Only one of the four tasks of
+    counting was played, so the mean is marked by a star, which a note explains. The table needs
+    both forms of instructions: the implicit one, and the one with references spelled out
+    (resolved).
     """
-    results = [*make_results("10", "direct"), *make_results("11", "direct", form="resolved")]
+    results = [*play("10", "direct"), *play("11", "direct", form="resolved")]
 
     table = diagnostic_tables()["forms"].make(RunData(frame_of(results)))
 
