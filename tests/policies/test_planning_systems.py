@@ -212,38 +212,75 @@ class ServerWithoutMemory(MmeVlaServer):
         return super().infer(message)
 
 
-GEMINI_REPLY = '{"description": "x", "subgoal_sequence": [], "subgoal": "put it down"}'
-MEMER_REPLY = '{"current_subtask": "put it down", "keyframe_positions": [1]}'
+def play_two_seconds(name, server, model):
+    """Play 40 control steps with a system of the paper; its policy asks at steps 0, 16 and 32.
+
+    Args:
+        name: of the system.
+        server: of its policy, which writes down its messages.
+        model: the server of its planner's model; None for a system without one.
+    """
+    addresses = {"server": server.place, "policy.timeout": "300"}
+    if model is not None:
+        addresses["vlm"] = model.url
+    policy = load_system(name, addresses)
+    needs = PolicyNeeds.of(policy).env_options
+    env = roboirg.make("PickXtimes", setting="direct", max_steps=40, **needs)
+    info = play(env, policy)
+    policy.close()
+    assert info["status"] == "timeout"
+
+
+def subgoals_sent_to(server):
+    """Return the subgoal in each request for actions that a policy server got; None for none."""
+    messages = map(unpack, server.messages)
+    return [message.get("grounded_subgoal") for message in messages if "prompt" in message]
+
+
+@pytest.mark.sim
+def test_a_system_without_a_planner_sends_no_subgoals():
+    """TTT-Expert is a policy with a memory, which asks its server for actions at steps 0, 16 and 32
+    of 40.
+    """
+    with MmeVlaServer() as server:
+        play_two_seconds("TTT-Expert", server, model=None)
+
+    assert subgoals_sent_to(server) == [None, None, None]
+
+
+@pytest.mark.sim
+def test_the_oracle_system_sends_subgoals_with_points_of_the_picture():
+    """Its planner reads the simulator and asks no model: *pick up the red cube at <120, 80>* ..."""
+    with ServerWithoutMemory() as server:
+        play_two_seconds("GroundSG-oracle", server, model=None)
+
+    subgoals = subgoals_sent_to(server)
+    assert len(subgoals) == 3
+    for subgoal in subgoals:
+        assert re.fullmatch(r"pick up the \w+ cube at <\d+, \d+> .*", subgoal)
 
 
 @pytest.mark.sim
 @pytest.mark.parametrize(
-    ("name", "reply", "questions", "subgoal"),
+    ("name", "reply", "questions"),
     [
-        ("TTT-Expert", "", 0, "None"),
-        ("GroundSG-Gemini", GEMINI_REPLY, 1, "put it down"),
-        ("GroundSG-oracle", "", 0, r"pick up the \w+ cube at <\d+, \d+> .*"),
-        ("MemER", MEMER_REPLY, 3, "put it down"),
+        (
+            "GroundSG-Gemini",
+            '{"description": "x", "subgoal_sequence": [], "subgoal": "put it down"}',
+            1,
+        ),
+        ("MemER", '{"current_subtask": "put it down", "keyframe_positions": [1]}', 3),
     ],
 )
-def test_every_system_plays_a_whole_episode(name, reply, questions, subgoal):
-    """40 steps in three chunks, against a policy server and a model's server on real sockets."""
-    server = MmeVlaServer() if name == "TTT-Expert" else ServerWithoutMemory()
-    with server, fake_vlm([reply]) as vlm:
-        addresses = {"server": server.place, "policy.timeout": "300"}
-        if reply:
-            addresses["vlm"] = vlm.url
-        policy = load_system(name, addresses)
-        env = roboirg.make(
-            "PickXtimes", setting="direct", max_steps=40, **PolicyNeeds.of(policy).env_options
-        )
-        info = play(env, policy)
-        policy.close()
+def test_a_system_with_a_model_sends_the_subgoal_that_the_model_names(name, reply, questions):
+    """The model always replies *put it down*, in the JSON that each planner asks for.
 
-    assert info["status"] == "timeout"
-    messages = map(unpack, server.messages)
-    named = [message.get("grounded_subgoal") for message in messages if "prompt" in message]
-    assert len(named) == 3
-    for words in named:
-        assert re.fullmatch(subgoal, str(words))
-    assert len(vlm.requests) == questions
+    In 40 steps the policy asks its server for actions three times, each time with that subgoal. The
+    planner of MemER asks its model before each of them; that of GroundSG-Gemini once, as it does
+    not ask again before step 75.
+    """
+    with ServerWithoutMemory() as server, fake_vlm([reply]) as model:
+        play_two_seconds(name, server, model)
+
+    assert subgoals_sent_to(server) == ["put it down", "put it down", "put it down"]
+    assert len(model.requests) == questions

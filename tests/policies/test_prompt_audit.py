@@ -148,18 +148,29 @@ def test_a_sentencepiece_model_lies_between_the_bounds(sentencepiece_file, text)
 
 
 def test_a_json_tokenizer_is_read(tmp_path):
+    """A tokenizer of the library `tokenizers` makes a token of each word, and puts *[B]*, the
+    beginning, before them.
+
+    Read back from its file it gives 1 token before the words, tokens that end after 3, 7, 12 and 13
+    characters (*put|the|cube|.*), and behind them 1 token for the line break that prompts get. The
+    file's own truncation and padding do not count.
+    """
     tokenizers = pytest.importorskip("tokenizers")
-    words = {word: number for number, word in enumerate(["[B]", "put", "the", "cube", ".", "[U]"])}
-    model = tokenizers.Tokenizer(tokenizers.models.WordLevel(words, unk_token="[U]"))  # noqa: S106
-    model.pre_tokenizer = tokenizers.pre_tokenizers.Whitespace()
-    model.post_processor = tokenizers.processors.TemplateProcessing("[B] $A", None, [("[B]", 0)])
-    model.enable_truncation(3)
-    model.enable_padding(length=20)
-    path = tmp_path / "tokenizer.json"
+    numbers = {"[B]": 0, "put": 1, "the": 2, "cube": 3, ".": 4, "[unknown]": 5}
+    model = tokenizers.models.WordLevel(numbers, unk_token="[unknown]")  # noqa: S106
+    tokenizer = tokenizers.Tokenizer(model)
+    tokenizer.pre_tokenizer = tokenizers.pre_tokenizers.Whitespace()
+    tokenizer.post_processor = tokenizers.processors.TemplateProcessing(
+        "[B] $A", None, [("[B]", 0)]
+    )
+    tokenizer.enable_truncation(3)
+    tokenizer.enable_padding(length=20)
+    path = str(tmp_path / "tokenizer.json")
+    tokenizer.save(path)
 
-    model.save(str(path))
+    tokens = read_tokenizer(path)("put the cube.")
 
-    assert read_tokenizer(str(path))("put the cube.") == Tokens(1, (3, 7, 12, 13), 1)
+    assert tokens == Tokens(before=1, ends=(3, 7, 12, 13), after=1)
 
 
 @pytest.mark.parametrize(
