@@ -63,25 +63,41 @@ def test_a_free_server_is_not_waited_for(tmp_path, reported):
 
 
 @pytest.mark.usefixtures("process_with_first_server")
-def test_waiting_for_a_busy_server_is_reported_counted_and_ends_in_an_error(tmp_path, reported):
-    """Another process (the fixture) has the first server, so a wait of 0.2 s ends in an error.
-
-    `reported` has what was waited for, in order: the test itself, then a free server, then the
-    test again once that ended, then nothing. The 0.2 s count as time in a queue.
-    """
-    before = queued_seconds()
-
-    with (
-        waiting.waiting("its turn in a test"),
-        pytest.raises(PolicyTimeoutError, match=r"Other episodes used h:8001 for 0\.2 s"),
-    ):
+def test_waiting_for_a_busy_server_ends_in_an_error(tmp_path):
+    """Another process (the fixture) has locked h:8001, the first server, for an hour."""
+    with pytest.raises(PolicyTimeoutError, match=r"Other episodes used h:8001 for 0\.2 s"):
         lock_server([FIRST_SERVER], wait=0.2, folder=tmp_path)
 
-    outer, for_server, again, end = reported
-    assert for_server.what == "a free server: h:8001"
-    assert for_server.is_queue
-    assert (again, end) == (outer, None)
+
+@pytest.mark.usefixtures("process_with_first_server")
+def test_the_wait_for_a_busy_server_counts_as_time_in_a_queue(tmp_path):
+    """Another process (the fixture) has locked the first server; this one waits 0.2 s for it."""
+    before = queued_seconds()
+
+    with pytest.raises(PolicyTimeoutError):
+        lock_server([FIRST_SERVER], wait=0.2, folder=tmp_path)
+
     assert queued_seconds() - before >= 0.2
+
+
+@pytest.mark.usefixtures("process_with_first_server")
+def test_the_wait_for_a_busy_server_is_reported_within_what_was_waited_for(tmp_path, reported):
+    """Another process (the fixture) has locked h:8001, the first server.
+
+    `reported` has what this process waits for, whenever that changes: its turn, then the server,
+    then its turn again, then nothing.
+    """
+    with waiting.waiting("its turn"), pytest.raises(PolicyTimeoutError):
+        lock_server([FIRST_SERVER], wait=0.2, folder=tmp_path)
+
+    turn, server, turn_again, nothing = reported
+    assert [wait.what for wait in (turn, server, turn_again)] == [
+        "its turn",
+        "a free server: h:8001",
+        "its turn",
+    ]
+    assert server.is_queue
+    assert nothing is None
 
 
 @pytest.mark.usefixtures("process_with_first_server")

@@ -72,8 +72,12 @@ class Posing(Recorder):
 
 
 @pytest.fixture(autouse=True)
-def _forget():
+def recorders():
+    """The policies (of the class Recorder) that a server has made, in their order: one when it is
+    opened, and then one for each episode.
+    """
     Recorder.episodes.clear()
+    return Recorder.episodes
 
 
 def check_same(given, kept, fields):
@@ -81,148 +85,226 @@ def check_same(given, kept, fields):
         assert np.array_equal(given[field], kept[field]), field
 
 
-FIELDS_SENT = {
-    "openpi": ("front_rgb", "wrist_rgb", "joint_positions"),
-    "mme-vla": ("front_rgb", "wrist_rgb", "joint_positions"),
-    "challenge": ("front_rgb", "wrist_rgb", "joint_positions", "gripper", "end_effector"),
-}
-
-
 def play(url, length, *moments, **more):
-    """Play an episode at a server; return the chunks and the client's metadata."""
+    """Play an episode at a server, with a video of that length; return the client's metadata and
+    the chunks of actions that it got, one for each moment.
+    """
     client = make_policy(url, 0)
     client.reset(moments[0]["instruction"], video(length, **more))
     chunks = [client.act(seen).tolist() for seen in moments]
     client.close()
-    return chunks, client.metadata
+    return client.metadata, chunks
 
 
-FIRST_MOMENT = moment(3, history=())
-LATER_MOMENT = moment(5, history=(moment(4), moment(5)))
-
-
-def served_episodes(protocol):
-    """Play two episodes through a server, of videos of three and two moments."""
-    expected = {
-        "policy": HERE, "network": "none", "protocol": protocol,
-        "python": platform.python_version(),
-    }  # fmt: skip
-    with served(HERE, protocol, seed=7) as url:
-        for length in (3, 2):
-            chunks, metadata = play(url, length, FIRST_MOMENT, LATER_MOMENT)
-            assert chunks == [[[1] * 8] * 4, [[2] * 8] * 4]
-            assert expected.items() <= metadata.items()
-    _opened, *episodes = Recorder.episodes
-    return episodes
+FIRST = moment(3, history=())
+"""What a client shows at the first question, after a video of the moments 0 to 2."""
+SECOND = moment(5, history=(moment(4), moment(5)))
+"""What it shows at the second question, with all moments since the first in the history."""
 
 
 @pytest.mark.parametrize("protocol", SERVED)
-def test_a_served_policy_sees_what_its_client_was_shown(protocol):
-    """A client plays two episodes at a server: in each, two moments are shown to the policy behind
-    it.
-
-    The policy writes down what it gets: seed 7 of the server, the instruction (MME-VLA lowers it),
-    and the fields that the protocol carries, equal to what the client was given. A message has one
-    number for the gripper; the policy sees it as two fingers, of which the first is compared.
+def test_a_server_makes_a_policy_for_each_episode_and_closes_it(recorders, protocol):
+    """The policy of a server with seed 7 counts its calls in its actions: all numbers of the first
+    chunk are 1. In the second episode the count begins anew, with another policy.
     """
-    first, second = served_episodes(protocol)
+    with served(HERE, protocol, seed=7) as url:
+        _, first_chunks = play(url, 3, FIRST)
+        _, second_chunks = play(url, 3, FIRST)
 
-    for policy in (first, second):
-        assert (policy.seed, policy.closed) == (7, True)
-        assert policy.instruction == (INSTRUCTION.lower() if protocol == "mme-vla" else INSTRUCTION)
-        for given, observation in zip((FIRST_MOMENT, LATER_MOMENT), policy.calls, strict=True):
-            check_same(given, observation, FIELDS_SENT[protocol])
-            assert observation["gripper"].shape == (2,)
-            assert observation["gripper"][0] == given["gripper"][0]
-
-
-@pytest.mark.parametrize("protocol", [name for name in SERVED if name != "openpi"])
-def test_a_served_policy_sees_the_video_and_the_moments_between_two_questions(protocol):
-    """A client plays two episodes, with videos of three and of two moments.
-
-    The policy behind the server sees the videos, and at the second question the moments 4 and 5
-    since the first, as its history. MME-VLA sends no pictures of the wrist in these, and openpi
-    neither videos nor moments.
-    """
-    first, second = served_episodes(protocol)
-    shown = set(FIELDS_SENT[protocol])
-    if protocol == "mme-vla":
-        shown.remove("wrist_rgb")
-
-    check_same(video(3), first.demonstration, shown)
-    assert len(second.demonstration["joint_positions"]) == 2
-    assert first.calls[0]["history"][:-1] == ()
-    for given, kept in zip(LATER_MOMENT["history"], first.calls[1]["history"], strict=True):
-        check_same(given, kept, shown)
+    _opened, first, second = recorders
+    assert (first.seed, second.seed) == (7, 7)
+    assert first.closed
+    assert second.closed
+    assert np.array_equal(first_chunks, np.full((1, 4, 8), 1))
+    assert np.array_equal(second_chunks, np.full((1, 4, 8), 1))
 
 
-def test_a_policy_that_is_served_by_openpi_gets_no_video():
-    """The client has a video of three moments, which openpi has no message for."""
-    first, _ = served_episodes("openpi")
-    assert len(first.demonstration["joint_positions"]) == 0
+@pytest.mark.parametrize("protocol", SERVED)
+def test_the_client_of_a_served_policy_has_its_metadata(protocol):
+    """The policy Recorder declares that it has no network; the server adds the rest."""
+    with served(HERE, protocol) as url:
+        metadata, _ = play(url, 3, FIRST)
+
+    assert metadata["policy"] == HERE
+    assert metadata["network"] == "none"
+    assert metadata["protocol"] == protocol
+    assert metadata["python"] == platform.python_version()
 
 
-GROWING_PROMPT = [
-    {**moment(0, history=()), "instruction": "this one is red."},
-    {**moment(2, history=(moment(1), moment(2))), "instruction": "please note."},
-    {**moment(3, history=(moment(3),)), "instruction": "please note."},
-    {**moment(5, history=(moment(4), moment(5))), "instruction": "take it."},
-]
-"""What a client sends at four questions: its instruction changes twice, at steps 2 and 5."""
+@pytest.mark.parametrize(
+    ("protocol", "instruction"),
+    [
+        ("openpi", "Put the Red cube on the target."),
+        ("challenge", "Put the Red cube on the target."),
+        ("mme-vla", "put the red cube on the target."),
+    ],
+)
+def test_a_served_policy_gets_the_instruction_lowered_by_mme_vla(recorders, protocol, instruction):
+    """The client says *Put the Red cube on the target.*"""
+    with served(HERE, protocol) as url:
+        play(url, 3, FIRST)
+
+    assert recorders[-1].instruction == instruction
 
 
-@pytest.mark.parametrize("protocol", [name for name in SERVED if name != "openpi"])
-def test_a_served_policy_hears_each_new_sentence_of_a_growing_prompt(protocol):
-    """In both episodes the client's prompt changes: *this one is red*, *please note*, *take it*.
-
-    The first is the instruction; the policy hears the others with the steps at which they came, 2
-    and 5. Steps of the second episode, which is checked here, are counted from its own beginning.
+@pytest.mark.parametrize(
+    ("protocol", "fields"),
+    [
+        ("openpi", ["front_rgb", "wrist_rgb", "joint_positions"]),
+        ("mme-vla", ["front_rgb", "wrist_rgb", "joint_positions"]),
+        ("challenge", ["front_rgb", "wrist_rgb", "joint_positions", "gripper", "end_effector"]),
+    ],
+)
+def test_a_served_policy_sees_what_its_client_was_shown(recorders, protocol, fields):
+    """A client is shown FIRST and SECOND, and the policy behind the server keeps what it sees
+    (`calls`): the fields that the protocol carries are equal.
     """
     with served(HERE, protocol) as url:
-        play(url, 3, *GROWING_PROMPT)
-        play(url, 2, *GROWING_PROMPT)
+        play(url, 3, FIRST, SECOND)
 
-    *_, policy = Recorder.episodes
-    assert policy.instruction == "this one is red."
-    assert policy.heard == [("please note.", 2), ("take it.", 5)]
+    first_seen, second_seen = recorders[-1].calls
+    check_same(FIRST, first_seen, fields)
+    check_same(SECOND, second_seen, fields)
 
 
-def test_openpi_has_no_reset_so_that_a_new_prompt_is_a_new_episode():
-    """The client's prompt ends with *take it*: the last policy has it as its instruction.
+@pytest.mark.parametrize("protocol", SERVED)
+def test_a_served_policy_sees_the_gripper_as_two_fingers(recorders, protocol):
+    """Most protocols carry one number for the gripper, the position of its first finger."""
+    with served(HERE, protocol) as url:
+        play(url, 3, FIRST)
 
-    It heard nothing during its episode, as each of the changes before began another one.
+    (seen,) = recorders[-1].calls
+    assert seen["gripper"].shape == (2,)
+    assert seen["gripper"][0] == FIRST["gripper"][0]
+
+
+VIDEO_FIELDS = [
+    ("mme-vla", ["front_rgb", "joint_positions"]),
+    ("challenge", ["front_rgb", "wrist_rgb", "joint_positions", "gripper", "end_effector"]),
+]
+"""What protocols carry of each moment of a video or a history."""
+
+
+@pytest.mark.parametrize(("protocol", "fields"), VIDEO_FIELDS)
+def test_a_served_policy_sees_the_video(recorders, protocol, fields):
+    """Two episodes have videos of three and of two moments; nothing of the first is in the second.
+
+    `fields` are those that the protocol carries of a video.
+    """
+    with served(HERE, protocol) as url:
+        play(url, 3, FIRST)
+        play(url, 2, FIRST)
+
+    _opened, first, second = recorders
+    check_same(video(3), first.demonstration, fields)
+    check_same(video(2), second.demonstration, fields)
+
+
+@pytest.mark.parametrize(("protocol", "fields"), VIDEO_FIELDS)
+def test_a_served_policy_sees_the_moments_between_two_questions(recorders, protocol, fields):
+    """The first question shows moment 3, and nothing before it. The second one shows moment 5, with
+    the moments 4 and 5 since the first as its history.
+
+    `fields` are those that the protocol carries of a history.
+    """
+    with served(HERE, protocol) as url:
+        play(url, 3, FIRST, SECOND)
+
+    first_seen, second_seen = recorders[-1].calls
+    earlier, newest = second_seen["history"]
+    assert len(first_seen["history"]) <= 1  # at most moment 3 itself
+    check_same(moment(4), earlier, fields)
+    check_same(moment(5), newest, fields)
+
+
+def test_a_policy_that_is_served_by_openpi_gets_no_video(recorders):
+    """The client has a video of three moments, which openpi has no message for."""
+    with served(HERE, "openpi") as url:
+        play(url, 3, FIRST)
+
+    assert len(recorders[-1].demonstration["joint_positions"]) == 0
+
+
+def saying(text, number, *since):
+    """Return what a client shows at a moment: the text said last, and the moments since."""
+    return {**moment(number, history=map(moment, since)), "instruction": text}
+
+
+@pytest.mark.parametrize("protocol", [name for name in SERVED if name != "openpi"])
+def test_a_served_policy_hears_each_new_sentence_of_a_growing_prompt(recorders, protocol):
+    """At steps 0, 2, 3 and 5 a client asks for actions; its prompt changes at steps 2 and 5.
+
+    The first text is the instruction; the policy hears the others, with their steps. So it does in
+    a second episode, whose steps are counted from its own beginning.
+    """
+    asked = [
+        saying("this one is red.", 0),
+        saying("please note.", 2, 1, 2),
+        saying("please note.", 3, 3),
+        saying("take it.", 5, 4, 5),
+    ]
+
+    with served(HERE, protocol) as url:
+        play(url, 3, *asked)
+        play(url, 2, *asked)
+
+    for policy in recorders[1:]:  # the first one was made as the server was opened
+        assert policy.instruction == "this one is red."
+        assert policy.heard == [("please note.", 2), ("take it.", 5)]
+
+
+def test_openpi_has_no_reset_so_that_a_new_prompt_is_a_new_episode(recorders):
+    """A client asks twice in one episode, and its prompt changes in between.
+
+    With openpi the server cannot tell this from a new episode. So the policy begins one, with the
+    second text as its instruction, and hears nothing in it.
     """
     with served(HERE, "openpi") as url:
-        play(url, 3, *GROWING_PROMPT)
+        play(url, 3, saying("this one is red.", 0), saying("take it.", 2, 1, 2))
 
-    *_, policy = Recorder.episodes
+    policy = recorders[-1]
     assert policy.instruction == "take it."
     assert policy.heard == []
 
 
-def test_a_served_policy_sees_depth_and_calibration_if_the_client_sends_them():
-    """Moment 3 is shown at the first question, and moments 4 and 5 at the second.
+DEPTH_AND_MATRICES = [name for name in moment(0, sensors=True) if name != "instruction"]
 
-    The policy wants depth and declares that it observes each step. What it gets equals what the
-    client was given, field by field: in the video, at the first question, and in the history of
-    the second.
+
+def played_with_sensors(recorders):
+    """Return the policy `Seeing`, which wants depth, after an episode of two questions: moment 3,
+    and moment 5 with the moments 4 and 5 since the first. Moments have depth and the cameras'
+    matrices.
     """
     before, between, now = (moment(number, sensors=True) for number in (3, 4, 5))
-    fields = [field for field in now if field != "instruction"]
-
+    asked = [{**before, "history": ()}, {**now, "history": (between, now)}]
     with served(f"{__name__}:Seeing", "challenge") as url:
-        play(
-            f"{url}?depth=yes&calibration=yes", 3, {**before, "history": ()},
-            {**now, "history": (between, now)}, sensors=True,
-        )  # fmt: skip
+        play(f"{url}?depth=yes&calibration=yes", 3, *asked, sensors=True)
+    return recorders[-1]
 
-    _opened, policy = Recorder.episodes
-    first, second = policy.calls
-    check_same(video(3, sensors=True), policy.demonstration, fields)
-    check_same(before, first, fields)
-    check_same(between, second["history"][0], fields)
-    check_same(now, second["history"][1], fields)
-    assert second["front_depth"].dtype == np.int16
+
+def test_a_served_policy_sees_depth_and_calibration_of_each_question(recorders):
+    """The questions show the moments 3 and 5; depth is in whole millimeters."""
+    first_seen, second_seen = played_with_sensors(recorders).calls
+
+    check_same(moment(3, sensors=True), first_seen, DEPTH_AND_MATRICES)
+    check_same(moment(5, sensors=True), second_seen, DEPTH_AND_MATRICES)
+    assert second_seen["front_depth"].dtype == np.int16
+
+
+def test_a_served_policy_sees_depth_and_calibration_of_the_moments_between_questions(recorders):
+    """The second question shows the moments 4 and 5 since the first one as its history."""
+    _, second_seen = played_with_sensors(recorders).calls
+
+    earlier, newest = second_seen["history"]
+    check_same(moment(4, sensors=True), earlier, DEPTH_AND_MATRICES)
+    check_same(moment(5, sensors=True), newest, DEPTH_AND_MATRICES)
+
+
+def test_a_served_policy_sees_depth_and_calibration_of_the_video(recorders):
+    """The video has the moments 0 to 2."""
+    policy = played_with_sensors(recorders)
+
+    check_same(video(3, sensors=True), policy.demonstration, DEPTH_AND_MATRICES)
 
 
 def test_a_request_whose_lists_differ_in_length_is_refused():
@@ -252,47 +334,45 @@ def reply_to(raw, message):
     return unpack(raw.recv())
 
 
-FRAMES = np.stack([moment(number)["front_rgb"][None] for number in range(3)])
-VIDEO_OF_TWO_FRAMES_AND_THE_FIRST_MOMENT = {
-    "add_buffer": True,
-    "images": FRAMES,
-    "state": np.zeros((3, 8), np.float32),
-    "exec_start_idx": 2,
-}
-
-
 @pytest.mark.parametrize("kind", ["grounded", "simple"])
-def test_connections_to_an_mme_vla_server_share_one_policy(kind):
-    """The video comes over one connection, and the question with its subgoal over another.
+def test_connections_to_an_mme_vla_server_share_one_policy(recorders, kind):
+    """A server of MME-VLA has one memory for all connections.
 
-    The buffer holds two frames of the video and the current one: the policy sees the video of two,
-    and follows the subgoal. (The first recorded policy is the one with which the server was
-    opened.)
+    Over the first one come three frames, of which the first two (`exec_start_idx`) are the video,
+    and over the second one the question, with a subgoal. One policy has seen the video and follows
+    the subgoal.
     """
-    request = {
-        "observation/image": FRAMES[2, 0],
-        "observation/wrist_image": FRAMES[2, 0],
+    frames = np.stack([moment(number)["front_rgb"][None] for number in range(3)])
+    shown = {"images": frames, "state": np.zeros((3, 8), np.float32), "exec_start_idx": 2}
+    question = {
+        "observation/image": frames[2, 0],
+        "observation/wrist_image": frames[2, 0],
         "observation/state": np.zeros(8),
         "prompt": "go",
         f"{kind}_subgoal": "pick up the cube at <1, 2>",
     }
-    with served(HERE, "mme-vla") as url, opened(url) as first, opened(url) as second:
-        reset = reply_to(first, {"reset": True})
-        shown = reply_to(first, VIDEO_OF_TWO_FRAMES_AND_THE_FIRST_MOMENT)
-        asked = reply_to(second, request)
 
-    assert reset.keys() == {"reset_finished", "reset_time_ms"}
-    assert shown.keys() == {"add_buffer_finished", "add_buffer_time_ms"}
-    assert asked.keys() == {"actions", "infer_time_ms"}
-    _opened, policy = Recorder.episodes
-    assert np.array_equal(policy.demonstration["front_rgb"], FRAMES[:2, 0])
+    with served(HERE, "mme-vla") as url, opened(url) as first, opened(url) as second:
+        answers = [
+            reply_to(first, {"reset": True}),
+            reply_to(first, {"add_buffer": True, **shown}),
+            reply_to(second, question),
+        ]
+
+    assert [set(answer) for answer in answers] == [
+        {"reset_finished", "reset_time_ms"},
+        {"add_buffer_finished", "add_buffer_time_ms"},
+        {"actions", "infer_time_ms"},
+    ]
+    _opened, policy = recorders
+    assert np.array_equal(policy.demonstration["front_rgb"], frames[:2, 0])
     assert policy.subgoals == ["pick up the cube at <1, 2>"]
 
 
-def test_idle_connections_make_no_policy():
+def test_idle_connections_make_no_policy(recorders):
     """The only one is that with which the server was opened."""
     with served(HERE, "mme-vla") as url, opened(url), opened(url):
-        assert len(Recorder.episodes) == 1
+        assert len(recorders) == 1
 
 
 @pytest.mark.parametrize(
@@ -329,7 +409,7 @@ def test_after_a_malformed_request_the_next_episode_works():
             raw.send(b"\xc1")
             raw.recv()
 
-        chunks, _ = play(url, 0, moment(0, history=()))
+        _, chunks = play(url, 0, moment(0, history=()))
 
     assert np.shape(chunks) == (1, 4, 8)
 
@@ -373,7 +453,7 @@ def test_a_server_with_a_key_serves_a_client_with_the_same_key(protocol, monkeyp
     """Both have *sesame*: one chunk of 4 actions of 8 numbers is the answer of the policy."""
     monkeypatch.setenv("KEY", "sesame")
     with served(HERE, protocol, key="sesame") as url:
-        chunks, _ = play(f"{url}?api_key_env=KEY", 0, moment(0, history=()))
+        _, chunks = play(f"{url}?api_key_env=KEY", 0, moment(0, history=()))
 
     assert np.shape(chunks) == (1, 4, 8)
 
@@ -429,7 +509,7 @@ def test_the_command_serve_runs_until_a_signal_ends_it():
     with serving("mme-vla") as server:
         assert server.url.startswith("mme-vla://127.0.0.1:")
 
-        chunks, _ = play(server.url, 2, moment(2, history=()))
+        _, chunks = play(server.url, 2, moment(2, history=()))
         assert np.shape(chunks) == (1, 16, 8)
 
         server.process.send_signal(signal.SIGTERM)

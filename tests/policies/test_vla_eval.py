@@ -32,16 +32,32 @@ def described(array):
 
 
 def test_an_episode_is_what_the_harness_would_send(snapshot):
-    """All messages of an episode, compared with stored ones."""
+    """The client sends what vla-eval's own harness does: it greets, starts an episode, shows each
+    moment, and ends the episode.
+
+    The stored payloads have the video, three pictures of each camera, in the first observation
+    alone. Each array stands there as its type, shape and a checksum.
+    """
     with VlaEvalServer() as server:
         with client_of(server, "vla-eval") as client:
             client.reset(INSTRUCTION, video(3))
-            rows = [client.act(moment(number, history=())).tolist() for number in (3, 4)]
+            client.act(moment(3, history=()))
+            client.act(moment(4, history=()))
         wait_for_messages(server, 5)
 
-    assert rows == [[[1.0] * 8], [[2.0] * 8]]
+    kinds = [kind for kind, _ in server.payloads]
+    assert kinds == ["hello", "episode_start", "observation", "observation", "episode_end"]
     sent = json.dumps(server.payloads, indent=1, default=described)
-    assert re.sub(r"roboirg [\d.]+", "roboirg", sent) == snapshot
+    assert re.sub(r"roboirg [\d.]+", "roboirg", sent) == snapshot  # without our version
+
+
+def test_each_observation_is_answered_by_one_action():
+    """The server (a stand-in) answers its n-th observation with eight numbers n."""
+    with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
+        client.reset(INSTRUCTION, video(3))
+
+        assert client.act(moment(3)).tolist() == [[1, 1, 1, 1, 1, 1, 1, 1]]
+        assert client.act(moment(4)).tolist() == [[2, 2, 2, 2, 2, 2, 2, 2]]
 
 
 def test_the_version_of_a_server_is_its_name_and_that_of_vla_eval():
@@ -52,14 +68,23 @@ def test_the_version_of_a_server_is_its_name_and_that_of_vla_eval():
     assert server_version(client.metadata) == "Test, vla-eval 0.8.0"
 
 
-def test_observations_without_a_video_have_no_history():
+def test_without_a_video_no_video_is_sent():
+    """What follows a video, also the mark that an episode begins anew, is left out with it."""
     with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
-        client.act({**moment(1), "instruction": "said later"})
+        client.act(moment(1))
 
     shown = shown_to(server)
-    assert shown["task_description"] == "said later"
-    assert not shown.keys() & {"video_history", "episode_restart"}
+    assert "video_history" not in shown
+    assert "episode_restart" not in shown
+
+
+def test_a_server_is_shown_what_was_said_last():
+    with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
+        client.reset("Put it there.", video(0))
+        client.act({**moment(1), "instruction": "And now the other one."})
+
+    assert shown_to(server)["task_description"] == "And now the other one."
 
 
 def test_a_subgoal_is_sent_with_each_observation_of_its_episode():
