@@ -124,7 +124,9 @@ def record_of(run, policy, arm):
 
 
 @pytest.mark.sim
-def test_an_episode_is_a_success_exactly_if_the_goal_that_was_stated_is_reached(run_with_other_goals):
+def test_an_episode_is_a_success_exactly_if_the_goal_that_was_stated_is_reached(
+    run_with_other_goals,
+):
     """The run has two policies and three arms."""
     records = read_records(run_with_other_goals)
 
