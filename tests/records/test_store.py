@@ -18,7 +18,6 @@ from run_fakes import FakePlay, fake_record, fake_run, small_plan
 
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import RoboIRGError
-from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.core.versions import Versions
 from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.server_lock import lock_server
@@ -62,60 +61,84 @@ def eight_records():
     return tuple(fake_record(job) for job in small_plan(4).jobs())
 
 
+@st.composite
+def places_to_cut(draw, content):
+    """Return a number of bytes to keep of a file: any, or one that ends just before a newline."""
+    before_newlines = [place for place, byte in enumerate(content) if byte == ord("\n")]
+    return draw(st.integers(0, len(content)) | st.sampled_from(before_newlines))
+
+
 @given(data=st.data())
 @settings(max_examples=40, deadline=None)
 def test_a_file_of_records_cut_anywhere_loses_only_the_line_that_was_cut(data):
-    """As by a crash. What is left of that line is kept in a file of its own.
+    """A crash leaves the first bytes of a file of eight lines, one for each record.
 
-    A record is complete as soon as its last brace is there; its newline may be missing.
+    All records are read whose last brace is there (the newline behind it may be missing). Once the
+    file is opened to be written, it has their lines again; what is left of the line that was cut
+    is moved to a file of its own.
     """
-    with tempfile.TemporaryDirectory() as name:
-        path = fill(Path(name), *eight_records()) / RECORDS_FILE
-        whole = path.read_bytes()
-        line_ends = [place for place, byte in enumerate(whole) if byte == ord("\n")]
-        cut = data.draw(st.integers(0, len(whole)) | st.sampled_from(line_ends))
-        complete = eight_records()[: sum(end <= cut for end in line_ends)]
-        kept = b"".join(encode(record) + b"\n" for record in complete)
+    lines = [encode(record) for record in eight_records()]
+    whole = b"\n".join(lines) + b"\n"
+    kept = whole[: data.draw(places_to_cut(whole))]
+    *complete, torn = kept.split(b"\n")
+    if torn in lines:
+        complete, torn = [*complete, torn], b""
 
-        path.write_bytes(whole[:cut])
-        found = tuple(iterate_records(path.parent))
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name, RECORDS_FILE)
+        path.write_bytes(kept)
+        found = list(map(encode, iterate_records(path.parent)))
         with RecordStore(path.parent) as store:
-            torn = store.torn
-            store.append(eight_records()[-1])
+            assert store.torn == torn
 
         assert found == complete
-        assert torn == whole[len(kept) : cut]
-        assert path.read_bytes() == kept + encode(eight_records()[-1]) + b"\n"
+        assert path.read_bytes() == b"".join(line + b"\n" for line in complete)
         if torn:
             assert path.with_name(TORN_FILE).read_bytes() == torn + b"\n"
 
 
-POLICY_ERROR = {"outcome": "error", "error": "policy"}
+def test_a_record_that_is_added_behind_a_cut_line_has_a_line_of_its_own(tmp_path):
+    """A crash has cut off the last 10 bytes of the second of two records; the first is kept."""
+    first, second, *_ = eight_records()
+    path = fill(tmp_path, first, second) / RECORDS_FILE
+    path.write_bytes(path.read_bytes()[:-10])
+
+    fill(tmp_path, second)
+
+    assert read_records(tmp_path) == (first, second)
 
 
 def test_an_error_before_a_policy_declares_its_version_gets_that_of_its_verdicts(tmp_path):
-    """The first episode was won with version 7; the second ended before its version was known.
+    """Of a policy that declares its version late one episode was won, with version 7; another one
+    ended in an error before that, so that its version is unknown.
 
-    Else its row has no mark of the error, and a row of unknown version stands next to it.
+    Both are results of the same policy, so the error is read as one of version 7 and counts there.
     """
-    won = with_version(eight_records()[0], "7")
-    raised = replace(with_version(eight_records()[1], UNKNOWN_VERSION), **POLICY_ERROR)
-    fill(tmp_path, won, raised)
+    first, second, *_ = eight_records()
+    won = with_version(first, "7")
+    failed = replace(with_version(second, "unknown"), outcome="error", error="policy")
+    fill(tmp_path, won, failed)
 
-    versions = [result.policy_version for result in read_results(tmp_path)]
+    results = read_results(tmp_path)
 
-    assert versions == ["7", "7"]
+    assert [result.policy_version for result in results] == ["7", "7"]
 
 
 def test_an_error_of_another_policy_of_the_same_name_stays_of_unknown_version(tmp_path):
-    """The two policies have another `makeup`, so version 7 of one says nothing of the other."""
-    won = with_version(eight_records()[0], "7")
-    another = replace_field(won.ref, version=UNKNOWN_VERSION, makeup=(("policy", "another"),))
-    fill(tmp_path, won, replace(eight_records()[1], ref=another, **POLICY_ERROR))
+    """One policy won an episode with version 7. Another one of the same name, which is made of
+    other parts (`makeup`), ended in an error before it declared its version.
 
-    versions = [result.policy_version for result in read_results(tmp_path)]
+    The version 7 of the one says nothing of the other.
+    """
+    first, second, *_ = eight_records()
+    won = with_version(first, "7")
+    another = replace_field(won.ref, version="unknown", makeup=(("policy", "another"),))
+    failed = replace(second, ref=another, outcome="error", error="policy")
+    fill(tmp_path, won, failed)
 
-    assert versions == ["7", UNKNOWN_VERSION]
+    results = read_results(tmp_path)
+
+    assert [result.policy_version for result in results] == ["7", "unknown"]
 
 
 def test_unfinished_lines_of_several_crashes_are_all_kept_in_a_file_of_their_own(tmp_path):
