@@ -275,38 +275,28 @@ def act_in_turns(episodes, steps):
     return [np.stack(rows)[:steps] for rows in played]
 
 
-PLAYS_CHUNKS = st.fixed_dictionaries(
-    {
-        "n_obs_steps": st.integers(1, 5),
-        "n_action_steps": st.integers(1, 6),
-        "temporal_ensemble_coeff": st.none(),
-    }
-)
-AVERAGES_CHUNKS = st.fixed_dictionaries(
-    {
-        "n_obs_steps": st.integers(1, 5),
-        "n_action_steps": st.just(1),
-        "temporal_ensemble_coeff": st.just(0.01),
-    }
-)
-
-
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     kind=st.sampled_from(["act", "diffusion", "vqbet", "somebody_s_plugin"]),
-    fields=st.one_of(PLAYS_CHUNKS, AVERAGES_CHUNKS),
+    n_obs_steps=st.integers(1, 5),
+    n_action_steps=st.integers(1, 6),
+    averages=st.booleans(),
 )
-def test_two_interleaved_episodes_get_the_actions_of_lerobot_s_own_loop(checkpoint, kind, fields):
+def test_two_interleaved_episodes_get_the_actions_of_lerobot_s_own_loop(
+    checkpoint, kind, n_obs_steps, n_action_steps, averages
+):
     """LeRobot's own loop asks for one action after each observation, here for 24. Two episodes of
     our policy take turns with the same observations, and each gets the same 24 actions: neither
     sees anything of the other.
 
-    `fields` of the configuration say how: an action of the stand-in model is a sum of the last
-    `n_obs_steps` (1 to 5) observations, so that any other input shows. Of each chunk that it plans,
-    `n_action_steps` (1 to 6) are played; or one, the mean of what all chunks planned for its step
-    (then `temporal_ensemble_coeff` is a number).
+    An action of the stand-in model is a sum of the last `n_obs_steps` observations, so that any
+    other input shows. Of each chunk that it plans, `n_action_steps` are played; or one, the mean of
+    what all chunks planned for its step (then `temporal_ensemble_coeff` is a number).
     """
-    configure(checkpoint, type=kind, **fields)
+    configure(checkpoint, type=kind, n_obs_steps=n_obs_steps)
+    configure(checkpoint, n_action_steps=n_action_steps, temporal_ensemble_coeff=None)
+    if averages:
+        configure(checkpoint, n_action_steps=1, temporal_ensemble_coeff=0.01)
     expected = actions_of_lerobot_s_loop(checkpoint.model, 24)
 
     first, second = act_in_turns([policy_after_reset(), policy_after_reset()], steps=24)
@@ -423,12 +413,11 @@ def test_checkpoints_with_memory_are_not_batched(checkpoint, remembers):
     assert [len(batch["task"]) for batch in checkpoint.model.batches] == [1, 1, 1]
 
 
-@pytest.mark.parametrize("remembers", [{"type": "diffusion"}, {"temporal_ensemble_coeff": 0.01}])
-def test_an_episode_that_is_not_batched_has_the_noise_that_it_has_alone(checkpoint, remembers):
-    """Such a model (see above) is asked one episode after the other. Here it adds random noise to
-    its actions; that of the second episode depends on its own seed, 1, alone.
+def test_an_episode_that_is_not_batched_has_the_noise_that_it_has_alone(checkpoint):
+    """A model of the kind "diffusion" is asked one episode after the other. Here it adds random
+    noise to its actions; that of the second episode depends on its own seed, 1, alone.
     """
-    configure(checkpoint, is_noisy=True, **remembers)
+    configure(checkpoint, type="diffusion", is_noisy=True)
     episodes = [policy_after_reset(0, "?batch=4"), policy_after_reset(1, "?batch=4")]
 
     _, together = episodes[0].act_together(episodes, [moment(1), moment(1)])

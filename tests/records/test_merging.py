@@ -107,8 +107,8 @@ def test_merging_warns_of_verdicts_by_other_code(tmp_path):
 def test_merging_does_not_warn_of_other_code_in_episodes_without_instruction(tmp_path):
     """The verdict of a told episode and that of a silent one come of different states of the code.
 
-    A warning is for results that are compared. In a silent episode (the arm *silent*) nothing is
-    said that could be understood, so its results are not compared with those of told ones.
+    A warning is for results that are compared. A silent episode (the arm *silent*) is a control,
+    in which nothing is said that could be understood.
     """
     told, silent, *_ = played_records()
     silent = replace(silent, arm="silent", verdict_code="older")
