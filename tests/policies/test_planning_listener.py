@@ -195,7 +195,7 @@ def test_two_unreadable_replies_are_counted_and_no_third_is_asked_for():
 def test_a_prompt_that_google_blocks_counts_as_an_unreadable_reply():
     with fake_vlm([Garbage(b'{"promptFeedback": {"blockReason": "OTHER"}}')]) as server:
         policy = make_listener(server, "google")
-        assert policy.decide(stand_in(get_episode("StopCube", "test", 0)), "Stop.") is None
+        assert policy.decide(ENV, "Do it.") is None
     assert spent(policy)["unparsed"] == 1
     assert "(no answer)" in words_of(server.requests[1])
 
@@ -275,7 +275,7 @@ def test_each_fault_of_a_model_service_has_its_own_error_without_the_key(
         policy = make_listener(server, provider, api_key_env=KEY_VARIABLE)
 
         with pytest.raises(error, match=words) as raised:
-            policy.decide(ENV, "Stop.")
+            policy.decide(ENV, "Do it.")
 
     assert KEY in json.dumps(server.headers)
     assert KEY not in str(raised.value)
@@ -293,7 +293,7 @@ def test_a_reply_that_comes_too_late_is_a_timeout(provider, late):
         policy = make_listener(server, provider, timeout_s=0.5)
 
         with pytest.raises(PolicyTimeoutError, match=r"did not answer within 0\.5 s") as raised:
-            policy.decide(ENV, "Stop.")
+            policy.decide(ENV, "Do it.")
 
     assert raised.value.__cause__ is None
 
@@ -303,7 +303,7 @@ def test_an_absent_service_is_a_connection_error(provider):
     with fake_vlm(["{}"]) as server:
         policy = make_listener(server, provider)
     with pytest.raises(PolicyConnectionError, match="cannot be reached"):
-        policy.decide(stand_in(get_episode("StopCube", "test", 0)), "Stop.")
+        policy.decide(ENV, "Do it.")
 
 
 def test_the_key_for_openai_in_the_environment_is_not_sent_to_other_servers(monkeypatch):

@@ -98,8 +98,8 @@ def test_the_policy_behind_a_memer_planner_sees_the_moments_of_its_own_period():
 
 
 def observation_at(step, size=64):
-    """What is seen at a step: its number as a shade of grey."""
-    return {"front_rgb": np.full((size, size, 3), step % 256, np.uint8)}
+    """What is seen at a step: its number as a shade of grey, and nothing since the last question."""
+    return {"front_rgb": np.full((size, size, 3), step % 256, np.uint8), "history": ()}
 
 
 def video(steps, size=64):
@@ -142,7 +142,7 @@ def steps_asked(kind, reply, chunk=CHUNK, **options):
         policy.reset("Do it.", NO_VIDEO)
         for step in range(0, 321, chunk):
             before = len(server.requests)
-            policy.act({**observation_at(step), "history": ()})
+            policy.act(observation_at(step))
             asked += [step] * (len(server.requests) - before)
     return asked
 
@@ -465,8 +465,8 @@ def test_a_planner_whose_subgoals_are_refused_asks_five_times_in_an_episode(when
         counts = []
         for _ in range(2):
             policy.reset("Do it.", NO_VIDEO)
-            policy.act({**observation_at(0), "history": ()})
-            policy.act({**observation_at(CHUNK), "history": ()})
+            policy.act(observation_at(0))
+            policy.act(observation_at(CHUNK))
             counts.append(len(server.requests))
 
     assert counts == [5, 10]
@@ -482,7 +482,7 @@ def test_a_planner_learns_that_a_subgoal_was_refused_and_not_what_it_meant():
         policy = HierarchicalPolicy(planner, Refusing())
         policy.reset("Do it.", NO_VIDEO)
 
-        policy.act({**observation_at(0), "history": ()})
+        policy.act(observation_at(0))
 
     assert planner.ends[-1] == SubgoalEnd(SUBGOAL, "refused", "no")
 
@@ -734,9 +734,9 @@ def test_a_planner_quotes_also_the_sentence_that_was_said_during_the_episode(kin
     with fake_vlm([REPLY_OF[kind]]) as server:
         policy = HierarchicalPolicy(make_planner(kind, server), PolicyThatStandsStill(96))
         policy.reset("This one is red.", NO_VIDEO)
-        policy.act({**observation_at(0), "history": ()})
+        policy.act(observation_at(0))
         policy.hear("Take it.", 0)
-        policy.act({**observation_at(96), "history": ()})
+        policy.act(observation_at(96))
 
     first, second = map(json.dumps, server.requests)
     assert "This one is red." in first

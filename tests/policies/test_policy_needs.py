@@ -106,53 +106,40 @@ def test_a_planner_that_declares_nothing_needs_neither_cameras_nor_video():
     assert PolicyNeeds.of_planner(object()) == PolicyNeeds(cameras=(), demonstration_frames="none")
 
 
-def merged_needs(*, planner, policy):
-    """Return the needs of a planner and of the policy that it guides, together.
-
-    Args:
-        planner: what the planner declares, by name.
-        policy: what the policy declares, by name.
+@pytest.mark.parametrize(
+    ("need", "of_planner", "of_policy", "merged"),
+    [
+        ("cameras", ("front",), ("wrist",), ("front", "wrist")),
+        ("demonstration_frames", 4, 6, 2),  # each 4th and each 6th frame are among each 2nd
+        ("observe_every", None, 4, 4),
+        ("trained_tasks", ("BinFill",), ("PickXtimes", "BinFill"), ("BinFill",)),
+        ("actions", "teleport", "ee_pose", "ee_pose"),
+        ("prompt_tokens", 7, 64, 64),
+        ("tokenizer", "planner.model", "policy.model", "policy.model"),
+    ],
+)
+def test_needs_of_a_planner_and_of_the_policy_behind_it_are_merged(
+    need, of_planner, of_policy, merged
+):
+    """Both get the cameras, frames and observations that either needs, and are trained on the tasks
+    that both know. Only the policy acts and reads prompts, so for these its needs count alone.
     """
-    return PolicyNeeds.of(HierarchicalPolicy(Planner(**planner), Follower(**policy)))
+    planner = Planner(**{need: of_planner})
+    policy = Follower(**{need: of_policy})
 
+    both = PolicyNeeds.of(HierarchicalPolicy(planner, policy))
 
-def test_a_planner_and_its_policy_get_the_cameras_of_both():
-    both = merged_needs(planner={"cameras": ("front",)}, policy={"cameras": ("wrist",)})
-
-    assert both.cameras == ("front", "wrist")
+    assert getattr(both, need) == merged
 
 
 def test_the_history_of_a_planner_s_cameras_is_added_to_that_of_its_policy():
     """A planner reads the past pictures of all its cameras; a policy names those that it reads."""
-    both = merged_needs(
-        planner={"cameras": ("front",)},
-        policy={"cameras": ("front", "wrist"), "history_cameras": ("wrist",)},
-    )
+    planner = Planner(cameras=("front",))
+    policy = Follower(cameras=("front", "wrist"), history_cameras=("wrist",))
+
+    both = PolicyNeeds.of(HierarchicalPolicy(planner, policy))
 
     assert both.history_cameras == ("front", "wrist")
-
-
-def test_a_planner_and_its_policy_get_every_frame_that_one_of_them_reads():
-    """Every 4th and every 6th frame of the video are all among every 2nd one."""
-    both = merged_needs(planner={"demonstration_frames": 4}, policy={"demonstration_frames": 6})
-
-    assert both.demonstration_frames == 2
-
-
-def test_a_planner_that_declares_no_period_gets_the_observations_of_its_policy():
-    """`observe_every` is the number of control steps between two observations."""
-    both = merged_needs(planner={}, policy={"observe_every": 4})
-
-    assert both.observe_every == 4
-
-
-def test_a_planner_and_its_policy_are_trained_where_both_of_them_are():
-    both = merged_needs(
-        planner={"trained_tasks": ("BinFill",)},
-        policy={"trained_tasks": ("PickXtimes", "BinFill")},
-    )
-
-    assert both.trained_tasks == ("BinFill",)
 
 
 def test_a_planner_with_its_policy_declares_all_needs_merged():
@@ -165,18 +152,6 @@ def test_a_planner_with_its_policy_declares_all_needs_merged():
     both = PolicyNeeds.of(HierarchicalPolicy(planner, policy))
 
     assert both == PolicyNeeds.of(policy).merge(PolicyNeeds.of_planner(planner))
-
-
-def test_actions_and_limits_of_prompts_are_those_of_the_policy_behind_a_planner():
-    """The policy acts and reads the prompt, so what a planner declares of these does not matter."""
-    both = merged_needs(
-        planner={"actions": "teleport", "prompt_tokens": 7, "tokenizer": "planner.model"},
-        policy={"actions": "ee_pose", "prompt_tokens": 64, "tokenizer": "policy.model"},
-    )
-
-    assert both.actions == "ee_pose"
-    assert both.prompt_tokens == 64
-    assert both.tokenizer == "policy.model"
 
 
 def test_a_policy_that_names_no_trained_tasks_does_not_limit_those_of_the_other():

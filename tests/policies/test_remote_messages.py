@@ -105,14 +105,6 @@ def test_challenge_messages_are_byte_for_byte_the_stored_ones(name, options, has
         policy.act({**latest, "history": (later, latest)})
 
     assert server.messages == stored_messages(name)
-
-
-@pytest.mark.parametrize(
-    ("options", "has_sensors"), [("", False), ("?depth=yes&calibration=1", True)]
-)
-def test_a_challenge_client_needs_depth_and_calibration_if_its_url_says_so(options, has_sensors):
-    policy = make_policy(f"challenge://localhost:1{options}", 0)
-
     assert policy.depth == has_sensors
     assert policy.calibration == has_sensors
 

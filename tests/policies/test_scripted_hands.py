@@ -317,22 +317,18 @@ def test_the_choices_of_each_task_are_those_of_robomme(task, choices):
     """RoboMME lets a model choose among the motions of a task: `choices`, in its order, with a plus
     behind a motion for which a point has to be chosen.
 
-    They are the same in all episodes of a task, of which 20 are tried.
+    They are the same in all episodes of a task, of which 20 are tried. Their labels are letters.
     """
     for episode in range(20):
+        labels = ""
         motions = []
         for choice in choices_of(get_episode(task, "test", episode)):
-            needs_point = choice.kind is not None
-            motions.append(choice.primitives[0].kind + ("+" if needs_point else ""))
+            motion = choice.primitives[0].kind
+            motions.append(motion if choice.kind is None else f"{motion}+")
+            labels += choice.label
 
         assert " ".join(motions) == choices
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_choices_are_labeled_by_letters_in_their_order(task):
-    labels = [choice.label for choice in choices_of(get_episode(task, "test", 0))]
-
-    assert labels == ["a", "b", "c", "d"][: len(labels)]
+        assert "abcd".startswith(labels)
 
 
 @pytest.mark.sim

@@ -61,38 +61,35 @@ def eight_records():
     return tuple(fake_record(job) for job in small_plan(4).jobs())
 
 
-@st.composite
-def places_to_cut(draw, content):
-    """Return a number of bytes to keep of a file: any, or one that ends just before a newline."""
-    before_newlines = [place for place, byte in enumerate(content) if byte == ord("\n")]
-    return draw(st.integers(0, len(content)) | st.sampled_from(before_newlines))
-
-
 @given(data=st.data())
 @settings(max_examples=40, deadline=None)
 def test_a_file_of_records_cut_anywhere_loses_only_the_line_that_was_cut(data):
-    """A crash leaves the first bytes of a file of eight lines, one for each record.
+    """A crash leaves the first lines of a file of records, and a part of the next line.
 
-    All records are read whose last brace is there (the newline behind it may be missing). Once the
-    file is opened to be written, it has their lines again; what is left of the line that was cut
-    is moved to a file of its own.
+    All whole records are read; one is whole as soon as its last brace is there, as only the newline
+    is missing. Once the file is opened to be written, it has their lines again; what is left of the
+    line that was cut is moved to a file of its own.
     """
     lines = [encode(record) for record in eight_records()]
-    whole = b"\n".join(lines) + b"\n"
-    kept = whole[: data.draw(places_to_cut(whole))]
-    *complete, torn = kept.split(b"\n")
-    if torn in lines:
-        complete, torn = [*complete, torn], b""
+    whole_lines = lines[: data.draw(st.integers(0, 7), label="whole lines")]
+    next_line = lines[len(whole_lines)]
+    bytes_left = st.integers(0, len(next_line)) | st.just(len(next_line))
+    torn = next_line[: data.draw(bytes_left, label="bytes left of the next line")]
+    kept = [*whole_lines, torn]
 
     with tempfile.TemporaryDirectory() as name:
         path = Path(name, RECORDS_FILE)
-        path.write_bytes(kept)
+        path.write_bytes(b"\n".join(kept))
+        if torn == next_line:
+            torn = b""
+        else:
+            kept.pop()
         found = list(map(encode, iterate_records(path.parent)))
         with RecordStore(path.parent) as store:
             assert store.torn == torn
 
-        assert found == complete
-        assert path.read_bytes() == b"".join(line + b"\n" for line in complete)
+        assert found == kept
+        assert path.read_bytes() == b"".join(line + b"\n" for line in kept)
         if torn:
             assert path.with_name(TORN_FILE).read_bytes() == torn + b"\n"
 

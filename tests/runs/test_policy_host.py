@@ -391,22 +391,19 @@ class It:
 
 def test_worlds_share_one_process_of_a_policy_on_each_device(write_policy):
     """Four worlds and two devices, 0 and 3: the policy tells its device and process."""
-    spec = write_policy(
-        "located",
-        """
+    text = """
 class It(BasePolicy):
     def reset(self, instruction, demonstration):
         self.metadata = {"device": os.environ["CUDA_VISIBLE_DEVICES"], "process": os.getpid()}
-""",
-    )
-    with HostPool(Hosting(devices=("0", "3")).settings or HostSettings()) as pool:
-        worlds = [HostedPolicy(pool.connect(), read_policy(spec), 0) for _ in range(4)]
+"""
+    ref = read_policy(write_policy("located", text))
+    with HostPool(Hosting(devices=("0", "3")).settings) as pool:
+        worlds = [HostedPolicy(pool.connect(), ref, 0) for _ in range(4)]
         for world in worlds:
             world.reset("Pick it.", {})
-        found = [(world.metadata["device"], world.metadata["process"]) for world in worlds]
 
-    assert sorted(device for device, _ in found) == ["0", "0", "3", "3"]
-    assert len({process for _, process in found}) == 2
+    assert sorted(world.metadata["device"] for world in worlds) == ["0", "0", "3", "3"]
+    assert len({world.metadata["process"] for world in worlds}) == 2
 
 
 # What a policy is
@@ -526,18 +523,20 @@ class It(BasePolicy):
     )
 
 
-def test_a_crash_of_a_policys_process_is_an_error_of_the_episode_that_caused_it(
-    begin_episode, dies_if_told
-):
-    """The process ends with exit code 7 within act(), as the policy was told to die."""
-    bad = begin_episode(dies_if_told)
-    bad.reset("die", {})
+@pytest.fixture
+def crashed_episode(begin_episode, dies_if_told):
+    """The error of an episode whose policy has just ended its process in act(), as it was told."""
+    policy = begin_episode(dies_if_told)
+    policy.reset("die", {})
+    with pytest.raises(EpisodeError) as error:
+        policy.act({})
+    return error.value
 
-    with pytest.raises(EpisodeError) as guilty:
-        bad.act({})
 
-    assert guilty.value.kind == "policy"
-    assert str(guilty.value) == "the process ended with exit code 7 in the policy's act()"
+def test_a_crash_of_a_policys_process_is_an_error_of_the_episode_that_caused_it(crashed_episode):
+    """The process ended with exit code 7 within act(), as the policy was told to die."""
+    assert crashed_episode.kind == "policy"
+    assert str(crashed_episode) == "the process ended with exit code 7 in the policy's act()"
 
 
 def test_a_crash_of_a_policys_process_loses_the_other_episodes_that_share_it(
@@ -559,15 +558,11 @@ def test_a_crash_of_a_policys_process_loses_the_other_episodes_that_share_it(
         ending.usage()
 
 
-def test_all_episodes_learn_the_same_about_the_end_of_a_policys_process(
-    host_pool_of_test, begin_episode, dies_if_told
-):
-    bad = begin_episode(dies_if_told)
-    bad.reset("die", {})
-    with pytest.raises(EpisodeError):
-        bad.act({})
-
+@pytest.mark.usefixtures("crashed_episode")
+def test_all_episodes_learn_the_same_about_the_end_of_a_policys_process(host_pool_of_test):
+    """The policy printed *last words* and ended its process with exit code 7."""
     process = process_in(host_pool_of_test)
+
     first_told = process.loss()
     told_again = process.loss()
 
@@ -575,13 +570,9 @@ def test_all_episodes_learn_the_same_about_the_end_of_a_policys_process(
     assert told_again == first_told
 
 
+@pytest.mark.usefixtures("crashed_episode")
 def test_after_a_crash_a_policy_gets_a_new_process(begin_episode, dies_if_told):
     """The next episode gets an answer of one action."""
-    bad = begin_episode(dies_if_told)
-    bad.reset("die", {})
-    with pytest.raises(EpisodeError):
-        bad.act({})
-
     again = begin_episode(dies_if_told)
     again.reset("live", {})
 
@@ -679,31 +670,18 @@ class It(BasePolicy):
     assert [call.exception() for call in calls] == [None, None, None, None]
 
 
-@pytest.fixture
-def tells_its_process(write_policy):
-    """The spec of a policy that tells the number of its process in its metadata."""
-    text = """
-class It(BasePolicy):
-    def reset(self, instruction, demonstration):
-        self.metadata = {"process": os.getpid()}
-"""
-    return write_policy("located", text)
-
-
-def test_a_frozen_process_is_ended_when_the_limit_of_a_call_is_over(
-    begin_episode, tells_its_process
-):
-    """The process is stopped (SIGSTOP) between two calls, so that it does not begin the next one.
+def test_a_frozen_process_is_ended_when_the_limit_of_a_call_is_over(begin_episode):
+    """The policy Resident tells the number of its process in its usage. This process is stopped
+    (SIGSTOP) between two calls, so that it does not begin the next one.
 
     After the 4 s that a call may take it is ended. The episode is lost: its call is not to blame.
     """
-    world = begin_episode(tells_its_process, limit_s=4.0)
-    world.reset("Pick it.", {})
+    world = begin_episode("hosting_fakes:Resident", limit_s=4.0)
 
-    os.kill(world.metadata["process"], signal.SIGSTOP)
+    os.kill(int(world.usage()["process"]), signal.SIGSTOP)
 
     with pytest.raises(EpisodeLostError, match="began no call within 4 s"):
-        world.act({})
+        world.usage()
 
 
 def test_an_episode_whose_policy_was_ended_by_another_world_is_lost_and_not_to_blame(
