@@ -275,9 +275,12 @@ def act_in_turns(episodes, steps):
     return [np.stack(rows)[:steps] for rows in played]
 
 
+KINDS_OF_MODELS = ["act", "diffusion", "vqbet", "somebody_s_plugin"]
+
+
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
-    kind=st.sampled_from(["act", "diffusion", "vqbet", "somebody_s_plugin"]),
+    kind=st.sampled_from(KINDS_OF_MODELS),
     n_obs_steps=st.integers(1, 5),
     n_action_steps=st.integers(1, 6),
     averages=st.booleans(),
@@ -293,10 +296,10 @@ def test_two_interleaved_episodes_get_the_actions_of_lerobot_s_own_loop(
     other input shows. Of each chunk that it plans, `n_action_steps` are played; or one, the mean of
     what all chunks planned for its step (then `temporal_ensemble_coeff` is a number).
     """
-    configure(checkpoint, type=kind, n_obs_steps=n_obs_steps)
-    configure(checkpoint, n_action_steps=n_action_steps, temporal_ensemble_coeff=None)
+    configure(checkpoint, type=kind, n_obs_steps=n_obs_steps, n_action_steps=n_action_steps)
+    configure(checkpoint, temporal_ensemble_coeff=None)
     if averages:
-        configure(checkpoint, n_action_steps=1, temporal_ensemble_coeff=0.01)
+        configure(checkpoint, temporal_ensemble_coeff=0.01, n_action_steps=1)
     expected = actions_of_lerobot_s_loop(checkpoint.model, 24)
 
     first, second = act_in_turns([policy_after_reset(), policy_after_reset()], steps=24)
@@ -305,7 +308,7 @@ def test_two_interleaved_episodes_get_the_actions_of_lerobot_s_own_loop(
     assert np.allclose(second, expected, atol=1e-6)
 
 
-@pytest.mark.parametrize("kind", ["act", "diffusion", "vqbet", "somebody_s_plugin"])
+@pytest.mark.parametrize("kind", KINDS_OF_MODELS)
 @pytest.mark.parametrize(("n_action_steps", "calls"), [(1, 24), (2, 12), (5, 5), (6, 4)])
 def test_a_checkpoint_is_called_once_for_the_actions_of_a_chunk(
     checkpoint, kind, n_action_steps, calls

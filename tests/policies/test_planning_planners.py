@@ -98,7 +98,7 @@ def test_the_policy_behind_a_memer_planner_sees_the_moments_of_its_own_period():
 
 
 def observation_at(step, size=64):
-    """What is seen at a step: its number as a shade of grey, and nothing since the last question."""
+    """What is seen at a step, its number as a shade of grey; nothing since the last question."""
     return {"front_rgb": np.full((size, size, 3), step % 256, np.uint8), "history": ()}
 
 

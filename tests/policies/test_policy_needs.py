@@ -32,17 +32,11 @@ class Demanding:
     def follow(self, subgoal): ...
 
 
-class Planner(SimpleNamespace):
-    """A planner that declares what it is given, as attributes."""
+class Declares(SimpleNamespace):
+    """A planner or a policy that declares what it is given, as attributes."""
 
     def reset(self, instruction, demonstration): ...
     def plan(self, observation, step): ...
-
-
-class Follower(SimpleNamespace):
-    """A policy that follows subgoals, and declares what it is given, as attributes."""
-
-    def reset(self, instruction, demonstration): ...
     def act(self, observation): ...
     def follow(self, subgoal): ...
 
@@ -124,8 +118,8 @@ def test_needs_of_a_planner_and_of_the_policy_behind_it_are_merged(
     """Both get the cameras, frames and observations that either needs, and are trained on the tasks
     that both know. Only the policy acts and reads prompts, so for these its needs count alone.
     """
-    planner = Planner(**{need: of_planner})
-    policy = Follower(**{need: of_policy})
+    planner = Declares(**{need: of_planner})
+    policy = Declares(**{need: of_policy})
 
     both = PolicyNeeds.of(HierarchicalPolicy(planner, policy))
 
@@ -134,8 +128,8 @@ def test_needs_of_a_planner_and_of_the_policy_behind_it_are_merged(
 
 def test_the_history_of_a_planner_s_cameras_is_added_to_that_of_its_policy():
     """A planner reads the past pictures of all its cameras; a policy names those that it reads."""
-    planner = Planner(cameras=("front",))
-    policy = Follower(cameras=("front", "wrist"), history_cameras=("wrist",))
+    planner = Declares(cameras=("front",))
+    policy = Declares(cameras=("front", "wrist"), history_cameras=("wrist",))
 
     both = PolicyNeeds.of(HierarchicalPolicy(planner, policy))
 
@@ -146,7 +140,7 @@ def test_a_planner_with_its_policy_declares_all_needs_merged():
     """The needs of the policy `Demanding` all differ from the defaults, so that none can be
     forgotten unnoticed.
     """
-    planner = Planner(cameras=("front",), demonstration_frames=4, trained_tasks=("BinFill",))
+    planner = Declares(cameras=("front",), demonstration_frames=4, trained_tasks=("BinFill",))
     policy = Demanding()
 
     both = PolicyNeeds.of(HierarchicalPolicy(planner, policy))

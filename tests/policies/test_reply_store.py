@@ -47,6 +47,12 @@ BUSY = ModelBusyError("busy")
 LOST = PolicyConnectionError("lost")
 
 
+@pytest.fixture
+def settings(tmp_path):
+    """Settings of a run that stores the replies of its model, without a budget."""
+    return ReplySettings(tmp_path)
+
+
 def query_of(words, shade=None):
     """Return a question with these words, and with a picture of a shade of grey if one is given."""
     picture = () if shade is None else (Picture(np.full((2, 2, 3), shade, np.uint8)),)
@@ -61,9 +67,8 @@ def ask_in_episode(server, settings, *words, episode="a", shade=None, **options)
     return replies, Counter(vlm.usage())
 
 
-def test_replies_stored_for_an_episode_are_used_when_it_is_played_again(tmp_path):
+def test_replies_stored_for_an_episode_are_used_when_it_is_played_again(settings):
     """So that an interrupted run pays no call of a model twice."""
-    settings = ReplySettings(tmp_path)
     with fake_vlm(["one", "two", "never"]) as server:
         first, _ = ask_in_episode(server, settings, "first", "second")
 
@@ -79,11 +84,10 @@ def test_replies_stored_for_an_episode_are_used_when_it_is_played_again(tmp_path
     [("b", ["first"]), ("a", ["first", "first"])],
     ids=["another episode", "the same words once more"],
 )
-def test_what_was_not_asked_before_in_an_episode_is_asked(tmp_path, episode, words):
+def test_what_was_not_asked_before_in_an_episode_is_asked(settings, episode, words):
     """Stored is the reply to *first* in episode a. Another episode, or the same words a second
     time, are questions of their own, so the service is asked and says *two*.
     """
-    settings = ReplySettings(tmp_path)
     with fake_vlm(["one", "two"]) as server:
         ask_in_episode(server, settings, "first")
 
@@ -93,12 +97,12 @@ def test_what_was_not_asked_before_in_an_episode_is_asked(tmp_path, episode, wor
     assert len(server.requests) == 2
 
 
-def test_a_run_that_measures_the_spread_of_a_model_asks_everything_again(tmp_path):
+def test_a_run_that_measures_the_spread_of_a_model_asks_everything_again(tmp_path, settings):
     """Stored is the reply *one* to the question *first*. With the option `anew` that is not used:
     the model is asked again, and says *two*. No count speaks of the store.
     """
     with fake_vlm(["one", "two"]) as server:
-        ask_in_episode(server, ReplySettings(tmp_path), "first")
+        ask_in_episode(server, settings, "first")
 
         replies, counts = ask_in_episode(server, ReplySettings(tmp_path, anew=True), "first")
 
@@ -116,9 +120,8 @@ def test_without_a_store_the_same_question_is_asked_again():
     assert replies == ["two"]
 
 
-def test_a_stored_reply_is_not_used_for_another_picture(tmp_path):
+def test_a_stored_reply_is_not_used_for_another_picture(settings):
     """Pictures may differ in a bit on another machine; this is counted."""
-    settings = ReplySettings(tmp_path)
     with fake_vlm(["one", "two"]) as server:
         ask_in_episode(server, settings, "words", shade=1)
 
@@ -134,9 +137,8 @@ def test_a_stored_reply_is_not_used_for_another_picture(tmp_path):
     ids=["temperature", "patience and prices"],
 )
 def test_a_stored_reply_is_used_unless_an_option_changes_that_would_change_it(
-    tmp_path, changes, reply
+    settings, changes, reply
 ):
-    settings = ReplySettings(tmp_path)
     with fake_vlm(["one", "two"]) as server:
         ask_in_episode(server, settings, "words")
 
@@ -218,9 +220,8 @@ def test_a_reply_of_unknown_cost_stops_a_run_with_a_budget(tmp_path, reply):
 
 
 @OF_UNKNOWN_COST
-def test_a_reply_of_unknown_cost_is_stored(tmp_path, reply):
+def test_a_reply_of_unknown_cost_is_stored(settings, reply):
     """Asked the same question again, a run takes the stored reply, *one*; what it cost is NaN."""
-    settings = ReplySettings(tmp_path)
     with fake_vlm([reply, "two"]) as server:
         ask_in_episode(server, settings, "0", **PRICES)
 
@@ -247,9 +248,8 @@ def test_an_unreadable_reply_makes_the_cost_of_a_run_unknown(tmp_path):
     assert len(server.requests) == 1
 
 
-def test_a_reply_with_an_invalid_character_is_stored_and_paid_once(tmp_path):
+def test_a_reply_with_an_invalid_character_is_stored_and_paid_once(settings):
     """Half a surrogate pair cannot be written as UTF-8."""
-    settings = ReplySettings(tmp_path)
     with fake_vlm(["\ud800 fine"]) as server:
         ask_in_episode(server, settings, "words", **PRICES)
 
@@ -322,18 +322,18 @@ def test_a_stored_cost_that_is_no_number_is_unknown(tmp_path):
     store.close()
 
 
-def test_a_stored_reply_that_is_no_text_is_left_out(tmp_path):
+def test_a_stored_reply_that_is_no_text_is_left_out(tmp_path, settings):
     """A stranger wrote the byte FF, which is no text, as a reply into the file."""
     with changed_store(tmp_path) as database:
         database.execute("INSERT INTO replies VALUES ('a', 0, 'x', x'ff', 1, 1, 1)")
-    store = reply_store.ReplyStore(ReplySettings(tmp_path), "a")
+    store = reply_store.ReplyStore(settings, "a")
 
     assert not store.replies()
 
     store.close()
 
 
-def test_a_turn_years_away_as_by_a_wrong_clock_is_not_waited_for(tmp_path, monkeypatch):
+def test_a_turn_years_away_as_by_a_wrong_clock_is_not_waited_for(tmp_path, settings, monkeypatch):
     """The file says that the service's next turn is at 1e308 s; the clock of the test says 5 s.
 
     Its `sleep` fails the test: so the turn comes at once.
@@ -342,7 +342,7 @@ def test_a_turn_years_away_as_by_a_wrong_clock_is_not_waited_for(tmp_path, monke
         database.execute("UPDATE services SET next_at = 1e308")
     monkeypatch.setattr(reply_store, "time", SimpleNamespace(time=lambda: 5.0, sleep=pytest.fail))
 
-    store = reply_store.ReplyStore(ReplySettings(tmp_path), "a")
+    store = reply_store.ReplyStore(settings, "a")
     store.wait_for_turn("service", None)
     store.close()
 
@@ -359,7 +359,9 @@ def test_a_budget_without_prices_is_refused_before_anything_is_asked(tmp_path):
 
 @pytest.mark.parametrize("provider", ["openai", "google"])
 @pytest.mark.parametrize("code", [429, 503, 502])
-def test_a_busy_model_service_is_asked_again_after_the_pause_it_names(tmp_path, provider, code):
+def test_a_busy_model_service_is_asked_again_after_the_pause_it_names(
+    tmp_path, settings, provider, code
+):
     """A service says three times that it is busy, and to come again in 0.05 s; then it replies.
 
     So there are four requests and waits of 0.15 s or more. The time of the next request is stored,
@@ -369,7 +371,7 @@ def test_a_busy_model_service_is_asked_again_after_the_pause_it_names(tmp_path, 
     started = time.time()
     with fake_vlm([busy, busy, busy, "at last"]) as server:
         replies, counts = ask_in_episode(
-            server, ReplySettings(tmp_path), "words", provider=provider, patience_s=60
+            server, settings, "words", provider=provider, patience_s=60
         )
 
     assert replies == ["at last"]
@@ -421,11 +423,11 @@ def test_answers_that_were_lost_use_up_the_retries_and_a_busy_service_does_not(m
     assert pauses == [1, 2, 4, 8]
 
 
-def test_a_reply_of_another_format_is_an_error_and_is_not_stored(tmp_path):
+def test_a_reply_of_another_format_is_an_error_and_is_not_stored(settings):
     with fake_vlm([Garbage(b"{}"), "one"]) as server:
         with pytest.raises(PolicyReplyError):
-            ask_in_episode(server, ReplySettings(tmp_path), "words")
-        replies, counts = ask_in_episode(server, ReplySettings(tmp_path), "words")
+            ask_in_episode(server, settings, "words")
+        replies, counts = ask_in_episode(server, settings, "words")
         assert (replies, counts["stored"]) == (["one"], 0)
 
 
@@ -566,18 +568,18 @@ def waits(monkeypatch):
     return found
 
 
-def test_processes_that_ask_at_the_same_moment_take_turns(tmp_path, waits):
+def test_processes_that_ask_at_the_same_moment_take_turns(settings, waits):
     """At 20 requests a minute they start three seconds apart; a store is that of a process."""
-    for store in [reply_store.ReplyStore(ReplySettings(tmp_path), "a") for _ in range(3)]:
+    for store in [reply_store.ReplyStore(settings, "a") for _ in range(3)]:
         store.wait_for_turn("service", 20.0)
         store.close()
 
     assert waits == [3.0, 6.0]
 
 
-def test_the_longest_pause_that_a_service_asked_for_counts(tmp_path, waits):
+def test_the_longest_pause_that_a_service_asked_for_counts(settings, waits):
     """Also if nothing limits the rate of requests."""
-    store = reply_store.ReplyStore(ReplySettings(tmp_path), "a")
+    store = reply_store.ReplyStore(settings, "a")
     store.pause("service", 9.0)
     store.pause("service", 4.0)
 

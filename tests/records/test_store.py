@@ -255,6 +255,15 @@ def test_atomic_writing_replaces_a_file_and_leaves_no_temporary_one(tmp_path):
 
 
 @pytest.fixture
+def victim(tmp_path):
+    """A file of somebody else, next to the folder `run`."""
+    path = tmp_path / "victim"
+    path.write_text("mine")
+    (tmp_path / "run").mkdir()
+    return path
+
+
+@pytest.fixture
 def limit_file_sizes():
     """Return what limits the size of files, in bytes, as a full disk does."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -288,12 +297,10 @@ def test_a_full_disk_ends_the_run_in_one_sentence_and_loses_no_earlier_record(
     ids=["stored", "checked"],
 )
 @pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "videos/a.jpg"])
-def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path, name, begin):
+def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path, victim, name, begin):
     """Each name is one that a run writes to; here it links to a file of somebody else."""
-    victim = tmp_path / "victim"
-    victim.write_text("mine")
     link = tmp_path / "run" / name
-    link.parent.mkdir(parents=True)
+    link.parent.mkdir(exist_ok=True)
     link.symlink_to(victim)
 
     with pytest.raises(RoboIRGError, match=f"{link} is a symbolic link, and a run writes"):
@@ -303,11 +310,8 @@ def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path, name, begin
 
 
 @pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "models.sqlite"])
-def test_a_run_changes_no_file_that_has_another_name_elsewhere(tmp_path, name):
+def test_a_run_changes_no_file_that_has_another_name_elsewhere(tmp_path, victim, name):
     """A hard link."""
-    victim = tmp_path / "victim"
-    victim.write_text("mine")
-    (tmp_path / "run").mkdir()
     (tmp_path / "run" / name).hardlink_to(victim)
 
     with pytest.raises(RoboIRGError, match=f"{name} has another name elsewhere"):
@@ -328,17 +332,14 @@ def test_a_run_does_not_start_where_a_pipe_would_block_it(tmp_path, name):
         RecordStore(tmp_path / "run")
 
 
-def test_a_plan_may_be_a_hard_link_as_it_is_replaced(tmp_path):
+def test_a_plan_may_be_a_hard_link_as_it_is_replaced(tmp_path, victim):
     """Writing the plan makes a new file of that name; the other name keeps the old content."""
-    victim = tmp_path / "victim"
-    victim.write_text("{}")
-    (tmp_path / "run").mkdir()
     (tmp_path / "run" / PLAN_FILE).hardlink_to(victim)
 
     with RecordStore(tmp_path / "run"):
         write_plan(small_plan(), tmp_path / "run")
 
-    assert victim.read_text() == "{}"
+    assert victim.read_text() == "mine"
 
 
 def test_a_folder_of_videos_on_another_disk_is_refused_at_the_start(tmp_path):
@@ -360,9 +361,8 @@ def test_a_folder_of_a_run_may_be_a_link(tmp_path):
     assert read_records(tmp_path / "disk") == eight_records()
 
 
-def test_a_lock_that_is_a_link_is_refused(tmp_path):
-    (tmp_path / "victim").write_text("mine")
-    (tmp_path / "lock").symlink_to(tmp_path / "victim")
+def test_a_lock_that_is_a_link_is_refused(tmp_path, victim):
+    (tmp_path / "lock").symlink_to(victim)
     refused = pytest.raises(RoboIRGError, match=f"Cannot write {tmp_path / 'lock'}")
 
     with refused, locked(tmp_path / "lock", "taken"):

@@ -115,58 +115,43 @@ def run_with_other_goals(tmp_path_factory):
     return folder
 
 
-def record_of(run, policy, arm):
-    """Return the only record of a run with that policy and arm."""
-    (record,) = (
-        record for record in read_records(run) if (record.policy, record.arm) == (policy, arm)
-    )
-    return record
+@pytest.fixture
+def records(run_with_other_goals):
+    """The records of that run, by policy and arm."""
+    return {(record.policy, record.arm): record for record in read_records(run_with_other_goals)}
 
 
 @pytest.mark.sim
-def test_an_episode_is_a_success_exactly_if_the_goal_that_was_stated_is_reached(
-    run_with_other_goals,
-):
+def test_an_episode_is_a_success_exactly_if_the_goal_that_was_stated_is_reached(records):
     """The run has two policies and three arms."""
-    records = read_records(run_with_other_goals)
-
     assert len(records) == 6
-    for record in records:
+    for key, record in records.items():
         is_reached = record.goals.stated in record.goals.reached
-        assert (record.outcome == "success") == is_reached, record.slug
+        assert (record.outcome == "success") == is_reached, key
 
 
 @pytest.mark.sim
-def test_a_policy_that_does_what_it_hears_succeeds_at_another_goal(run_with_other_goals):
+def test_a_policy_that_does_what_it_hears_succeeds_at_another_goal(records):
     """The listener was told another goal than the episode's, and did that."""
-    record = record_of(run_with_other_goals, "listener", "other-goal")
-
-    assert record.outcome == "success"
+    assert records["listener", "other-goal"].outcome == "success"
 
 
 @pytest.mark.sim
-def test_a_policy_that_does_the_original_goal_although_told_another_one_fails(run_with_other_goals):
-    """`habit` does so; that it would have succeeded at the original goal is recorded as well."""
-    record = record_of(run_with_other_goals, "habit", "other-goal")
+def test_a_policy_that_does_the_original_goal_although_told_another_one_fails(records):
+    """`habit` does so; that it would have succeeded at the original goal is recorded as well. Told
+    the original goal itself, it has no second verdict.
+    """
+    record = records["habit", "other-goal"]
 
     assert record.outcome == "failure"
     assert record.goals.original == "success"
     assert record.attribution.failure == "other_goal"
+    assert records["habit", "told"].goals.original is None
 
 
 @pytest.mark.sim
-def test_an_episode_told_as_it_is_has_no_verdict_on_another_original_goal(run_with_other_goals):
-    record = record_of(run_with_other_goals, "habit", "told")
-
-    assert record.outcome == "success"
-    assert record.goals.original is None
-
-
-@pytest.mark.sim
-def test_a_silent_episode_is_told_nothing_about_its_goal(run_with_other_goals):
-    record = record_of(run_with_other_goals, "listener", "silent")
-
-    assert record.instruction[0].text == "Please do your task."
+def test_a_silent_episode_is_told_nothing_about_its_goal(records):
+    assert records["listener", "silent"].instruction[0].text == "Please do your task."
 
 
 @pytest.mark.sim
