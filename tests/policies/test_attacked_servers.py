@@ -92,6 +92,10 @@ def test_a_connection_that_sends_nothing_is_closed_after_the_timeout():
 
 
 def test_the_command_serve_fails_if_its_server_stops_by_itself(monkeypatch):
+    """The command opens a server and waits for a signal to end it. The server is replaced by one
+    that returns at once, and signals are not listened for. The command fails, and the error names
+    the address.
+    """
     stopped = SimpleNamespace(serve_forever=lambda: None)
     monkeypatch.setattr(
         policy_server, "open_server", lambda *_, **__: PolicyServer(stopped, "openpi://here:1")

@@ -230,7 +230,9 @@ def test_a_letter_in_an_object_that_breaks_off_is_no_answer():
     ],
 )
 def test_a_reply_with_a_good_and_a_malformed_json_object_is_unreadable(read, later):
-    """The malformed one may be a correction, so the good one must not count."""
+    """The good object alone is read. The malformed one may correct it, so with that behind it,
+    before it or around it (in one more pair of braces) the good one must not count.
+    """
     good = '{"answer": "C", "color": "green", "repeats": 3}'
     read(good)
     for reply in (f"{good}\n{later}", f"{later}\n{good}", f"{{{good}}}"):

@@ -148,7 +148,9 @@ def test_a_key_in_an_error_of_a_policy_server_is_masked_in_records(message):
 
 
 def test_a_key_in_the_reply_of_a_model_is_masked_when_shown_and_stored(tmp_path):
-    """A model may repeat the key that the client sent in its header."""
+    """A model may repeat the key that the client sent in its header. The reply is shown to the
+    policy and stored in a file; both have a star for each letter of the key.
+    """
     query = ModelQuery("system", (ChatTurn("user", ("words",)),))
     with fake_vlm([f"my key is {KEY}"]) as server:
         vlm = VLMQuery(model_options(server, api_key_env=VARIABLE), Template("$why"))
@@ -162,7 +164,9 @@ def test_a_key_in_the_reply_of_a_model_is_masked_when_shown_and_stored(tmp_path)
 
 
 def test_a_key_that_a_library_prints_is_masked_in_the_log(tmp_path):
-    """While a log is kept, its file holds the key; afterwards as many stars."""
+    """A library may print straight into the file of a log, so that the file holds the key; when
+    the log is closed, a star stands for each letter.
+    """
     handed_keys.remember_key(KEY)
     with EpisodeLog(tmp_path / "log.txt") as log:
         log.path.write_text(f"closed: {KEY}\n")

@@ -23,7 +23,9 @@ WRIST = "observation.images.wrist"
 
 
 def test_a_lerobot_policy_has_the_version_and_the_folder_of_its_url(tmp_path):
-    """Nothing is loaded for it."""
+    """The checkpoint is a folder with a configuration and no weights: nothing is loaded before the
+    first episode.
+    """
     folder = write_checkpoint(tmp_path / "last")
 
     policy = make_policy(f"lerobot://{folder}?version=step-3", 0)

@@ -63,6 +63,9 @@ def answers_with_the_meant_goal(episode, setting="explicit"):
 
 @pytest.mark.parametrize("task", every_task())
 def test_the_schema_for_a_model_s_answer_has_exactly_the_goals_that_occur(task):
+    """A schema lists the answers that a model may give, one for each goal. The goals that occur
+    are those of all scenes of all splits of the task; each is read back from its answer.
+    """
     slots = goal_schema(task)
     possible = set()
     for episode in split_episodes([task], SPLITS):
@@ -87,6 +90,9 @@ COLORS = {"type": "string", "enum": ["blue", "green", "red"]}
     ],
 )
 def test_the_json_schema_for_a_model_lists_the_values_of_each_field_of_an_answer(task, fields):
+    """COLORS are the texts *blue*, *green* and *red*. In PickXtimes one color is picked one to
+    five times; in VideoUnmask one or two colors.
+    """
     assert goal_schema(task).schema()["properties"] == fields
 
 
@@ -105,6 +111,9 @@ def test_the_json_schema_for_a_model_lists_the_values_of_each_field_of_an_answer
     )
 )
 def test_any_json_reply_is_read_as_a_goal_or_refused(reply):
+    """Hypothesis makes up the reply, with colors and fields that occur. To refuse it is to raise
+    `UnparsableReplyError`; any other exception fails the test.
+    """
     for task in every_task():
         slots = goal_schema(task)
         with contextlib.suppress(UnparsableReplyError):
@@ -127,6 +136,9 @@ def test_any_json_reply_is_read_as_a_goal_or_refused(reply):
     ],
 )
 def test_a_wrong_reply_is_refused_with_what_would_be_right(task, reply, words):
+    """No JSON, a field that is missing, a value that its field cannot have, and values that no
+    goal has together (nothing to sort; the same color twice).
+    """
     with pytest.raises(UnparsableReplyError, match=words):
         goal_schema(task).read(reply)
 
@@ -169,6 +181,9 @@ GREEN_THREE_TIMES = '{"color": "green", "repeats": 3}'
 
 
 def test_an_unreadable_reply_is_asked_again_with_the_reason():
+    """The first reply is *no idea*. The second request has the messages of the first one, the
+    reply, and why it cannot be read. Its answer is the goal of ENV, the green cube three times.
+    """
     with fake_vlm(["no idea", GREEN_THREE_TIMES]) as server:
         policy = make_listener(server)
 
@@ -193,6 +208,9 @@ def test_two_unreadable_replies_are_counted_and_no_third_is_asked_for():
 
 
 def test_a_prompt_that_google_blocks_counts_as_an_unreadable_reply():
+    """Google replies with the reason for which it blocked the prompt, and without an answer. The
+    model is asked a second time, with *(no answer)* in place of its reply, and in vain.
+    """
     with fake_vlm([Garbage(b'{"promptFeedback": {"blockReason": "OTHER"}}')]) as server:
         policy = make_listener(server, "google")
         assert policy.decide(ENV, "Do it.") is None
@@ -212,7 +230,9 @@ def usage_of(calls, unparsed=0, impossible=0):
 
 
 def test_a_goal_that_the_scene_lacks_is_counted_as_impossible():
-    """The model answers with a red cube; the scene has a green one only."""
+    """The model answers with a red cube; the scene of ENV has a green one only. What was
+    understood is recorded all the same.
+    """
     with fake_vlm(['{"color": "red", "repeats": 1}']) as server:
         policy = make_listener(server)
         policy.make_primitives = lambda env: None  # there is no arm here
@@ -225,6 +245,10 @@ def test_a_goal_that_the_scene_lacks_is_counted_as_impossible():
 
 
 def test_a_model_that_reads_text_only_gets_no_picture():
+    """With `pictures=False` the policy needs no camera and no video, and with `structured=False`
+    it asks for no JSON schema (`response_format`). The model, a stand-in, answers with the
+    episode's goal.
+    """
     episode = get_episode("VideoUnmask", "test", 0)
     said = instruct(episode, "direct").text
     with fake_vlm([goal_schema("VideoUnmask").answers[episode.goal]]) as server:
@@ -338,6 +362,7 @@ def test_what_is_recorded_of_a_policy_has_its_server_and_not_its_key(monkeypatch
     ids=["named", "usual of Google"],
 )
 def test_a_missing_key_is_reported_with_the_name_of_its_variable(monkeypatch, options, variable):
+    """An option names the variable with the key; without it, Google's models have a usual one."""
     monkeypatch.delenv(variable, raising=False)
 
     with pytest.raises(MissingDependencyError, match=variable):
@@ -356,7 +381,9 @@ def test_a_missing_key_is_reported_with_the_name_of_its_variable(monkeypatch, op
     ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
 )
 def test_the_version_of_a_policy_changes_only_with_what_may_change_an_answer(changes, is_same):
-    """Records are compared by version."""
+    """Records are compared by version. Where the model's server is and how long to wait for it
+    change no answer; pictures and temperature may.
+    """
     with fake_vlm(["{}"]) as server:
         version = make_listener(server).version
 
@@ -402,6 +429,9 @@ def test_the_page_of_listeners_shows_a_stored_request_and_a_reply():
     [("VideoUnmask", "spatial"), ("StopCube", "reasoning")],
 )
 def test_a_policy_with_a_stand_in_model_solves_an_episode(task, setting):
+    """The stand-in answers with the goal that the words mean. It is asked once, and the scripted
+    expert then does the task in the simulator.
+    """
     episode = get_episode(task, "test", 0)
     with fake_vlm(answers_with_the_meant_goal(episode, setting)) as server:
         policy = make_listener(server, frames=2, frames_every=20)
@@ -412,7 +442,10 @@ def test_a_policy_with_a_stand_in_model_solves_an_episode(task, setting):
 
 
 def test_the_model_is_asked_only_after_the_last_sentence_was_heard():
-    """The first of two sentences comes at the reset, the second at step 20."""
+    """Of two sentences the first comes at the reset, the second at step 20 (`unheard=1`: one is
+    still to come). The model, a stand-in, is asked once, about both, and names the goal of ENV,
+    the green cube three times.
+    """
     first, last = instruct(ENV.episode, "direct").turns
     with fake_vlm([GREEN_THREE_TIMES]) as server:
         policy = make_listener(server)

@@ -66,6 +66,9 @@ def test_a_system_with_a_planner_asks_it_for_subgoals_with_points(name, kind):
     ("name", "remembers"), [("TTT-Expert", True), ("FrameS-Modul", True), ("pi0.5", False)]
 )
 def test_a_system_without_a_planner_sends_its_history_if_it_has_a_memory(name, remembers):
+    """All three are policies behind a server, which is asked after each 16 steps (`execute`);
+    pi0.5 has no memory.
+    """
     policy = load_system(name)
 
     assert not isinstance(policy, HierarchicalPolicy)
@@ -75,6 +78,9 @@ def test_a_system_without_a_planner_sends_its_history_if_it_has_a_memory(name, r
 
 
 def test_options_in_a_system_s_name_override_its_configuration():
+    """Options of the planner and of its model stand alone (`vlm` is the address of the model's
+    server), those of the policy behind it have the prefix `policy.`.
+    """
     policy = make_policy(
         "system:GroundSG-QwenVL?server=gpu:9001&vlm=http://other:8000/v1&model=mine"
         "&video_frames=2&timeout_s=7.5&policy.execute=8",
@@ -100,6 +106,7 @@ def test_an_option_of_a_system_changes_the_address_of_its_policy_and_leaves_its_
 
 @pytest.mark.parametrize("spec", [*(f"system:{name}" for name in SYSTEMS_OF_THE_PAPER), LISTENER])
 def test_needs_and_version_of_a_system_are_known_without_making_it(spec):
+    """`read_policy` reads the name alone. A policy that is privileged has a method attach(env)."""
     known = read_policy(spec)
     policy = make_policy(spec, 5)
 
@@ -135,6 +142,7 @@ def test_needs_and_version_of_a_system_are_known_without_making_it(spec):
     ],
 )  # fmt: skip
 def test_a_wrong_system_or_planner_name_is_refused_with_what_would_be_right(spec, error, words):
+    """Each name is wrong in one respect: a word, an option, its value, or one that is missing."""
     with pytest.raises(error, match=words):
         find_policy(spec)
 
@@ -166,6 +174,7 @@ def test_a_user_s_system_is_a_toml_file(tmp_path):
     ids=["a policy that follows no subgoals", "a server for a policy without one", "no TOML"],
 )
 def test_a_user_s_system_that_cannot_be_made_is_refused(tmp_path, text, options, reason):
+    """The file of the system has this text; `options` follow its path in the name of the policy."""
     with pytest.raises(InvalidValueError, match=reason):
         make_policy(system_file(tmp_path, text) + options, 0)
 

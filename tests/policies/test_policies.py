@@ -169,6 +169,9 @@ class PolicyWithoutArguments(PolicyWithoutSeed):
     ids=["misspelled", "no module", "no class", "other signature", "no act", "no class at all"],
 )  # fmt: skip
 def test_a_wrong_policy_name_is_refused_with_what_would_be_right(spec, error, words):
+    """The classes PolicyWithout… are those of this file: one without a method act(), and one whose
+    reset() takes no arguments.
+    """
     with pytest.raises(error, match=words):
         find_policy(spec)
 

@@ -76,6 +76,7 @@ def test_needs_can_be_declared_on_a_policy():
     ],
 )
 def test_needs_with_a_wrong_value_are_refused(needs, error, words):
+    """Each has one value that its need cannot have; `touch` is no need at all."""
     with pytest.raises(error, match=words):
         PolicyNeeds(**needs)
 

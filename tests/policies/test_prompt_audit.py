@@ -141,6 +141,9 @@ def sentencepiece_file():
     "text", ["Put the red cube into the bin.", "cubes,", "third third", "Remember: green one"]
 )
 def test_a_sentencepiece_model_lies_between_the_bounds(sentencepiece_file, text):
+    """The tokenizer of a real model (the fixture) makes no fewer tokens of a text than
+    `fewest_tokens` says and no more than `most_tokens`; the last one ends with the text.
+    """
     tokens = read_tokenizer(sentencepiece_file)(text)
 
     assert fewest_tokens(text).total <= tokens.total <= most_tokens(text).total
@@ -184,7 +187,9 @@ def test_a_json_tokenizer_is_read(tmp_path):
 def test_a_tokenizer_file_that_cannot_be_read_is_refused_with_the_reason(
     tmp_path, name, size, reason
 ):
-    """A file of 2**40 zeros takes no space on the disk."""
+    """The file has so many bytes, all of them zero (2**40 take no space on the disk), or is
+    missing (None).
+    """
     path = tmp_path / name
     if size is not None:
         with path.open("wb") as file:
@@ -200,6 +205,9 @@ def test_a_tokenizer_file_that_cannot_be_read_is_refused_with_the_reason(
 def test_a_tokenizer_file_without_its_library_is_refused_with_what_to_install(
     tmp_path, monkeypatch, name, library
 ):
+    """A file that ends in .json is of the library tokenizers, any other of sentencepiece. None in
+    `sys.modules` makes the import of a library fail.
+    """
     (tmp_path / name).write_text("{}")
     monkeypatch.setitem(sys.modules, library, None)
 

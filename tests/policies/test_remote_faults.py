@@ -112,7 +112,9 @@ def test_an_error_in_a_reply_is_shown_in_the_words_of_the_server(protocol, reply
 
 
 def test_an_error_in_place_of_the_metadata_is_shown():
-    """A server sends its metadata first; here it sends an error, with a message."""
+    """A server sends its metadata first, at the latest before it is asked anything; here it sends
+    an error with a message.
+    """
     with WireServer() as server, client_of(server, "openpi") as policy:
         server.metadata = {"status": "error", "message": "The checkpoint is missing."}
         with pytest.raises(PolicyReplyError, match="with an error: The checkpoint is missing"):
@@ -143,6 +145,7 @@ def test_the_reason_with_which_a_server_closes_is_shown():
 
 @pytest.mark.parametrize("protocol", ["mme-vla", "challenge"])
 def test_a_server_that_does_not_confirm_a_reset_is_an_error(protocol):
+    """The server's first reply says that the reset was not done. The next episode is played."""
     with (
         PROTOCOLS[protocol](faults=[{"reset_finished": False}]) as server,
         client_of(server, protocol) as policy,
@@ -173,7 +176,9 @@ class NumberingServer(WireServer):
 
 
 def test_a_late_reply_is_not_taken_for_the_next_one():
-    """Reply 1 takes five seconds, the client waits for two."""
+    """All numbers of the server's n-th reply are n. Reply 1 takes five seconds, and the client
+    waits for two: that is a timeout. The reply to the next request is at least the second one.
+    """
     with (
         NumberingServer(faults=[5.0]) as server,
         client_of(server, "openpi", "?timeout=2") as policy,
@@ -196,7 +201,9 @@ def _played_in_time(policy):
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_a_server_that_ends_the_connection_ends_the_episode(protocol):
-    """It does so at the first request for actions."""
+    """It does so at the first request for actions. From then on the policy has to be reset before
+    it acts.
+    """
     with (
         failing_at_inference(protocol, "die") as server,
         client_of(server, protocol) as policy,
@@ -277,7 +284,9 @@ PORT = 20_000 + os.getpid() % 10_000
 
 
 def test_a_client_waits_for_a_server_that_starts_late():
-    """It starts half a second after the client was made."""
+    """The server starts half a second after the client was made, which tries for up to 300 s to
+    connect and then plays a step.
+    """
     server = MmeVlaServer(port=PORT)
     timer = threading.Timer(0.5, server.__enter__)
     timer.start()
@@ -320,7 +329,9 @@ def test_an_absent_server_is_reported_in_one_sentence():
 
 
 def test_closing_a_policy_closes_its_connection():
-    """Three policies are closed, each of them twice."""
+    """Three policies connect to a server one after the other, and are closed, each of them twice.
+    The server notices soon afterwards: three connections were made, and none is open.
+    """
     with WireServer() as server:
         for _ in range(3):
             policy = make_policy(f"openpi://{server.place}", 0)

@@ -121,6 +121,9 @@ def test_a_challenge_server_is_shown_each_moment_once():
 
 
 def test_the_metadata_of_a_challenge_server_are_kept_with_its_address():
+    """The server (a stand-in) says that it is *submission*, version *phase-1*. The client adds its
+    address, and that it executes all actions of a chunk.
+    """
     with ChallengeServer() as server, client_of(server, "challenge") as policy:
         policy.reset(INSTRUCTION, video(3))
 
@@ -141,6 +144,9 @@ class ServerThatIgnoresFrames(MmeVlaServer):
 
 
 def test_with_history_no_mme_vla_gets_the_current_frame_only():
+    """Of an episode with one question the server gets two messages, whose keys are shown: the
+    reset and the question, and no frames for its memory. 16 of its 20 actions are executed.
+    """
     with (
         ServerThatIgnoresFrames() as server,
         client_of(server, "mme-vla", "?history=no") as policy,
@@ -214,6 +220,9 @@ def test_a_history_longer_than_a_part_is_sent_in_parts():
 
 
 def test_url_options_rename_the_message_keys_of_an_openpi_checkpoint():
+    """`wrist=` names no key, so the picture of the wrist is neither needed nor sent. Of the
+    server's 20 actions three are executed.
+    """
     with (
         WireServer() as server,
         client_of(server, "openpi", "?front=base&wrist=&state=q&prompt=say&execute=3") as policy,
@@ -233,6 +242,9 @@ def test_two_entries_of_a_request_with_one_key_are_refused(query):
 
 
 def test_a_policy_server_may_have_a_path_in_its_url():
+    """Behind host and port the client asks for the path, and records it with them, without the
+    slash at its end.
+    """
     with WireServer() as server:
         place = f"{server.place}/v1/realtime/robot/openpi"
         policy = make_policy(f"openpi://{place}/", 0)
@@ -243,6 +255,9 @@ def test_a_policy_server_may_have_a_path_in_its_url():
 
 
 def test_a_server_cannot_give_another_address_for_its_own():
+    """The server's metadata are kept, such as its version, but for its address and how many
+    actions are executed, which the client knows better.
+    """
     with WireServer() as server, client_of(server, "openpi") as policy:
         server.metadata = {"server": "another:1", "execute": 3, "version": "2"}
         policy.reset(INSTRUCTION, {})

@@ -68,7 +68,9 @@ def ask_in_episode(server, settings, *words, episode="a", shade=None, **options)
 
 
 def test_replies_stored_for_an_episode_are_used_when_it_is_played_again(settings):
-    """So that an interrupted run pays no call of a model twice."""
+    """Two questions are asked, and both again as after an interruption. No call is paid twice: the
+    model, which would say *never* by then, gets two requests.
+    """
     with fake_vlm(["one", "two", "never"]) as server:
         first, _ = ask_in_episode(server, settings, "first", "second")
 
@@ -121,7 +123,9 @@ def test_without_a_store_the_same_question_is_asked_again():
 
 
 def test_a_stored_reply_is_not_used_for_another_picture(settings):
-    """Pictures may differ in a bit on another machine; this is counted."""
+    """The same words with a picture of another shade are another question, so the model is asked
+    and says *two*. As pictures may differ in a bit on another machine, this is counted.
+    """
     with fake_vlm(["one", "two"]) as server:
         ask_in_episode(server, settings, "words", shade=1)
 
@@ -139,6 +143,9 @@ def test_a_stored_reply_is_not_used_for_another_picture(settings):
 def test_a_stored_reply_is_used_unless_an_option_changes_that_would_change_it(
     settings, changes, reply
 ):
+    """Stored is the reply *one*; who asks the model anew gets *two*. Another temperature may
+    change a reply; how long to wait and what it costs does not.
+    """
     with fake_vlm(["one", "two"]) as server:
         ask_in_episode(server, settings, "words")
 
@@ -249,7 +256,9 @@ def test_an_unreadable_reply_makes_the_cost_of_a_run_unknown(tmp_path):
 
 
 def test_a_reply_with_an_invalid_character_is_stored_and_paid_once(settings):
-    """Half a surrogate pair cannot be written as UTF-8."""
+    """Half a surrogate pair cannot be written as UTF-8, so it is stored as an escape. PRICES make
+    a reply cost 10 dollars: asked twice, the question has cost that once.
+    """
     with fake_vlm(["\ud800 fine"]) as server:
         ask_in_episode(server, settings, "words", **PRICES)
 
@@ -323,7 +332,9 @@ def test_a_stored_cost_that_is_no_number_is_unknown(tmp_path):
 
 
 def test_a_stored_reply_that_is_no_text_is_left_out(tmp_path, settings):
-    """A stranger wrote the byte FF, which is no text, as a reply into the file."""
+    """A stranger wrote a row into the file of replies whose text is the byte FF, which is no
+    UTF-8.
+    """
     with changed_store(tmp_path) as database:
         database.execute("INSERT INTO replies VALUES ('a', 0, 'x', x'ff', 1, 1, 1)")
     store = reply_store.ReplyStore(settings, "a")
@@ -424,6 +435,7 @@ def test_answers_that_were_lost_use_up_the_retries_and_a_busy_service_does_not(m
 
 
 def test_a_reply_of_another_format_is_an_error_and_is_not_stored(settings):
+    """The first reply is an empty object, without choices. Asked again, the model says *one*."""
     with fake_vlm([Garbage(b"{}"), "one"]) as server:
         with pytest.raises(PolicyReplyError):
             ask_in_episode(server, settings, "words")
@@ -442,6 +454,7 @@ def test_a_reply_of_another_format_is_an_error_and_is_not_stored(settings):
     ],
 )
 def test_the_waiting_time_of_a_service_is_read_in_seconds(headers, seconds):
+    """A date, and what is no positive number, is left out (None)."""
     assert retry_after_s(headers) == seconds
 
 
@@ -578,7 +591,9 @@ def test_processes_that_ask_at_the_same_moment_take_turns(settings, waits):
 
 
 def test_the_longest_pause_that_a_service_asked_for_counts(settings, waits):
-    """Also if nothing limits the rate of requests."""
+    """A service asks for a pause of 9 s and then of 4 s. The next request waits for 9 s, also if
+    nothing limits the rate (None). The clock of the fixture stands still and notes the waits.
+    """
     store = reply_store.ReplyStore(settings, "a")
     store.pause("service", 9.0)
     store.pause("service", 4.0)

@@ -166,7 +166,9 @@ def test_a_goal_that_the_scene_does_not_have_is_put_into_words_as_well():
 
 
 def test_without_a_goal_the_policy_hears_what_was_said_and_that_is_counted():
-    """The namer of this test finds no goal in any text."""
+    """The namer of this test finds no goal in any text. DIRECT is what was said, *I want to see
+    how you handle the green cube. Grab it …*; it is passed on.
+    """
     policy = resolving(NamesNothing())
 
     policy.reset(DIRECT, {})
@@ -289,6 +291,9 @@ def test_the_version_names_that_of_the_namer_and_of_the_policy():
     ],
 )
 def test_a_spec_that_makes_no_sense_is_refused_in_one_sentence(spec, why):
+    """Right would be *resolve:NAMER?policy=POLICY*, with a namer that finds the goal in the words
+    and a policy that listens to words.
+    """
     with pytest.raises((InvalidValueError, UnknownNameError), match=why):
         read_policy(spec)
 

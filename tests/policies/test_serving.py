@@ -395,7 +395,9 @@ def test_after_a_malformed_request_the_next_episode_works():
 
 @pytest.mark.parametrize("protocol", SERVED)
 def test_an_exception_in_a_served_policy_reaches_the_client_with_its_message(protocol):
-    """The policy here fails at the instruction *fail*; the next episode works."""
+    """The policy Recorder raises *the weights melted* if the instruction begins with *fail*. The
+    next episode works.
+    """
     now = moment(1, history=())
     with served(HERE, protocol) as url:
         with pytest.raises(PolicyReplyError, match="RuntimeError: the weights melted"):
@@ -406,7 +408,7 @@ def test_an_exception_in_a_served_policy_reaches_the_client_with_its_message(pro
 
 @pytest.mark.parametrize("protocol", SERVED)
 def test_a_server_reports_its_health_to_anyone(protocol):
-    """Also without the key *sesame*, at the path /healthz."""
+    """The server's key is *sesame*. A request for the path /healthz without it is answered *OK*."""
     with served(HERE, protocol, key="sesame") as url:
         health = HTTPConnection(url.split("://")[1], timeout=300)
         health.request("GET", "/healthz")
@@ -484,7 +486,9 @@ def test_a_policy_that_a_protocol_cannot_serve_is_refused_with_the_reason(option
 
 
 def test_the_command_serve_runs_until_a_signal_ends_it():
-    """143 is 128 + 15, the number of SIGTERM."""
+    """The command serves the random policy, of whose chunk 16 actions of 8 numbers are executed.
+    SIGTERM ends it with exit code 143, which is 128 + 15, the number of that signal.
+    """
     with serving("mme-vla") as server:
         assert server.url.startswith("mme-vla://127.0.0.1:")
 

@@ -70,7 +70,9 @@ def finished_program(code, path):
 
 
 def test_all_ways_to_print_end_in_the_log_and_not_on_the_terminal(tmp_path):
-    """What is printed before and after an episode stays on the terminal."""
+    """The program prints with Python, with C, through a descriptor and through a child process, on
+    stdout and on stderr. What it prints before and after the episode stays on the terminal.
+    """
     log = tmp_path / "logs" / "a.txt"
 
     done = finished_program(PROGRAM_THAT_PRINTS, log)
@@ -143,7 +145,7 @@ def test_an_episode_that_prints_nothing_has_no_log(tmp_path):
 
 
 def test_an_episode_that_is_played_again_and_prints_nothing_loses_its_old_log(tmp_path):
-    """From the begin of the second attempt on."""
+    """The first attempt printed *words*. Their log is gone as soon as the second attempt begins."""
     path = log_path(tmp_path, "played twice")
     with EpisodeLog(path) as log:
         os.write(log.descriptor, b"words")

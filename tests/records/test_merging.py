@@ -27,7 +27,9 @@ def merge_records(folder, *runs):
 
 
 def test_merging_two_parts_of_a_run_gives_the_whole_without_duplicates(tmp_path):
-    """Of 8 records the parts have the first 5 and the last 5, so 2 twice."""
+    """Of 8 records the parts have the first 5 and the last 5. So 8 are added, and 2 come a second
+    time.
+    """
     records = tuple(played_records())
 
     merged = merge_records(tmp_path, records[:5], records[3:])
@@ -47,7 +49,7 @@ def test_merging_again_into_the_same_folder_adds_nothing(tmp_path):
 
 
 def test_the_plan_of_a_merged_run_is_kept(tmp_path):
-    """Or nobody could count what is missing."""
+    """The plan lists the episodes of a run; without it nobody could count what is missing."""
     part = tmp_path / "part"
     fake_run(part)
 
@@ -58,7 +60,9 @@ def test_the_plan_of_a_merged_run_is_kept(tmp_path):
 
 
 def test_merging_keeps_a_verdict_rather_than_an_error(tmp_path):
-    """Whichever comes first."""
+    """Three runs have a record of the same episode: an error, a success, and the error again.
+    Whichever comes first, the success is kept.
+    """
     won = played_records()[0]
     error = replace(won, outcome="error", error="connection", server_version=None)
 
@@ -69,6 +73,7 @@ def test_merging_keeps_a_verdict_rather_than_an_error(tmp_path):
 
 
 def test_merging_keeps_the_first_of_two_errors(tmp_path):
+    """Both runs have an error of the same episode, with different causes."""
     usual = played_records()[0]
     first = replace(usual, outcome="error", error="connection", cause="connection: refused")
     second = replace(first, cause="connection: lost")
@@ -79,6 +84,9 @@ def test_merging_keeps_the_first_of_two_errors(tmp_path):
 
 
 def test_merging_keeps_the_first_of_two_verdicts_and_reports_the_other_as_a_conflict(tmp_path):
+    """Both runs have a verdict on the same episode: it failed in the first one and was won in the
+    second.
+    """
     record = played_records()[1]
     fell = replace(record, outcome="failure", cause="it fell")
     won = replace(record, outcome="success", cause=None)
@@ -91,6 +99,9 @@ def test_merging_keeps_the_first_of_two_verdicts_and_reports_the_other_as_a_conf
 
 
 def test_merging_warns_of_verdicts_by_other_code(tmp_path):
+    """`verdict_code` is a digest of the code that judged an episode; one of the two runs has
+    another.
+    """
     first, second, *_ = played_records()
     by_other_code = replace(second, verdict_code="old")
 
@@ -118,7 +129,10 @@ def test_merging_does_not_warn_of_other_code_in_episodes_without_instruction(tmp
 
 
 def test_videos_actions_and_logs_are_copied_with_the_records_that_are_kept(tmp_path):
-    """The verdict of the second run is kept in place of the error of the first."""
+    """Run a has an error of an episode, run b a verdict on it, which replaces the error. Both have
+    a video, its picture, actions and a log, in files that say whose they are; those of b are
+    copied.
+    """
     record = replace(played_records()[0], video="videos/x.mp4", action_log="ab" * 32)
     error = replace(record, outcome="error", error="connection")
     files = (
@@ -181,7 +195,9 @@ def test_a_run_is_not_merged_into_itself(tmp_path):
 
 
 def test_runs_with_two_wording_files_can_be_merged(tmp_path):
-    """Their words differ, as they should."""
+    """Each run has its sentences from a file of its own, with another digest. They are other
+    episodes, so their words may differ.
+    """
     usual = played_records()[0]
     folders = []
     for digest in ("0a", "1b"):

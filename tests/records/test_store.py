@@ -42,7 +42,9 @@ from roboirg.util.atomic_write import locked, write_atomically
 
 @pytest.mark.parametrize("field", Versions._fields[1:])
 def test_a_run_is_refused_if_any_of_its_versions_differs(field):
-    """As those of the language, the environment and the server."""
+    """Versions are those of the language, the environment, the server and so on. One of them was
+    *a* when the run began, and is *b* now.
+    """
     differences = Versions(**{field: "a"}).differences(Versions(**{field: "b"}))
 
     sentence = f"^x whose {field.replace('_', ' ')} is a, but now it is b; choose another --out.$"
@@ -139,7 +141,9 @@ def test_an_error_of_another_policy_of_the_same_name_stays_of_unknown_version(tm
 
 
 def test_unfinished_lines_of_several_crashes_are_all_kept_in_a_file_of_their_own(tmp_path):
-    """Twice a record is cut off by a crash, and the store is opened again."""
+    """Twice a crash cuts off a record in its line, and the file of records is opened again to be
+    written. Both unfinished lines are moved to TORN_FILE, and no record is left.
+    """
     for torn in (b'{"policy": "a', b'{"policy": "b'):
         with (tmp_path / RECORDS_FILE).open("ab") as file:
             file.write(torn)
@@ -149,7 +153,7 @@ def test_unfinished_lines_of_several_crashes_are_all_kept_in_a_file_of_their_own
 
 
 def test_a_second_run_in_the_same_folder_is_refused_with_the_process_of_the_first(tmp_path):
-    """Once the first store is closed, another may open the folder."""
+    """A store locks its folder. Once the first store is closed, another may open the folder."""
     first = RecordStore(tmp_path)
 
     with pytest.raises(StoreError, match=rf"being written by .*process {os.getpid()}\)"):
@@ -221,7 +225,9 @@ def test_a_line_that_is_no_record_is_reported_with_its_number(tmp_path, read, li
     ids=["steps", "duration", "cost", "step limit"],
 )  # fmt: skip
 def test_a_record_with_a_number_that_could_not_be_read_back_is_not_written(tmp_path, fields):
-    """Beyond 64 bits, no number, or infinite."""
+    """Numbers beyond 64 bits, NaN and infinity have no place in JSON, or are not read back as they
+    were. The file stays empty.
+    """
     record = replace(eight_records()[0], **fields)
 
     with RecordStore(tmp_path) as store, pytest.raises(StoreError, match=r"is not a record"):
@@ -311,7 +317,9 @@ def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path, victim, nam
 
 @pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "models.sqlite"])
 def test_a_run_changes_no_file_that_has_another_name_elsewhere(tmp_path, victim, name):
-    """A hard link."""
+    """A file of the run is a hard link to a file of somebody else: to write into the one would
+    change the other.
+    """
     (tmp_path / "run" / name).hardlink_to(victim)
 
     with pytest.raises(RoboIRGError, match=f"{name} has another name elsewhere"):
@@ -322,7 +330,9 @@ def test_a_run_changes_no_file_that_has_another_name_elsewhere(tmp_path, victim,
 
 @pytest.mark.parametrize("name", ["records.torn", "logs/a.txt"])
 def test_a_run_does_not_start_where_a_pipe_would_block_it(tmp_path, name):
-    """The unfinished line would be written into it."""
+    """A file to write to is a named pipe, where a writer waits until somebody reads. The
+    unfinished record in the folder would be moved to records.torn.
+    """
     path = tmp_path / "run" / name
     path.parent.mkdir(parents=True)
     (tmp_path / "run" / RECORDS_FILE).write_text('{"a')
@@ -343,6 +353,7 @@ def test_a_plan_may_be_a_hard_link_as_it_is_replaced(tmp_path, victim):
 
 
 def test_a_folder_of_videos_on_another_disk_is_refused_at_the_start(tmp_path):
+    """The folder `videos` of the run is a link to a folder elsewhere. Nothing is recorded."""
     (tmp_path / "disk").mkdir()
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "videos").symlink_to(tmp_path / "disk")

@@ -152,5 +152,8 @@ def test_without_processes_for_policies_a_planner_runs_in_the_process_of_the_wor
     ],
 )
 def test_a_planner_that_cannot_be_used_is_refused_with_the_reason(spec, words):
+    """The planners are in own_planners.py of this folder: one that needs the simulator, none of
+    that name, one without a method plan(), and one that takes no options.
+    """
     with pytest.raises(InvalidValueError, match=re.escape(words)):
         open_policy(read_policy(spec))

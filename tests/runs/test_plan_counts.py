@@ -71,4 +71,7 @@ def test_a_listener_calls_its_model_once_an_episode():
     ],
 )
 def test_no_calls_are_counted_of_a_policy_whose_model_is_elsewhere_unknown_or_missing(spec):
+    """The oracle and *random* have no model; that of a server or of a planner of the user's is not
+    seen from here.
+    """
     assert least_calls(pick_x_times_jobs(spec)) == {}

@@ -46,7 +46,9 @@ def plan_in_words_of(path, **options):
 
 
 def test_each_episode_in_words_of_a_file_has_their_digest_and_the_path(wording_file):
-    """Two episodes in three settings."""
+    """The plan has two episodes in three settings. All are in the words of the file named *test*;
+    the digest begins with that name.
+    """
     jobs = plan_in_words_of(wording_file).jobs()
 
     assert len(jobs) == 2 * 3
@@ -125,6 +127,10 @@ def test_a_worker_refuses_a_file_of_words_that_has_changed(wording_file, monkeyp
 def test_a_plan_is_refused_if_its_file_of_words_lacks_a_task_a_goal_or_a_name(
     wording_file, content, options, words
 ):
+    """FILE_OF_SENTENCES has a sentence for each goal of PickXtimes: one of three colors, one to
+    five times. It has no words for StopCube; without *once* a goal has no sentence; the last two
+    files have no name, and a task that does not exist.
+    """
     wording_file.write_text(content)
 
     with pytest.raises(InvalidValueError, match=words):

@@ -179,6 +179,7 @@ class It(BasePolicy):
 
 
 def test_usage_of_a_hosted_policy_that_is_no_finite_number_is_left_out(begin_episode, write_policy):
+    """The policy's usage is sent from its process to this one: the cost, which is NaN, is not."""
     text = """
 class It(BasePolicy):
     def usage(self):
@@ -244,6 +245,7 @@ class It(BasePolicy):
 
 
 def test_a_hosted_policy_is_made_with_its_seed(begin_episode, write_policy):
+    """The policy, in a process of its own, tells its seed in its metadata."""
     text = """
 class It(BasePolicy):
     def __init__(self, seed):
@@ -353,7 +355,9 @@ def test_a_policy_is_asked_about_no_more_episodes_at_once_than_a_batch_has(tmp_p
 
 
 def test_all_worlds_share_one_object_of_a_batched_policy(begin_episode):
-    """It tells in its metadata how many of it were made."""
+    """BatchedDice plays many episodes with one object. It tells in its metadata how many of it
+    were made: one for three episodes.
+    """
     worlds = [begin_episode("hosting_fakes:BatchedDice", seed) for seed in range(3)]
 
     for world in worlds:
@@ -456,7 +460,9 @@ class It(BasePolicy):
 
 
 def test_a_policys_version_is_shortened_and_its_control_characters_are_escaped(write_policy):
-    """So that it never controls the terminal that it is printed on."""
+    """The version begins with codes that clear a terminal, turn text around, and end a line, and
+    half a surrogate pair, which becomes *?*; it has 500 digits more.
+    """
     spec = write_policy(
         "controls_terminals",
         """
@@ -714,7 +720,9 @@ class It(BasePolicy):
 
 
 def test_a_process_that_is_starting_is_not_ended_as_frozen():
-    """After 0.01 s it cannot have answered yet."""
+    """A process that hangs does not answer in time. This one has just been started, and cannot
+    have answered after 0.01 s; it is given longer.
+    """
     starting = PolicyChild(os.environ)
 
     starting.check(0.01)
