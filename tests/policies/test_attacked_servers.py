@@ -140,11 +140,8 @@ def test_a_message_above_64_mib_is_refused_from_its_header(server_without_key):
     The server closes the connection with code 1009, which means *too big*, has reserved no memory
     for the message, and stays healthy.
     """
-    final_binary_frame = 0x82
-    masked_with_length_in_8_bytes = 0xFF
-    length = 64 * 2**20 + 1
-    mask = bytes(4)
-    header = struct.pack("!BBQ", final_binary_frame, masked_with_length_in_8_bytes, length) + mask
+    # The last frame of a message, binary (0x82); masked, its length in 8 bytes (0xFF); the mask.
+    header = struct.pack("!BBQ", 0x82, 0xFF, 64 * 2**20 + 1) + bytes(4)
 
     with server_without_key.connect(opening()) as connection:
         assert connection.recv(65536).startswith(b"HTTP/1.1 101 ")  # a WebSocket from here on

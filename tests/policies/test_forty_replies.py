@@ -79,10 +79,10 @@ def test_a_reply_in_the_style_of_a_model_family_is_read_as_it_is_meant_or_counte
 
     found = model.ask(SOME_QUERY, READERS[styled.question])
 
-    is_unreadable = styled.reading is None
+    unreadable = int(styled.reading is None)
     assert found == styled.reading
-    assert model.usage()["unparsed"] == is_unreadable
-    assert len(questions) == 1 + is_unreadable
+    assert model.usage()["unparsed"] == unreadable
+    assert len(questions) == 1 + unreadable
 
 
 @pytest.mark.parametrize(

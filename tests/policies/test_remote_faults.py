@@ -112,9 +112,7 @@ def test_an_error_in_a_reply_is_shown_in_the_words_of_the_server(protocol, reply
 
 
 def test_an_error_in_place_of_the_metadata_is_shown():
-    """A server sends its metadata first, at the latest before it is asked anything; here it sends
-    an error with a message.
-    """
+    """A server sends its metadata before anything else; here it sends an error, with a message."""
     with WireServer() as server, client_of(server, "openpi") as policy:
         server.metadata = {"status": "error", "message": "The checkpoint is missing."}
         with pytest.raises(PolicyReplyError, match="with an error: The checkpoint is missing"):
