@@ -328,7 +328,7 @@ def test_a_suite_that_was_played_in_part_is_marked_in_the_table_of_forms():
     both forms of instructions: the implicit one, and the one with references spelled out
     (resolved).
     """
-    results = [*play("10", "direct"), *play("11", "direct", form="resolved")]
+    results = [*make_results("10", "direct"), *make_results("11", "direct", form="resolved")]
 
     table = diagnostic_tables()["forms"].make(RunData(frame_of(results)))
 
