@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 from flat_jobs import frame_of, make_result
 
-from roboirg.analysis.measures.arm_figures import arm_figures
-from roboirg.analysis.measures.chance import silent_chance
+from roboirg.analysis.measures.arm_figures import arm_figures, silent_chance
 from roboirg.analysis.measures.measure import mean_rate
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.tables.arm_table import language_use_sentences, make_arm_table

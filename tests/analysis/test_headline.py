@@ -18,7 +18,7 @@ from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.analysis.tables.run_tables import make_run_tables
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.word_sampler import LANGUAGE_VERSION
-from roboirg.shortcuts.shortcut_tables import Excess, ShortcutRow
+from roboirg.shortcuts.shortcut_shares import Excess, ShortcutRow
 from roboirg.tasks import all_tasks
 
 SETTINGS = ("reasoning", "spatial")

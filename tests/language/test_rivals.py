@@ -16,8 +16,9 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct
 from roboirg.language.instruction_row import row
 from roboirg.language.settings import settings_of
-from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.shortcuts.command_chance import blind_goals, right_share
+from roboirg.shortcuts.surface_rules import SURFACE_RULES
+from roboirg.shortcuts.text_guess import goal_share, guess_goal
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 

@@ -23,7 +23,6 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct, instruct_with
 from roboirg.language.settings import settings_of
 from roboirg.main import app
-from roboirg.shortcuts import SURFACE_RULES, draw_goal, goal_share, guess_goal
 from roboirg.shortcuts.goal_learner import LEARNED_FLOORS
 from roboirg.shortcuts.goal_vocabulary import goal_vocabulary
 from roboirg.shortcuts.shortcut_scores import (
@@ -36,14 +35,10 @@ from roboirg.shortcuts.shortcut_scores import (
     score_guess,
     score_rule,
 )
-from roboirg.shortcuts.shortcut_tables import (
-    Excess,
-    ShortcutRow,
-    excess_text,
-    shortcut_rows,
-    shortcut_table,
-)
-from roboirg.shortcuts.text_guess import slot_share
+from roboirg.shortcuts.shortcut_shares import Excess, ShortcutRow
+from roboirg.shortcuts.shortcut_tables import excess_text, shortcut_rows, shortcut_table
+from roboirg.shortcuts.surface_rules import SURFACE_RULES
+from roboirg.shortcuts.text_guess import draw_goal, goal_share, guess_goal, slot_share
 from roboirg.tasks import get_task, goals_of
 from roboirg.tasks.splits.splits import get_episode
 
