@@ -197,18 +197,57 @@ def test_all_turns_of_a_stopcube_episode_come_before_its_earliest_press():
     assert play(env, make_policy("listener", 0))["status"] == "success"
 
 
-@pytest.mark.sim
-def test_a_run_in_turns_records_the_step_of_each_utterance(tmp_path):
-    words = ["--policy", "listener", "--tasks", "VideoUnmask", "--settings", "explicit,direct"]
-    words += ["--plan", plan_file(delivery="turns", episodes=1, video="all"), "--workers", "0"]
-    result = CliRunner().invoke(app, ["run", *words, "--out", str(tmp_path)])
+@pytest.fixture(scope="module")
+def run_in_turns(tmp_path_factory):
+    """The folder of a run in turns: an episode in *explicit* and the same one in *direct*."""
+    folder = tmp_path_factory.mktemp("run")
+    plan = plan_file(
+        tasks="VideoUnmask", settings="explicit,direct", delivery="turns", episodes=1, video="all"
+    )
+    words = ["run", "--plan", plan, "--policy", "listener", "--workers", "0", "--out", str(folder)]
+    result = CliRunner().invoke(app, words)
     assert result.exit_code == 0, result.output
+    return folder
 
-    direct, explicit = read_records(tmp_path)
-    assert (explicit.options.delivery, direct.options.delivery) == ("prompt", "turns")
-    assert [turn.step for turn in explicit.instruction] == [0]
-    assert [turn.step for turn in direct.instruction] == [0, 20]
+
+@pytest.fixture
+def records_of_run_in_turns(run_in_turns):
+    """The record of the listener's episode in each setting."""
+    return {record.options.setting: record for record in read_records(run_in_turns)}
+
+
+@pytest.mark.sim
+def test_a_run_in_turns_records_the_step_of_each_utterance(records_of_run_in_turns):
+    """In the setting *direct* the instruction has two utterances, which are 20 steps apart."""
+    direct = records_of_run_in_turns["direct"]
+
+    assert direct.options.delivery == "turns"
+    assert [utterance.step for utterance in direct.instruction] == [0, 20]
+
+
+@pytest.mark.sim
+def test_a_single_utterance_in_a_run_in_turns_is_recorded_as_a_prompt(records_of_run_in_turns):
+    """An instruction of the setting *explicit* is one command, which is said at once, whatever the
+    plan asks for."""
+    explicit = records_of_run_in_turns["explicit"]
+
+    assert explicit.options.delivery == "prompt"
+    assert [utterance.step for utterance in explicit.instruction] == [0]
+
+
+@pytest.mark.sim
+def test_a_listener_in_a_run_in_turns_waits_for_the_last_utterance(records_of_run_in_turns):
+    """The listener solves the episode from its explicit command, said at step 0, and in the setting
+    *direct*, where the second utterance comes at step 20. It acts then, and needs as many steps."""
+    explicit = records_of_run_in_turns["explicit"]
+    direct = records_of_run_in_turns["direct"]
+
+    assert (explicit.outcome, direct.outcome) == ("success", "success")
     assert direct.steps == explicit.steps + 20
-    for record in (explicit, direct):
-        assert record.outcome == "success"
-        assert (tmp_path / record.video).stat().st_size > 1000
+
+
+@pytest.mark.sim
+def test_a_run_in_turns_has_a_video_of_each_episode(run_in_turns, records_of_run_in_turns):
+    """The plan asks for all videos; one has thousands of bytes."""
+    for record in records_of_run_in_turns.values():
+        assert (run_in_turns / record.video).stat().st_size > 1000
