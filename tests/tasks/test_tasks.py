@@ -142,15 +142,37 @@ def names_moved(motion):
     raise AssertionError(motion)
 
 
+def all_stages(episode):
+    """Return the stages of an episode's video and those of its own."""
+    return (*episode.demonstration, *episode.stages)
+
+
 @each_task
-def test_stages_point_at_and_handle_only_objects_of_the_scene(task):
-    """The facts of stages are checked wherever an episode is made."""
+def test_stages_handle_and_point_at_only_objects_of_the_scene(task):
+    """A stage has a motion primitive, such as to place something at a place, and may point at an
+    object in its words. All these names must be of the scene; a primitive without an object has
+    the name of the robot."""
     for episode in episodes(task):
         objects = {item.name for item in episode.scene.objects}
-        for stage in (*episode.demonstration, *episode.stages):
+        for stage in all_stages(episode):
             handled = {stage.primitive.subject, stage.primitive.place, stage.points_at}
             assert handled <= objects | {"robot", None}, episode.key
+
+
+@each_task
+def test_no_stage_forbids_the_fact_that_completes_it(task):
+    """A stage ends with the fact that it expects, and fails with one that it forbids."""
+    for episode in episodes(task):
+        for stage in all_stages(episode):
             assert stage.expects not in stage.forbids, episode.key
+
+
+@each_task
+def test_the_words_of_a_stage_have_a_place_for_a_pixel_if_it_points_at_something(task):
+    """In a subgoal such as "pick up the cube {at}", the pixel of the object at which the stage
+    points takes the place of `{at}`."""
+    for episode in episodes(task):
+        for stage in all_stages(episode):
             assert ("{at}" in stage.subgoal) == (stage.points_at is not None), episode.key
 
 
