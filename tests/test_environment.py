@@ -165,16 +165,21 @@ def oracle_with_subgoals():
 
 
 def test_a_subgoal_changes_one_step_after_its_act_and_the_last_one_at_once(oracle_with_subgoals):
+    """The fixture is an episode that the oracle has played, and each change of its subgoals with
+    its step, the first of them at step 1. A stage of the task is done when the fact that it expects is
+    first there. The next subgoal is shown one step later; after the last stage, where the episode
+    ends, that all is done is shown at once."""
     env, changes = oracle_with_subgoals
     first_steps = {}
     for event in env.events:
         first_steps.setdefault(event.fact, event.step)
-    *acts, last_act = [first_steps[stage.expects] for stage in env.episode.stages]
+    done = [first_steps[stage.expects] for stage in env.episode.stages]
 
-    _, *steps, last_step = [step for step, _, _ in changes]
+    changed = [step for step, _, _ in changes]
 
-    assert steps == [step + 1 for step in acts]
-    assert last_step == last_act
+    assert changed[0] == 1
+    assert changed[1:-1] == [step + 1 for step in done[:-1]]
+    assert changed[-1] == done[-1]
 
 
 def test_a_subgoal_has_a_pixel_only_if_it_points(oracle_with_subgoals):
@@ -187,26 +192,41 @@ def test_a_subgoal_has_a_pixel_only_if_it_points(oracle_with_subgoals):
         assert ("<" in grounded) == (stage.points_at is not None)
 
 
-def test_the_types_of_the_options_of_make_are_those_of_the_environment():
-    """Editors read them from one class; would find an option that is missing there."""
+def test_the_options_that_make_declares_are_those_of_the_environment():
+    """`EnvOptions` has the types of all keywords of `roboirg.make`, for editors. They are the
+    fields of `EnvSettings`, in which two, words and environment, stand for the options of their
+    own: those of instructions and those of environments."""
+    fields = {field.name: field.type for field in dataclasses.fields(EnvSettings)}
+    del fields["words"]
+    del fields["environment"]
+
     typed = {name: hint.__forward_arg__ for name, hint in EnvOptions.__annotations__.items()}
-    own = {option.name: option.type for option in dataclasses.fields(EnvSettings)}
-    del own["words"], own["environment"]  # whose fields are options
 
-    assert typed.keys() == {*own, *OPTION_NAMES, *ENVIRONMENT_OPTIONS}
-    assert {name: typed[name] for name in own} == own
-    for made in (roboirg.make, RoboIRGEnv):
-        annotation = inspect.signature(made).parameters["options"].annotation
-        assert annotation == "Unpack[EnvOptions]"
+    assert typed.keys() == {*fields, *OPTION_NAMES, *ENVIRONMENT_OPTIONS}
+    assert fields.items() <= typed.items()
 
 
-def test_every_option_of_make_is_in_its_docstring_and_an_unknown_one_is_refused():
+@pytest.mark.parametrize("made", [roboirg.make, RoboIRGEnv])
+def test_editors_know_the_options_of_make_and_of_the_environment(made):
+    """`EnvOptions` has the types of all keywords; with this annotation editors offer them."""
+    options = inspect.signature(made).parameters["options"]
+
+    assert options.annotation == "Unpack[EnvOptions]"
+
+
+def test_every_option_of_make_is_in_its_docstring():
+    """Under "Keyword Args:", up to "Raises:", it explains the options in order, each on a line
+    "    name: ...". Those of instructions and of environments, which commands share, are explained
+    elsewhere."""
     _, _, documented = inspect.getdoc(roboirg.make).partition("Keyword Args:")
     documented, _, _ = documented.partition("Raises:")
     shared = {*OPTION_NAMES, *ENVIRONMENT_OPTIONS}
     own = [name for name in EnvOptions.__annotations__ if name not in shared]
 
     assert re.findall(r"^    (\w+): ", documented, re.MULTILINE) == own
+
+
+def test_an_unknown_option_of_make_is_refused_with_the_nearest_name():
     with pytest.raises(UnknownNameError, match=r"option of make\(\) 'camera'.*mean 'cameras'"):
         roboirg.make("PickXtimes", camera=("front",))
 
@@ -255,18 +275,22 @@ def test_a_task_without_a_video_has_a_demonstration_of_no_frames():
 
 
 def test_the_frame_hook_is_called_every_eighth_step_and_at_the_end():
-    """With the environment, and whether the step is of the video, as the first 66 are."""
+    """In VideoUnmask the video takes 66 steps, and going home one more; the policy's turn follows,
+    which is cut off after 14. So there are 67 + 14 = 81 steps. The hook is told which are of the
+    video."""
     env = roboirg.make("VideoUnmask", cameras=(), max_steps=14)
-    calls = []
+    in_video = []
+    in_turn = []
 
     def note(env, is_demonstration):
-        calls.append((env.session.world.elapsed, is_demonstration))
+        steps = in_video if is_demonstration else in_turn
+        steps.append(env.session.world.elapsed)
 
     env.set_frame_hook(note, every=8)
     play(env, make_policy("oracle", 0))
 
-    assert [step for step, _ in calls] == [8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 81]
-    assert [step for step, is_demonstration in calls if not is_demonstration] == [72, 80, 81]
+    assert in_video == [8, 16, 24, 32, 40, 48, 56, 64]
+    assert in_turn == [72, 80, 81]
 
 
 ACTIONS = HOME_ACTION + np.random.default_rng(0).normal(0, 0.1, (27, 8))
@@ -354,17 +378,18 @@ def test_the_history_of_a_chunk_draws_only_the_cameras_it_was_asked_for(monkeypa
 
 
 class NeedsHistory:
-    """Requires its own observations and video."""
+    """Requires its own observations and video, and notes what it gets of them."""
 
     cameras = ()
     observe_every = 5
     demonstration_frames = "none"
 
     def reset(self, instruction, demonstration):
-        self.seen = [len(demonstration)]
+        self.keys_of_video = sorted(demonstration)
+        self.history_lengths = []
 
     def act(self, observation):
-        self.seen.append(len(observation["history"]))
+        self.history_lengths.append(len(observation["history"]))
         return np.tile(HOME_ACTION, (7, 1))
 
 
@@ -375,17 +400,33 @@ def test_a_policy_is_not_played_in_an_environment_without_the_history_it_needs()
         play(env, NeedsHistory())
 
 
-def test_a_policy_gets_the_history_and_the_video_that_it_declares():
-    """Every 5th step of chunks of 7: none at the reset, then step 5, then step 10."""
-    policy = NeedsHistory()
+@pytest.fixture
+def policy_that_needs_history():
+    """A policy after an episode of 20 steps, in the environment that a run makes for its needs.
+
+    It needs an observation of every 5th step and no pictures, and acts in chunks of 7 steps.
+    """
     job = job_of(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
     needs = PolicyNeeds(cameras=(), demonstration_frames="none", observe_every=5)
     env = make_env(PreparedJob(job), needs)
     env.max_steps = 20
-
+    policy = NeedsHistory()
     play(env, policy)
+    return policy
 
-    assert policy.seen == [3, 0, 1, 1]
+
+def test_a_policy_gets_the_history_that_it_declares(policy_that_needs_history):
+    """The policy, from the fixture, declares that it needs an observation of every 5th step. It
+    acts at steps 0, 7 and 14: the history since it acted last has nothing, step 5, step 10."""
+    assert policy_that_needs_history.history_lengths == [0, 1, 1]
+
+
+def test_a_policy_gets_the_video_that_it_declares(policy_that_needs_history):
+    """The policy, from the fixture, declares that it needs no pictures of the video. What is left
+    are the states of the robot."""
+    keys = policy_that_needs_history.keys_of_video
+
+    assert keys == ["end_effector", "gripper", "joint_positions"]
 
 
 def test_the_tools_angles_in_observations_do_not_jump_by_a_full_turn():
