@@ -165,8 +165,8 @@ def test_readme_rightly_says_that_a_third_is_lost_with_direct_and_over_half_with
     best_published,
 ):
     """README says so in words, of the best published model. What is left, as a share of the rate
-    with explicit instructions: of direct ones about two thirds, of the others less than half. Spatial
-    ones exist for seven tasks alone, and are compared with explicit ones for these."""
+    with explicit instructions: of direct ones about two thirds, of the others less than half.
+    Spatial ones exist for seven tasks alone, and are compared with explicit ones for these."""
     explicit = best_published["explicit"].average
     seven_tasks = tasks_with_rates(best_published["spatial"])
     explicit_of_seven = best_published["explicit"].average_over(seven_tasks)

@@ -166,9 +166,9 @@ def oracle_with_subgoals():
 
 def test_a_subgoal_changes_one_step_after_its_act_and_the_last_one_at_once(oracle_with_subgoals):
     """The fixture is an episode that the oracle has played, and each change of its subgoals with
-    its step, the first of them at step 1. A stage of the task is done when the fact that it expects is
-    first there. The next subgoal is shown one step later; after the last stage, where the episode
-    ends, that all is done is shown at once."""
+    its step, the first of them at step 1. A stage of the task is done when the fact that it expects
+    is first there. The next subgoal is shown one step later; after the last stage, where the
+    episode ends, that all is done is shown at once."""
     env, changes = oracle_with_subgoals
     first_steps = {}
     for event in env.events:
