@@ -154,7 +154,8 @@ def test_the_instruction_of_an_observation_is_what_is_new_since_the_last_one(pla
 
 @pytest.mark.sim
 def test_the_history_has_what_was_said_last_at_each_of_its_steps(played_in_turns):
-    """At steps 5, 10, ..., 60."""
+    """Utterances 0 to 4 are said at steps 0, 10, 20, 30 and 40. The history has an observation of
+    the steps 5, 10, ..., 60, each with the last utterance until then."""
     policy, env = played_in_turns
 
     said = [env.instruction.turns.index(words) for words in policy.history]

@@ -22,8 +22,15 @@ from roboirg.records.record import Job, Record
 from roboirg.tasks import find_tasks
 
 ROOT = Path(__file__).parent.parent
+
+
+def text_of(name):
+    """Return the text of a file of the repository."""
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
-README = (ROOT / "README.md").read_text()
+README = text_of("README.md")
 MOST_WORDS = 1800
 SETTINGS = ("explicit", "direct", "reasoning", "contextual", "spatial")
 """The columns of the tables of results."""
@@ -43,7 +50,7 @@ def test_every_link_to_a_file_leads_to_one(page):
 
 
 def test_the_page_about_records_lists_exactly_the_keys_of_a_record():
-    table = (ROOT / "docs" / "record.md").read_text().split("## In Python")[0]
+    table = text_of("docs/record.md").split("## In Python")[0]
     keys = " ".join(line.split("|")[1] for line in table.splitlines() if line.startswith("| "))
     assert set(re.findall(r"`(\w+)`", keys)) == {*Record.__struct_fields__, "schema_version"}
 
@@ -61,7 +68,7 @@ def test_the_page_about_records_lists_exactly_the_fields_of_objects_in_a_record(
     """Where a key of a record holds an object, or a list of some, its row on the page has the names
     in braces, such as "| `instruction` | list of `{stage, text, step}` |". They must be those of
     the class that `Record` declares for the key, in the same order."""
-    table = (ROOT / "docs" / "record.md").read_text().split("## In Python")[0]
+    table = text_of("docs/record.md").split("## In Python")[0]
     key_then_names_in_braces = r"^\| \*?`(\w+)`\*? \| [^|]*\{([\w, ]+)\}"
     on_page = dict(re.findall(key_then_names_in_braces, table, flags=re.MULTILINE))
 
@@ -74,9 +81,14 @@ def test_the_page_about_records_lists_exactly_the_fields_of_objects_in_a_record(
     assert on_page == declared
 
 
+def project_of(pyproject):
+    """Return what a pyproject.toml says of its package."""
+    return tomllib.loads(text_of(pyproject))["project"]
+
+
 def required_by(pyproject):
     """Return the names of the packages that a pyproject.toml requires, also in its extras."""
-    project = tomllib.loads(pyproject.read_text())["project"]
+    project = project_of(pyproject)
     extras = project.get("optional-dependencies", {}).values()
     requirements = itertools.chain(project["dependencies"], *extras)
     return {re.split(r"[\[<>=]", requirement)[0] for requirement in requirements}
@@ -86,9 +98,9 @@ def test_every_dependency_is_explained_once_on_the_page_of_dependencies():
     """A row of the page's table begins with the name of a package; behind it the reason stands in
     backquotes or brackets. There must be one for each package that the benchmark or roboirg-learn
     requires, in any extra, but for these two themselves."""
-    required = required_by(ROOT / "pyproject.toml")
-    required |= required_by(ROOT / "packages" / "learn" / "pyproject.toml")
-    page = (ROOT / "docs" / "dependencies.md").read_text()
+    required = required_by("pyproject.toml")
+    required |= required_by("packages/learn/pyproject.toml")
+    page = text_of("docs/dependencies.md")
 
     explained = re.findall(r"^\| ([\w-]+) \| [`(]", page, flags=re.MULTILINE)
 
@@ -96,10 +108,10 @@ def test_every_dependency_is_explained_once_on_the_page_of_dependencies():
 
 
 def test_the_version_is_the_same_in_all_files_that_name_it():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    project = project_of("pyproject.toml")
     assert project["version"] == roboirg.__version__
-    assert f"## {roboirg.__version__}" in (ROOT / "CHANGELOG.md").read_text()
-    assert f"\nversion: {roboirg.__version__}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f"## {roboirg.__version__}" in text_of("CHANGELOG.md")
+    assert f"\nversion: {roboirg.__version__}\n" in text_of("CITATION.cff")
     assert f"version = {{{roboirg.__version__}}}" in README
 
 
@@ -132,8 +144,10 @@ def test_a_page_has_at_most_1800_words_of_prose(page):
     assert page.name == GENERATED or len(prose.split()) <= MOST_WORDS
 
 
-def table_row_with(name: str, page: str = (ROOT / "docs" / "floors.md").read_text()) -> str:
-    return next(line for line in page.splitlines() if name in line and line.startswith("|"))
+def table_row_with(name, page):
+    """Return the first row of a table of a page that has a text."""
+    lines = text_of(f"docs/{page}.md").splitlines()
+    return next(line for line in lines if name in line and line.startswith("|"))
 
 
 @pytest.fixture
@@ -181,16 +195,13 @@ def test_results_published_since_the_paper_are_on_the_pages_as_in_their_file():
     """The file has a row for each system and task, with the success in percent. A system's mean
     over its tasks stands in its row on the page about comparability, and in README."""
     rates = defaultdict(list)
-    with (ROOT / "docs" / "robomme-since.csv").open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            rates[row["system"]].append(float(row["success_percent"]))
+    for row in csv.DictReader(text_of("docs/robomme-since.csv").splitlines()):
+        rates[row["system"]].append(float(row["success_percent"]))
     planner = np.mean(rates["GPT-6 Astra planner + Qwen3-VL monitor + pi0.5 hands"])
     memory = np.mean(rates["agentic memory + Qwen3-VL-4B planner + GroundSG hands"])
 
-    page = (ROOT / "docs" / "comparability.md").read_text()
-
-    assert f"| {planner:.1f} |" in table_row_with("GPT-6 Astra", page)
-    assert f"| {memory:.1f} " in table_row_with("memory agent", page)
+    assert f"| {planner:.1f} |" in table_row_with("GPT-6 Astra", "comparability")
+    assert f"| {memory:.1f} " in table_row_with("memory agent", "comparability")
     assert f"reaches {planner:.0f} %" in README
 
 
@@ -199,24 +210,23 @@ def test_the_table_of_earlier_words_has_the_rates_of_its_csv_file():
     "| small-none | explicit | test | 1 | 24 (20–27) | 22 (18–25) |": what it learned from, the
     split, the number of seeds, and for each setting the rate with its interval, in percent."""
     rates_of_policies = defaultdict(list)
-    with (ROOT / "results" / "earlier-words.csv").open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            policy = " | ".join([row["row"], row["learned from"], row["split"], row["seeds"]])
-            rates_of_policies[policy].append(f"{row['percent']} ({row['low']}–{row['high']})")
+    for row in csv.DictReader(text_of("results/earlier-words.csv").splitlines()):
+        policy = f"{row['row']} | {row['learned from']} | {row['split']} | {row['seeds']}"
+        rates_of_policies[policy].append(f"{row['percent']} ({row['low']}–{row['high']})")
 
     lines = [f"| {policy} | {' | '.join(rates)} |" for policy, rates in rates_of_policies.items()]
 
     assert lines
-    assert "\n".join(["", *lines, "", ""]) in (ROOT / "docs" / "earlier-words.md").read_text()
+    assert "\n".join(["", *lines, "", ""]) in text_of("docs/earlier-words.md")
 
 
 def test_the_success_of_guessing_is_the_same_number_on_all_pages():
-    statistics = (ROOT / "docs" / "statistics.md").read_text()
+    statistics = text_of("docs/statistics.md")
     direct, reasoning, spatial = re.search(
         r"([\d.]+) in direct and contextual, ([\d.]+) in reasoning, ([\d.]+) in spatial", statistics
     ).groups()
 
-    assert table_row_with("`forgetful` hears").endswith(
+    assert table_row_with("`forgetful` hears", "floors").endswith(
         f"100 | {direct} | {reasoning} | {direct} | {spatial} |"
     )
     assert f"{float(reasoning):.0f} to {float(spatial):.0f} % of the implicit" in README
@@ -224,7 +234,7 @@ def test_the_success_of_guessing_is_the_same_number_on_all_pages():
 
 def percent_on_the_page_of_floors(row, setting):
     """Return the number in the row of the table that has a text, in the column of a setting."""
-    _, *percentages = table_row_with(row).strip("| ").split(" | ")
+    _, *percentages = table_row_with(row, "floors").strip("| ").split(" | ")
     return float(percentages[SETTINGS.index(setting)])
 
 
@@ -260,11 +270,9 @@ def test_rates_of_shortcuts_on_the_page_of_floors_are_those_that_the_program_com
 
 
 def test_the_six_tasks_named_as_without_video_are_those_of_the_table_of_tasks():
-    page = (ROOT / "docs" / "own-checkpoint.md").read_text()
+    page = text_of("docs/own-checkpoint.md")
     listed = re.search(r"Six are left: ([\w,\s]+)\.", page)[1]
 
-    rows = re.findall(
-        r"^\|[^|]*\| (\w+) \|[^|]*\| no \|$", (ROOT / "docs" / "tasks.md").read_text(), re.M
-    )
+    rows = re.findall(r"^\|[^|]*\| (\w+) \|[^|]*\| no \|$", text_of("docs/tasks.md"), re.M)
 
     assert set(re.findall(r"[A-Z]\w+", listed)) == set(rows) & {*find_tasks(["all"])}

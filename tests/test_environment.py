@@ -340,20 +340,6 @@ def test_the_history_of_a_chunk_has_every_fourth_observation(single_steps):
     check_same_observation(twelfth, single_steps[12][0])
 
 
-def test_the_history_of_a_chunk_has_the_words_of_each_of_its_moments():
-    """Utterances are said at steps 0 and 20; kept are steps 19 and 38."""
-    env = roboirg.make(
-        "PickXtimes", setting="direct", cameras=(), observe_every=19, delivery="turns"
-    )
-    env.reset()
-
-    observation, *_ = env.step_chunk(np.tile(HOME_ACTION, (40, 1)))
-
-    first, second = env.instruction.turns
-    heard = [seen["instruction"] for seen in observation["history"]]
-    assert heard == [first, second]
-
-
 def test_the_history_of_a_chunk_draws_only_the_cameras_it_was_asked_for(monkeypatch):
     """Of 20 steps the 8th and 16th from the front, then both cameras at the end."""
     drawn = []

@@ -157,23 +157,16 @@ def test_one_episode_or_none_has_no_interval(cells):
     assert rate_interval(cells) is None
 
 
-def test_the_interval_of_a_ratio_holds_the_ratio_as_measured():
-    """Of 50 episodes the first side solves 9 + 3 and the second 9 + 12: the ratio is 12/21."""
+def test_the_interval_of_a_ratio_ends_where_the_weighted_difference_may_just_be_0():
+    """Of 50 episodes the first side solves 9 + 3 and the second 9 + 12: the ratio is 12/21. Another
+    ratio r may be the true one as long as the first rate less r times the second, which is
+    `combined(1, -r)`, may be 0: at an end of the ratio's interval, the interval of that difference
+    begins or ends at 0."""
     rates = rates_of_pairs(both=9, only_first=3, only_second=12, neither=26)
 
     low, high = ratio_interval([rates])
 
     assert low < 12 / 21 < high
-
-
-def test_the_interval_of_a_ratio_ends_where_the_weighted_difference_may_just_be_0():
-    """A ratio r of two rates may be the true one as long as the first rate less r times the second
-    may be 0, which is tested as any difference is: at an end of the ratio's interval, the interval
-    of that difference begins or ends at 0. `combined(1, -r)` is the difference."""
-    rates = rates_of_pairs(both=9, only_first=3, only_second=12, neither=26)
-
-    low, high = ratio_interval([rates])
-
     assert mean_interval([rates.combined(1, -low)]).low == pytest.approx(0, abs=1e-4)
     assert mean_interval([rates.combined(1, -high)]).high == pytest.approx(0, abs=1e-4)
 
