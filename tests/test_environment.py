@@ -8,6 +8,7 @@ import subprocess
 import sys
 import warnings
 import weakref
+from typing import NamedTuple
 
 import gymnasium
 import numpy as np
@@ -126,42 +127,47 @@ def test_a_grounded_subgoal_points_at_the_pixel_of_its_object():
     assert (row, column) == pytest.approx((90, 105), abs=6)
 
 
-def test_the_pixel_of_a_subgoal_stays_the_same_until_its_act_is_done():
-    """Lifting moves the container, not its pixel; after the end the last one stays."""
-    env = roboirg.make("VideoUnmask", episode=1, cameras=(), grounded=True)
-    _, info = env.reset()
-    policy = make_policy("oracle", 0)
-    policy.attach(env)
-    policy.reset(env.instruction.text, info["demonstration"])
-    grounded = []
+class Change(NamedTuple):
+    """A change of subgoals: at which step, and what is shown from then on."""
 
-    while info["status"] == "ongoing":
-        grounded.append(info["grounded_subgoal"])
-        *_, info = env.step_chunk(policy.act({}))
-
-    assert (info["status"], info["subgoal"]) == ("success", "All tasks completed")
-    assert info["grounded_subgoal"] == grounded[-1]
-    assert len(set(grounded)) == len(env.episode.stages)
+    step: int
+    subgoal: str
+    grounded: str
 
 
-@pytest.fixture(scope="module")
-def oracle_with_subgoals():
-    """The environment of an oracle's play, and the changes of its subgoals.
+def subgoals_of_the_oracle(task):
+    """Return the environment of an episode that the oracle has played, and all changes of subgoals.
 
-    A change is the step, the subgoal, and the same with pixels.
+    The first is at its first step.
     """
-    env = roboirg.make("PickXtimes", episode=1, cameras=(), grounded=True)
-    changes = [(0, None, None)]
+    env = roboirg.make(task, episode=1, cameras=(), grounded=True)
+    changes = [Change(0, "", "")]
 
-    def note(env, _demonstration):
+    def note(env, is_demonstration):
         info = env._info()
-        subgoals = (info["subgoal"], info["grounded_subgoal"])
-        if changes[-1][1:] != subgoals:
-            changes.append((env.session.world.elapsed, *subgoals))
+        shown = (info["subgoal"], info["grounded_subgoal"])
+        if not is_demonstration and changes[-1][1:] != shown:
+            changes.append(Change(env.session.world.elapsed, *shown))
 
     env.set_frame_hook(note)
     assert play(env, make_policy("oracle", 0))["status"] == "success"
     return env, changes[1:]
+
+
+def test_the_pixel_of_a_subgoal_stays_the_same_until_its_act_is_done():
+    """In VideoUnmask a container is lifted, so its pixel moves, but the one in the subgoal must
+    not: there is a change for each stage and one for the end, which keeps the last pixel."""
+    env, changes = subgoals_of_the_oracle("VideoUnmask")
+
+    assert len(changes) == len(env.episode.stages) + 1
+    assert changes[-1].subgoal == "All tasks completed"
+    assert changes[-1].grounded == changes[-2].grounded
+
+
+@pytest.fixture(scope="module")
+def oracle_with_subgoals():
+    """An episode of PickXtimes that the oracle has played, and all changes of its subgoals."""
+    return subgoals_of_the_oracle("PickXtimes")
 
 
 def test_a_subgoal_changes_one_step_after_its_act_and_the_last_one_at_once(oracle_with_subgoals):
@@ -175,7 +181,7 @@ def test_a_subgoal_changes_one_step_after_its_act_and_the_last_one_at_once(oracl
         first_steps.setdefault(event.fact, event.step)
     done = [first_steps[stage.expects] for stage in env.episode.stages]
 
-    changed = [step for step, _, _ in changes]
+    changed = [change.step for change in changes]
 
     assert changed[0] == 1
     assert changed[1:-1] == [step + 1 for step in done[:-1]]
@@ -187,9 +193,9 @@ def test_a_subgoal_has_a_pixel_only_if_it_points(oracle_with_subgoals):
     and one for the end. Acts that point at a thing, such as to pick it up, have a pixel; to put
     it down need not."""
     env, changes = oracle_with_subgoals
-    for stage, (_, subgoal, grounded) in zip(env.episode.stages, changes, strict=False):
-        assert re.sub(r"at <\d+, \d+> ?", "", grounded).strip() == subgoal
-        assert ("<" in grounded) == (stage.points_at is not None)
+    for stage, shown in zip(env.episode.stages, changes, strict=False):
+        assert re.sub(r"at <\d+, \d+> ?", "", shown.grounded).strip() == shown.subgoal
+        assert ("<" in shown.grounded) == (stage.points_at is not None)
 
 
 def test_the_options_that_make_declares_are_those_of_the_environment():

@@ -106,24 +106,31 @@ def check_same(first, second):
         assert np.array_equal(value, second[key]), key
 
 
+def states_of_demonstration(session, recording=None):
+    """Play the demonstration of a session, as recorded if a recording is given.
+
+    Returns a recording of it, and a hash of the state at each moment of its video.
+    """
+    states = []
+    played = session.play_demonstration(lambda _: states.append(session.state_hash()), recording)
+    return played, states
+
+
 @pytest.mark.parametrize("task", slow_but((SHORT, "VideoRepick"), VIDEO_TASKS))
 def test_replaying_a_recorded_demonstration_gives_bit_identical_states(task):
     """One session plans the robot's motions, the other repeats the recorded actions, which went
-    through bytes. All hashes of the state, one for each moment of the video, the hash at the
-    end, and the events must be the same."""
-    planned = EpisodeSession(get_episode(task, "test", 3), visible=False)
-    replayed = EpisodeSession(get_episode(task, "test", 3), visible=True)
-    states = []
-    states_again = []
-    recording = planned.play_demonstration(lambda _: states.append(planned.state_hash()))
+    through bytes, and has cameras. All hashes of the state, one for each moment of the video, the
+    hash at the end, and the events must be the same."""
+    episode = get_episode(task, "test", 3)
+    planned = EpisodeSession(episode, visible=False)
+    replayed = EpisodeSession(episode, visible=True)
 
+    recording, states = states_of_demonstration(planned)
     restored = Recording.from_bytes(recording.to_bytes())
-    again = replayed.play_demonstration(
-        lambda _: states_again.append(replayed.state_hash()), restored
-    )
+    again, states_again = states_of_demonstration(replayed, restored)
 
     assert states_again == states
-    assert len(states) == restored.video_length(planned.episode)
+    assert len(states) == restored.video_length(episode)
     assert again.end == recording.end == restored.end
     assert replayed.events == planned.events
 
@@ -149,20 +156,15 @@ def test_after_a_replay_random_actions_lead_to_the_same_state_as_after_planning(
     ("task", "every"), slow_but([(SHORT, 3)], [(SHORT, 3), ("VideoPlaceOrder", 60)])
 )
 def test_video_pictures_read_after_the_policy_acted_show_the_demonstration(task, every):
-    """Pictures are drawn only when they are read, by replaying the demonstration.
-
-    Of the video every third, or sixtieth, moment has a picture, from the first one on.
-    """
-    steps = []
-    front = []
-    wrist = []
+    """A hook takes a picture with both cameras at each moment of the video while it is played. The
+    video that the reset returns has pictures of every third, or sixtieth, moment, which are drawn
+    when they are read: here after the robot has moved and the environment was closed."""
+    taken = {"front_rgb": [], "wrist_rgb": []}
 
     def take_pictures(env, is_demonstration):
         if is_demonstration:
-            if len(steps) % every == 0:
-                front.append(env.picture("front"))
-                wrist.append(env.picture("wrist"))
-            steps.append(env.session.world.elapsed)
+            taken["front_rgb"].append(env.picture("front"))
+            taken["wrist_rgb"].append(env.picture("wrist"))
 
     env = roboirg.make(task, episode=1, demonstration_frames=every)
     env.set_frame_hook(take_pictures)
@@ -172,9 +174,9 @@ def test_video_pictures_read_after_the_policy_acted_show_the_demonstration(task,
 
     video = info["demonstration"]
 
-    assert np.array_equal(video["front_rgb"], front)
-    assert np.array_equal(video["wrist_rgb"], wrist)
-    assert video.length == len(steps) == len(video["gripper"])
+    assert video.length == len(taken["front_rgb"]) == len(video["gripper"])
+    for key, pictures in taken.items():
+        assert np.array_equal(video[key], pictures[::every]), key
 
 
 def test_depth_and_calibration_of_the_video_are_those_of_its_moments():

@@ -30,6 +30,11 @@ def place(world, name):
     return world.bodies[name].position[:2]
 
 
+def places(world):
+    """Return where on the table each object is now, (x, y) in m, to a tenth of a millimeter."""
+    return {name: tuple(np.round(place(world, name), 4).tolist()) for name in world.bodies}
+
+
 def yaw_of(world, name):
     w, _, _, z = world.bodies[name].entity.pose.q
     return 2 * math.atan2(z, w)
@@ -42,12 +47,11 @@ def swapping_world():
 
 
 def test_objects_stay_where_they_are_before_their_swap_begins():
-    """Two objects, a and b, stand at y = -0.1 m and 0.1 m, and change places from step 10 on: after
-    ten steps they have not moved."""
+    """Two objects, a and b, stand at y = -0.1 m and 0.1 m, and change places from step 10 on; c
+    stays. After ten steps they have not moved."""
     world = rest(swapping_world(), 10)
 
-    assert place(world, "a") == pytest.approx((0.0, -0.1), abs=1e-4)
-    assert place(world, "b") == pytest.approx((0.0, 0.1), abs=1e-4)
+    assert places(world) == {"a": (0.0, -0.1), "b": (0.0, 0.1), "c": (0.1, 0.15)}
 
 
 def test_half_way_through_a_swap_the_objects_pass_each_other_on_opposite_lanes():
@@ -66,26 +70,24 @@ def test_after_a_swap_two_objects_have_changed_places_and_yaw_and_the_others_sta
     to 60. c was never moved. It stays so, one step and six steps later."""
     world = rest(swapping_world(), step)
 
-    assert place(world, "a") == pytest.approx((0.0, 0.1), abs=1e-4)
-    assert place(world, "b") == pytest.approx((0.0, -0.1), abs=1e-4)
+    assert places(world) == {"a": (0.0, 0.1), "b": (0.0, -0.1), "c": (0.1, 0.15)}
     assert yaw_of(world, "a") == pytest.approx(0.3, abs=1e-3)
-    assert place(world, "c") == pytest.approx((0.1, 0.15), abs=1e-4)
 
 
 def test_two_swaps_in_a_row_start_with_the_stage_they_wait_for():
-    """First a and b, then a and c; both count their steps from the start of stage 2."""
+    """Both swaps count their steps from the start of stage 2, which is noted after 20 steps: until
+    then nothing moves. Then a and b change places in 50 steps, and a and c in the next 50."""
     objects = [cube("a", 0.0, -0.15), cube("b", 0.0, 0.0), cube("c", 0.0, 0.15)]
     first = Swap("a", "b", 0, 50, 0.07, ("c",), stage=2)
     second = Swap("a", "c", 50, 50, 0.07, ("b",), stage=2)
-    world = rest(world_with(objects, first, second), 20)
-    assert place(world, "a") == pytest.approx((0.0, -0.15), abs=1e-4)
 
+    world = rest(world_with(objects, first, second), 20)
+    before = places(world)
     world.note_stage(2)
     rest(world, 101)
 
-    assert place(world, "a") == pytest.approx((0.0, 0.15), abs=1e-4)
-    assert place(world, "b") == pytest.approx((0.0, -0.15), abs=1e-4)
-    assert place(world, "c") == pytest.approx((0.0, 0.0), abs=1e-4)
+    assert before == {"a": (0.0, -0.15), "b": (0.0, 0.0), "c": (0.0, 0.15)}
+    assert places(world) == {"a": (0.0, 0.15), "b": (0.0, -0.15), "c": (0.0, 0.0)}
 
 
 def test_an_object_that_is_away_is_parked_far_off_and_returns_to_its_place():
