@@ -74,14 +74,13 @@ def habits_above_limits(folder, paths):
     found = Counter()
     for path in paths:
         found += habits_of(ast.parse(path.read_text("utf-8")))
-    thousand_statements = found["statements"] / 1000
-    hundred_loop_names = found["loop names"] / 100
     limits = LIMITS["plain"] | LIMITS["rooms"].get(folder, {})
     above = []
     for habit, limit in limits.items():
-        of_these = hundred_loop_names if habit == "called one" else thousand_statements
-        allowed = max(limit * of_these, 1)
-        if found[habit] > allowed:
+        allowed = limit * found["statements"] / 1000
+        if habit == "called one":
+            allowed = limit * found["loop names"] / 100
+        if found[habit] > max(allowed, 1):
             above.append(f"{folder}: {found[habit]} {habit}; it may have {allowed:.0f}")
     return above
 

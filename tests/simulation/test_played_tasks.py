@@ -150,13 +150,10 @@ def names_shown_at(step, scene):
     That leaves out what is still away, what a container hides, and places and lights without a
     shape of their own.
     """
-    absent = set()
-    for motion in scene.motions:
-        if isinstance(motion, Glow) or (isinstance(motion, Away) and motion.end >= step):
-            absent.add(motion.subject)
-    without_shape = ("hidden_cube", "site", "marker")
-    shown = [item.name for item in scene.objects if item.kind not in without_shape]
-    return [name for name in shown if name not in absent]
+    absent = {motion.subject for motion in scene.motions_of(Glow)}
+    absent |= {motion.subject for motion in scene.motions_of(Away) if motion.end >= step}
+    without_shape = {"hidden_cube", "site", "marker"}
+    return {item.name for item in scene.objects if item.kind not in without_shape} - absent
 
 
 @pytest.mark.parametrize("task", TASKS)
