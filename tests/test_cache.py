@@ -18,6 +18,8 @@ def file_names_in(folder):
 
 
 def test_a_cache_gives_back_what_was_written_last(tmp_path):
+    """An entry is written twice, the second time without content, and gives that; an entry that was
+    never written is None. The folder is made, and has no other file."""
     cache = Cache(tmp_path / "deep" / "down", 1000)
     cache.write("a1", b"first")
 

@@ -189,6 +189,8 @@ def test_help_has_a_short_option(roboirg):
 def test_without_pyav_a_run_with_videos_is_refused_before_anything_is_played(
     roboirg, tmp_path, monkeypatch
 ):
+    """PyAV, which writes videos, cannot be imported, as where it is not installed. The plan "demo"
+    asks for videos, so the run fails in one line, without a folder."""
     monkeypatch.setitem(sys.modules, "av", None)
     result = roboirg("run", "--plan", "demo", "--out", tmp_path / "out")
 
@@ -217,6 +219,7 @@ def test_videos_that_could_not_be_written_are_reported_once_and_change_no_verdic
 
 @pytest.mark.usefixtures("play_without_simulator")
 def test_a_run_prints_a_line_and_stores_a_record_for_each_episode(roboirg, tmp_path):
+    """Two episodes in each of five settings; the fixture has all succeed without a simulator."""
     result = roboirg(*RUN_TEN_EPISODES, tmp_path)
 
     assert result.code == 0, result.err
@@ -226,6 +229,7 @@ def test_a_run_prints_a_line_and_stores_a_record_for_each_episode(roboirg, tmp_p
 
 @pytest.mark.usefixtures("play_without_simulator")
 def test_the_same_run_command_plays_nothing_twice(roboirg, tmp_path):
+    """Two episodes in each of five settings, ten in all, are stored by the first call."""
     roboirg(*RUN_TEN_EPISODES, tmp_path)
 
     again = roboirg(*RUN_TEN_EPISODES, tmp_path)
@@ -236,6 +240,7 @@ def test_the_same_run_command_plays_nothing_twice(roboirg, tmp_path):
 
 @pytest.mark.usefixtures("play_without_simulator")
 def test_report_prints_the_results_then_the_path_of_the_page_that_it_writes(roboirg, tmp_path):
+    """The run has ten episodes of PickXtimes, which the fixture has succeed without a simulator."""
     roboirg(*RUN_TEN_EPISODES, tmp_path)
 
     result = roboirg("report", tmp_path)
@@ -422,6 +427,7 @@ def test_ctrl_c_within_a_class_definition_prints_one_sentence():
 
 
 def test_a_run_with_missing_episodes_has_exit_code_2_and_asks_for_the_same_command(capsys):
+    """Of ten planned episodes seven were played, and three are missing."""
     planned = 10
     played = 7
     missing = 3
@@ -435,6 +441,8 @@ def test_a_run_with_missing_episodes_has_exit_code_2_and_asks_for_the_same_comma
 
 @pytest.mark.usefixtures("play_without_simulator")
 def test_an_option_on_the_command_line_replaces_that_of_the_plan_file(roboirg, tmp_path):
+    """The plan's file has three episodes, and the command line two, 0 and 1. What only the file
+    has, the task, stays."""
     plan = tmp_path / "plan.yaml"
     plan.write_text("policies: [random]\ntasks: StopCube\nsettings: explicit\nepisodes: 3\n")
 
@@ -502,6 +510,7 @@ def check_refused_before_and_in_a_run(roboirg, out, sentence):
 
 @pytest.mark.parametrize("below", ["", "/deep/er"])
 def test_a_file_is_refused_as_an_output_folder(roboirg, tmp_path, below):
+    """The output folder is a file, or would be below one; neither can be made, and nothing is."""
     file = tmp_path / "file"
     file.write_text("x")
 
@@ -549,6 +558,8 @@ class Wanderer(CannedPlayer):
 def test_a_relative_output_folder_stays_the_same_although_a_policy_changes_directory(
     roboirg, tmp_path, monkeypatch
 ):
+    """The command is called in the folder "home" with the output folder "mine". A policy, stood in
+    for by `Wanderer`, changes to "away" at each episode; all records must be in "home/mine"."""
     home = tmp_path / "home"
     away = tmp_path / "away"
     home.mkdir()
@@ -566,6 +577,8 @@ def test_a_relative_output_folder_stays_the_same_although_a_policy_changes_direc
 
 @pytest.mark.usefixtures("play_without_simulator")
 def test_a_run_deletes_the_unfinished_videos_of_one_that_died_and_no_other_file(roboirg, tmp_path):
+    """A video is written as ".NAME.mp4.part" and gets its name at the end. A finished video, a file
+    with another ending and a folder with that of a part must stay."""
     videos = tmp_path / "videos"
     videos.mkdir()
     for name in (".a.mp4.part", "b.mp4", ".c.mp4.part.keep"):

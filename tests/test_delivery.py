@@ -25,6 +25,8 @@ def test_an_instruction_delivered_as_a_prompt_is_heard_whole_at_step_0():
 
 
 def test_a_prompt_stays_the_same_for_the_whole_episode():
+    """Delivered as a prompt, both utterances are heard at step 0; at step 100 there is nothing
+    new."""
     spoken = SpokenInstruction(("It is red.", "Take it."), "prompt")
 
     spoken.hear(100)
@@ -84,6 +86,7 @@ def test_settings_declare_that_they_can_come_in_turns_if_they_have_several_utter
 
 
 def test_the_words_are_the_same_in_either_delivery():
+    """In turns, utterances are said one after the other; as a prompt, all at once."""
     episode = get_episode("PickXtimes", "test", 1)
 
     prompt = language.instruct_with(episode, InstructionOptions("contextual", delivery="prompt"))
@@ -165,6 +168,8 @@ def test_the_history_has_what_was_said_last_at_each_of_its_steps(played_in_turns
 
 @pytest.mark.sim
 def test_at_the_reset_of_an_episode_with_turns_the_first_utterance_is_heard():
+    """Of the instruction's utterances only the first is said before the first step; it is in the
+    observation, and in `info` with its step."""
     env = roboirg.make("PickXtimes", setting="contextual", cameras=(), delivery="turns")
 
     observation, info = env.reset()

@@ -108,6 +108,8 @@ def test_every_dependency_is_explained_once_on_the_page_of_dependencies():
 
 
 def test_the_version_is_the_same_in_all_files_that_name_it():
+    """The package's own is compared with that of its metadata, the change log, the file for
+    citations, and the BibTeX entry in README."""
     project = project_of("pyproject.toml")
     assert project["version"] == roboirg.__version__
     assert f"## {roboirg.__version__}" in text_of("CHANGELOG.md")
@@ -116,6 +118,9 @@ def test_the_version_is_the_same_in_all_files_that_name_it():
 
 
 def test_the_policy_in_readme_has_at_most_15_lines_and_answers_with_an_action():
+    """The block of README that defines `MyPolicy` is executed. It must fit into 15 lines, without
+    blank ones and comments; the policy must have what the protocol `Policy` asks for, and answer an
+    observation with one action of eight numbers."""
     block = next(block for block in python_blocks(README) if "class MyPolicy" in block)
     body = [line for line in block.splitlines() if line.strip() and not line.startswith("#")]
     assert len(body) <= 15
@@ -221,6 +226,8 @@ def test_the_table_of_earlier_words_has_the_rates_of_its_csv_file():
 
 
 def test_the_success_of_guessing_is_the_same_number_on_all_pages():
+    """The page about statistics has the percentages in a sentence, by setting; the page about
+    floors has them in the row of `forgetful`, which guesses; README rounds them."""
     statistics = text_of("docs/statistics.md")
     direct, reasoning, spatial = re.search(
         r"([\d.]+) in direct and contextual, ([\d.]+) in reasoning, ([\d.]+) in spatial", statistics
@@ -270,6 +277,8 @@ def test_rates_of_shortcuts_on_the_page_of_floors_are_those_that_the_program_com
 
 
 def test_the_six_tasks_named_as_without_video_are_those_of_the_table_of_tasks():
+    """The page about own checkpoints lists them in a sentence. In the table of tasks their last
+    column, whether there is a video, is "no"; tasks that are not of RoboMME's are left out."""
     page = text_of("docs/own-checkpoint.md")
     listed = re.search(r"Six are left: ([\w,\s]+)\.", page)[1]
 

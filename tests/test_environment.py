@@ -37,6 +37,7 @@ pytestmark = pytest.mark.sim
     ("task", "options"), [("ButtonUnmask", {}), ("VideoUnmask", {"observe_every": 1})]
 )
 def test_the_environment_passes_gymnasiums_own_checker(task, options):
+    """It resets, steps and compares spaces, once without and once with a video and a history."""
     env = roboirg.make(task, setting="direct", cameras=(), **options)
     with warnings.catch_warnings():
         # Joint targets are in radians and positions in meters, not in [-1, 1].
@@ -55,6 +56,7 @@ def reset_with_video():
 
 
 def test_the_first_observation_has_the_declared_shapes_and_the_words(reset_with_video):
+    """Both cameras take pictures of 256 by 256 pixels; the instruction is the episode's."""
     env, observation, _ = reset_with_video
 
     assert observation in env.observation_space
@@ -247,6 +249,8 @@ def test_a_policy_is_not_played_in_an_environment_of_another_action_space():
 def test_a_policy_is_not_played_in_an_environment_without_the_depth_or_calibration_it_needs(
     attribute,
 ):
+    """A policy says by attributes what it needs. The random one is given a need, and the
+    environment has no cameras at all."""
     policy = make_policy("random", 0)
     setattr(policy, attribute, True)
     policy.cameras = ("front",)
@@ -257,6 +261,7 @@ def test_a_policy_is_not_played_in_an_environment_without_the_depth_or_calibrati
 
 @pytest.mark.parametrize("actions", ACTION_SPACES)
 def test_a_run_makes_the_environment_with_the_action_space_that_the_policy_declares(actions):
+    """The lower limits of its actions are those of the declared action space, which differ."""
     job = job_of(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
 
     env = make_env(PreparedJob(job), PolicyNeeds(cameras=(), actions=actions))
@@ -266,6 +271,8 @@ def test_a_run_makes_the_environment_with_the_action_space_that_the_policy_decla
 
 
 def test_a_task_without_a_video_has_a_demonstration_of_no_frames():
+    """PickXtimes has none, so each array has length 0. Without the front camera there are no
+    pictures of it; one step goes by at the reset, in which the robot rests."""
     env = roboirg.make("PickXtimes", cameras=("wrist",))
     observation, info = env.reset()
 
@@ -449,6 +456,7 @@ def test_closing_an_environment_frees_its_world():
 
 
 def test_a_step_after_the_end_of_an_episode_asks_for_a_reset():
+    """One step is allowed, so the episode has timed out after it."""
     env = roboirg.make("PickXtimes", cameras=(), max_steps=1)
     env.reset()
     env.step(HOME_ACTION)

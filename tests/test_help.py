@@ -38,6 +38,7 @@ def help_of(name, columns):
 
 
 def test_the_number_of_commands_and_parameters_stays_below_its_limits():
+    """`count_commands` counts those of the program as it is, and has the limits."""
     found = count_commands.commands()
     assert count_commands.entries() <= count_commands.MOST_ENTRIES
     assert len(found) - 1 <= count_commands.MOST_COMMANDS
@@ -57,6 +58,8 @@ def test_help_is_short():
 
 @every_command
 def test_help_has_an_example_that_the_command_takes(name):
+    """Each help text has one line, "Example: roboirg ...". It begins with the name of the command,
+    and its options are parsed as the command would."""
     text = help_of(name, 100)
 
     (example,) = re.findall(r"Example: roboirg (.*)", text)
@@ -77,6 +80,7 @@ def test_help_cuts_no_word_and_is_no_wider_than_the_terminal(name):
 
 
 def test_help_names_all_options():
+    """Of every command, in a terminal of 80 columns."""
     for name, command in all_commands().items():
         options = set()
         for parameter in command.params:
@@ -121,6 +125,8 @@ def test_a_plan_written_as_yaml_keeps_letters_beyond_ascii():
 
 
 def test_every_option_of_instructions_is_a_keyword_and_an_option_of_the_command_show():
+    """The fields of instruction options are the keywords of `roboirg.make`, and the command *show*
+    has each as an option, but for setting, form and delivery."""
     assert set(get_type_hints(InstructionKeywords)) == set(OPTION_NAMES)
 
     (shown,) = (

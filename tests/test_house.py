@@ -268,6 +268,8 @@ def repeated(places):
 
 
 def test_every_class_has_a_name_of_its_own():
+    """Two classes with one name, anywhere in the benchmark or in the packages next to it, would be
+    mistaken for each other; they are listed with their places."""
     places = defaultdict(list)
     for path in ALL_SOURCE_FILES:
         for node in ast.walk(layout.tree(path)):

@@ -76,6 +76,8 @@ def test_an_address_that_no_proxy_lists_has_no_proxy(host):
 def test_a_proxy_that_cannot_be_used_is_refused_without_printing_its_password(
     environment_without_proxies, given, shown
 ):
+    """A proxy for SOCKS needs a package, which cannot be imported here; others have a port that is
+    no number, or a password that ends the address. A model behind it is refused."""
     environment_without_proxies.setenv("ALL_PROXY", given)
     environment_without_proxies.setitem(sys.modules, "socksio", None)
 
@@ -113,6 +115,8 @@ def test_a_user_without_a_home_gets_a_private_folder_among_the_temporary_ones(
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root gives a link to another user")
 def test_a_temporary_folder_that_another_user_made_a_link_is_refused(monkeypatch, tmp_path):
+    """All users share the folder of temporary files. Another one, number 12345, has put a link
+    there with the name of this user's folder, to read or change what is written to it."""
     (tmp_path / "ours").mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     link = tmp_path / f"roboirgbench-{os.getuid()}"
@@ -160,6 +164,8 @@ def test_a_worker_is_watched_without_shared_memory(monkeypatch, has_memory_files
 def test_a_character_that_the_terminal_cannot_show_is_printed_as_a_question_mark(
     monkeypatch, encoding, shown
 ):
+    """The command, replaced by a function that prints "≠", writes to a terminal of this encoding.
+    Only UTF-8 has the character; the others must not end the command."""
     terminal = io.TextIOWrapper(io.BytesIO(), encoding)
     monkeypatch.setattr(sys, "stdout", terminal)
     monkeypatch.setattr(cli, "app", lambda **_: terminal.write("≠"))
@@ -180,6 +186,8 @@ def test_the_doctor_names_a_missing_temporary_folder(monkeypatch, tmp_path):
 
 
 def test_the_doctor_names_a_wrong_path_of_the_cache(monkeypatch):
+    """`~nobody-here` is the home of a user that there is not. The doctor's third check of files is
+    the cache."""
     monkeypatch.setenv("ROBOIRG_CACHE", "~nobody-here/x")
 
     cache = doctor._check_files()[2]

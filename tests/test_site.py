@@ -118,6 +118,8 @@ def names(links_of_pages):
 
 
 def test_the_reference_has_the_public_names(names):
+    """The fixture has all names that links to the built site may point to. Those of `roboirg`
+    itself are there, and a method, an attribute and a class below it."""
     assert {f"roboirg.{name}" for name in roboirg.__all__ if not name.startswith("_")} <= names
     assert "roboirg.envs.environment.RoboIRGEnv.step" in names
     assert "roboirg.policies.Policy.act" in names

@@ -85,6 +85,8 @@ def test_episodes_that_robomme_has_published_are_its_own(task):
 
 
 def test_all_episodes_of_the_benchmark_are_published_but_for_the_few_robomme_cannot_build():
+    """The fixed splits are RoboMME's. Six of its episodes, named by task, split and number, cannot
+    be built there, so the benchmark samples its own."""
     sampled = []
     for task in all_tasks():
         sampled += [episode.key for episode in episodes_of(task) if published(episode) is None]
@@ -137,6 +139,8 @@ def test_episodes_of_our_own_are_not_among_robomme_s_recorded_ones(task):
 def test_random_episodes_repeat_the_difficulties_and_have_seeds_of_their_own_range(
     task, index, difficulty
 ):
+    """The split *random* has no end; the difficulty of an episode follows from its number, modulo
+    4. Each has a range of seeds, so that no two share one, and is the same whenever it is made."""
     episode = get_episode(task, "random", index)
 
     first = slot_seed(get_task(task), "random", index)
@@ -147,6 +151,8 @@ def test_random_episodes_repeat_the_difficulties_and_have_seeds_of_their_own_ran
 
 @each_task
 def test_seeds_passed_over_are_of_our_own_episodes_and_never_reach_the_next_ones_range(task):
+    """For each episode that the benchmark samples, the shipped file of splits may have how many
+    seeds give no scene. There are fewer of these than seeds before the next episode's."""
     own = {f"{episode.split}/{episode.index}" for episode in episodes_of_our_own(task)}
 
     passed_over = shipped_splits()[task].passed_over

