@@ -261,7 +261,7 @@ def test_a_policy_is_not_played_in_an_environment_without_the_depth_or_calibrati
 
 @pytest.mark.parametrize("actions", ACTION_SPACES)
 def test_a_run_makes_the_environment_with_the_action_space_that_the_policy_declares(actions):
-    """The lower limits of its actions are those of the declared action space, which differ."""
+    """The lower limits of its actions are those of the declared action space."""
     job = job_of(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
 
     env = make_env(PreparedJob(job), PolicyNeeds(cameras=(), actions=actions))
