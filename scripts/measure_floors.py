@@ -22,18 +22,16 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
 from roboirg.language.settings import all_settings
 from roboirg.language.word_sampler import LANGUAGE_VERSION
-from roboirg.shortcuts import SURFACE_RULES
 from roboirg.shortcuts.goal_learner import InstructedEpisode
 from roboirg.shortcuts.shortcut_scores import counted_slots
+from roboirg.shortcuts.shortcut_shares import MARGIN, Group, ShortcutRow
 from roboirg.shortcuts.shortcut_tables import (
     LEARNING_SCENES,
-    MARGIN,
-    Group,
-    ShortcutRow,
     excess_text,
     score_texts,
     tabulate,
 )
+from roboirg.shortcuts.surface_rules import SURFACE_RULES
 from roboirg.tasks import all_tasks
 from roboirg.util.csv_text import csv_lines
 

@@ -14,6 +14,8 @@ from plan_files import plan_file
 
 import roboirg
 
+pytestmark = [pytest.mark.sim, pytest.mark.slow]
+
 CHANGES_THAT_ADD_THE_OPTION = {
     "core/instruction_options.py": [
         (
@@ -47,66 +49,114 @@ CHANGES_THAT_ADD_THE_OPTION = {
 """All that is changed in the package to add it: texts and what they become, by file."""
 
 
-CALL_COMMANDS = """
-import contextlib, io, json, sys
-import roboirg
-from roboirg.main import main
-
-told = []
-for words in json.loads(sys.argv[1]):
-    sys.argv = ["roboirg", *map(str, words)]
-    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.suppress(SystemExit):
-        main()
-    told.append(out.getvalue())
-env = roboirg.make("PickXtimes", setting="direct", greeting="hello", cameras=())
-print(json.dumps([*told, env.instruction.text]))
-"""
-
-
-@pytest.fixture
-def source_with_the_option(tmp_path):
-    folder = tmp_path / "src" / "roboirg"
-    shutil.copytree(Path(roboirg.__file__).parent, folder)
+@pytest.fixture(scope="module")
+def source_with_the_option(tmp_path_factory):
+    """A folder to import `roboirg` from: a copy of the package, changed."""
+    source = tmp_path_factory.mktemp("src")
+    package = shutil.copytree(Path(roboirg.__file__).parent, source / "roboirg")
     for name, changes in CHANGES_THAT_ADD_THE_OPTION.items():
-        text = (folder / name).read_text()
+        text = (package / name).read_text()
         for before, after in changes:
             assert before in text
             text = text.replace(before, after, 1)
-        (folder / name).write_text(text)
-    return folder.parent
+        (package / name).write_text(text)
+    return source
 
 
-@pytest.mark.sim
-@pytest.mark.slow
-def test_a_new_instruction_option_reaches_words_commands_plans_records_and_tables(
-    source_with_the_option, tmp_path
+@pytest.fixture(scope="module")
+def python_with_the_option(source_with_the_option):
+    """A function that calls Python with words, with the changed copy, and returns what is
+    printed."""
+
+    def call(words):
+        done = subprocess.run(
+            [sys.executable, *words.split()],
+            capture_output=True, text=True, check=False, cwd=source_with_the_option,
+            env=os.environ | {"PYTHONPATH": str(source_with_the_option), "COLUMNS": "200"},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def run_with_hello(python_with_the_option, tmp_path_factory):
+    """The folder of a run whose plan has `greeting: hello`: an episode in *explicit* and one in
+    *direct*."""
+    run = tmp_path_factory.mktemp("runs") / "run"
+    plan = plan_file(
+        tasks="PickXtimes", settings="explicit,direct", greeting="hello", max_steps=2, episodes=1
+    )
+    python_with_the_option(f"-m roboirg run --plan {plan} --policy random --workers 0 --out {run}")
+    return run
+
+
+def test_a_new_instruction_option_is_one_of_commands_and_changes_the_words(python_with_the_option):
+    """In a copy of the package an option `greeting` is added: a field, and in the setting *direct*
+    code that begins with "Hello, robot." if it is `hello`. The command line needs no more."""
+    printed = python_with_the_option(
+        "-m roboirg show PickXtimes 0 --words --settings direct --greeting hello"
+    )
+
+    assert printed.count("Hello, robot.") == 1
+
+
+def test_a_new_instruction_option_is_a_keyword_of_make(python_with_the_option, tmp_path):
+    """In a copy of the package an option `greeting` is added, which in the setting *direct* puts
+    "Hello, robot." in front. `roboirg.make` takes it as a keyword without a change of its own."""
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import roboirg\n"
+        'env = roboirg.make("PickXtimes", setting="direct", greeting="hello", cameras=())\n'
+        "print(env.instruction.text)\n"
+    )
+
+    printed = python_with_the_option(str(program))
+
+    assert printed.startswith("Hello, robot.")
+
+
+def test_a_new_instruction_option_is_a_field_of_plans_with_its_explanation(python_with_the_option):
+    """In a copy of the package the option `greeting` is added, with a description. A plan that sets
+    it is printed with that description as a comment above."""
+    plan = plan_file(greeting="hello")
+
+    printed = python_with_the_option(f"-m roboirg run --plan {plan} --show-plan")
+
+    assert "# hello: the robot is greeted; or plain.\ngreeting: hello" in printed
+
+
+def test_a_new_instruction_option_is_recorded_where_the_setting_reads_it(run_with_hello):
+    """In a copy of the package the option `greeting` is added, and only the setting *direct* reads
+    it. A run with `greeting: hello` records that there, with the words, and the default, `plain`,
+    in the setting *explicit*."""
+    lines = (run_with_hello / "records.jsonl").read_text().splitlines()
+    records = {}
+    for record in map(json.loads, lines):
+        records[record["options"]["setting"]] = record
+
+    assert records["direct"]["options"]["greeting"] == "hello"
+    assert records["direct"]["instruction"][0]["text"].startswith("Hello, robot.")
+    assert records["explicit"]["options"]["greeting"] == "plain"
+
+
+def test_tables_name_a_new_instruction_option_next_to_its_setting(
+    python_with_the_option, run_with_hello
 ):
-    """The option `greeting` is added to a copy of the package, as a field and the code that reads
-    it in the setting *direct*. A process calls five commands there, and what each has printed
-    comes back in order; the greeting "Hello, robot." must be in all of them."""
-    few = ("--tasks", "PickXtimes", "--settings", "explicit,direct")
-    plan = plan_file(greeting="hello", max_steps=2, episodes=1)
-    run, rows = tmp_path / "run", tmp_path / "rows.jsonl"
-    commands = [
-        ("show", "PickXtimes", 0, "--words", "--settings", "direct", "--greeting", "hello"),
-        ("run", "--plan", plan, "--show-plan"),
-        ("run", "--plan", plan, *few, "--policy", "random", "--workers", 0, "--out", run),
-        ("tables", run),
-        ("export", "instructions", *few, "--plan", plan, "--out", rows),
-    ]
-    done = subprocess.run(
-        [sys.executable, "-c", CALL_COMMANDS, json.dumps(commands, default=str)],
-        capture_output=True, text=True, check=False, cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(source_with_the_option), "COLUMNS": "200"},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    shown, planned, _, tables, _, made = json.loads(done.stdout)
-    assert shown.count("Hello, robot.") == 1
-    assert "# hello: the robot is greeted; or plain.\ngreeting: hello" in planned
-    records = [json.loads(line) for line in (run / "records.jsonl").read_text().splitlines()]
-    said = {record["options"]["setting"]: record["options"]["greeting"] for record in records}
-    assert said == {"direct": "hello", "explicit": "plain"}
-    assert records[0]["instruction"][0]["text"].startswith("Hello, robot.")
+    """The run was played by a copy of the package with a new option, `greeting`, and has set it to
+    `hello`, which the setting *direct* reads."""
+    tables = python_with_the_option(f"-m roboirg tables {run_with_hello}")
+
     assert "direct (greeting hello)" in tables
+
+
+def test_exported_instructions_have_the_words_of_a_new_option(python_with_the_option, tmp_path):
+    """In a copy of the package an option `greeting` is added, which in the setting *direct* puts
+    "Hello, robot." in front. The plan sets it, and the instructions of its episode are exported."""
+    plan = plan_file(tasks="PickXtimes", settings="direct", greeting="hello", episodes=1)
+    rows = tmp_path / "rows.jsonl"
+
+    python_with_the_option(f"-m roboirg export instructions --plan {plan} --out {rows}")
+
     assert "Hello, robot." in rows.read_text()
-    assert made.startswith("Hello, robot.")

@@ -18,6 +18,8 @@ def file_names_in(folder):
 
 
 def test_a_cache_gives_back_what_was_written_last(tmp_path):
+    """An entry is written twice, the second time without content, and gives that; an entry that was
+    never written is None. The folder is made, and has no other file."""
     cache = Cache(tmp_path / "deep" / "down", 1000)
     cache.write("a1", b"first")
 
@@ -121,33 +123,50 @@ def test_two_processes_may_fill_a_cache_at_once(tmp_path):
     assert file_names_in(tmp_path) == ["0", "1", "2", "3", "4"]
 
 
-def test_a_process_killed_while_writing_leaves_no_damaged_entry_in_the_cache(
-    tmp_path, caplog, monkeypatch
-):
-    """A process writes entries of 3 MB under the names 0 to 4, each of its own digit alone. It is
-    killed when it begins to write, which a new .part file shows, or a little later: in the
-    middle, or between two. All entries must then be whole, and what was left unfinished is swept
-    out by the next writing."""
-    unfinished = set()
-    for number in range(4):
-        process = process_that_fills(tmp_path, 10**9, 3_000_000)
-        while not set(tmp_path.glob("*.part")) - unfinished:
-            assert process.poll() is None
-            time.sleep(0.0002)
-        time.sleep(0.0015 * number)
-        process.kill()
-        process.communicate(timeout=600)
-        unfinished = set(tmp_path.glob("*.part"))
-        cache = Cache(tmp_path, 40_000_000)
-        for path in set(tmp_path.iterdir()) - unfinished:
-            assert set(cache.read(path.name)) == set(path.name.encode())
-    assert unfinished
+def kill_a_writer(folder, later_s):
+    """Start a process that writes entries of 3 MB to a cache, and kill it while it does.
+
+    An entry is written under a name that ends with .part, and gets its own at the end. The process
+    is killed so many seconds after a new file of that kind has appeared.
+    """
+    there_before = set(folder.glob("*.part"))
+    process = process_that_fills(folder, count=10**9, size=3_000_000)
+    while set(folder.glob("*.part")) <= there_before:
+        assert process.poll() is None
+        time.sleep(0.0002)
+    time.sleep(later_s)
+    process.kill()
+    process.communicate(timeout=600)
+
+
+def test_a_process_killed_while_writing_leaves_no_damaged_entry_in_the_cache(tmp_path, caplog):
+    """Four processes after each other write entries named 0 to 4, each full of its own digit, and
+    are killed at the beginning of a writing or up to 4.5 ms later, in the middle of it or after it.
+    What ends with .part was left unfinished; what has a name of its own must be whole, so that
+    reading it gives no warning."""
+    for later_s in (0.0, 0.0015, 0.003, 0.0045):
+        kill_a_writer(tmp_path, later_s)
+
+    cache = Cache(tmp_path, 40_000_000)
+    for name in file_names_in(tmp_path):
+        if not name.endswith(".part"):
+            assert set(cache.read(name)) == set(name.encode())
+    assert list(tmp_path.glob("*.part"))
     assert caplog.records == []
 
-    # What was left unfinished is swept out in time.
-    monkeypatch.setattr(cache_module, "_ABANDONED_S", -1.0)
-    cache.write("0", b"0")
-    assert not list(tmp_path.glob("*.part"))
+
+def test_what_a_killed_process_has_left_unfinished_is_removed_in_time(tmp_path):
+    """A file that ends with .part is an entry that is being written, or whose writer was killed. It
+    is kept for ten minutes, longer than a writing takes; later the next writing removes it."""
+    cache = Cache(tmp_path, 1000)
+    (tmp_path / "a1.part").write_bytes(b"young")
+    (tmp_path / "b2.part").write_bytes(b"old")
+    eleven_minutes_ago = time.time() - 660
+    os.utime(tmp_path / "b2.part", (eleven_minutes_ago, eleven_minutes_ago))
+
+    cache.write("c3", b"whole")
+
+    assert file_names_in(tmp_path) == ["a1.part", "c3"]
 
 
 def test_a_cache_that_cannot_be_written_is_reported_once_and_does_without(tmp_path, caplog):

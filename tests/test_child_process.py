@@ -93,11 +93,19 @@ def test_closing_does_not_wait_for_a_child_that_the_kernel_cannot_end():
     assert ChildProcess(stuck, stuck).close() == ChildExit(None)
 
 
+@pytest.fixture
+def _few_open_files():
+    """This process may have 64 open files, and raise that; the limit is put back in the end."""
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (64, limits[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+
+
+@pytest.mark.usefixtures("_few_open_files")
 def test_a_child_that_cannot_start_is_reported_with_what_would_help():
-    """The start fails with "too many files", for which stand-ins are patched in. The limit of open
-    files, 64 here, has been raised to at least 1,024 before that."""
-    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (64, hard))
+    """Starting a process is replaced by a failure, as where too many files are open. The limit of
+    open files, 64 here, has been raised before that, so what is left is to use fewer workers."""
     too_many = OSError(errno.EMFILE, "Too many files")
 
     with (
@@ -106,8 +114,8 @@ def test_a_child_that_cannot_start_is_reported_with_what_would_help():
     ):
         ChildProcess.spawn(answer_messages)
 
-    soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    assert soft >= 1_024
+    most_open_files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    assert most_open_files >= 1_024
 
 
 def test_a_process_that_a_child_has_started_ends_with_the_child():
@@ -152,16 +160,30 @@ def test_the_guard_of_a_child_looks_again_until_no_descendant_is_left():
     assert not is_alive(int(ended.stdout))
 
 
+GIVE_ITSELF_A_NAME_AND_WAIT = r"""
+import ctypes
+PR_SET_NAME = 15
+name = b"\xff) R 1\n(\xfe"
+ctypes.CDLL(None).prctl(PR_SET_NAME, name)
+print("named", flush=True)
+input()
+"""
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_descendants_are_found_although_their_names_contain_brackets_and_line_ends():
-    """/proc/PID/stat has the name in brackets, which a program may choose."""
-    name = r"b'\xff) R 1\n(\xfe'"
-    script = f"import ctypes; ctypes.CDLL(None).prctl(15, {name}); print(flush=True); input()"
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen([sys.executable, "-c", script], **pipes) as child:
-        assert child.stdout.readline()
-        assert child.pid in descendants(os.getpid())
+    """Linux lists a process in /proc/PID/stat as "PID (NAME) STATE PARENT", and a program may
+    choose its name. This one looks like the end of the brackets, with 1 as the parent, and has a
+    line end and bytes that are no text; the child must be found below this process all the same."""
+    command = [sys.executable, "-c", GIVE_ITSELF_A_NAME_AND_WAIT]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe) as child:
+        assert child.stdout.readline() == b"named\n"
+
+        found = descendants(os.getpid())
+
         child.kill()
+    assert child.pid in found
 
 
 def test_children_do_not_outlive_a_parent_that_is_killed(tmp_path):

@@ -30,8 +30,8 @@ from roboirg.runs.run.runner import RunSummary
 from roboirg.util.console_width import progress_console
 
 RUN_RANDOM = ("run", "--policy", "random", "--tasks", "PickXtimes")
-RUN_TWO_EPISODES = (*RUN_RANDOM, "--episodes", "2", "--workers", "0", "--out")
-"""Two episodes in each of five settings; a folder follows."""
+RUN_TEN_EPISODES = (*RUN_RANDOM, "--episodes", "2", "--workers", "0", "--out")
+"""Two episodes of PickXtimes in each of five settings; a folder follows."""
 
 
 @pytest.fixture
@@ -80,37 +80,75 @@ def run_with_plan_file(**fields):
     return (*RUN_RANDOM, "--plan", plan_file(**fields))
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        ((*RUN_RANDOM, "--settings", "implicit"), "'implicit' is a form of the instruction"),
-        ((*RUN_RANDOM, "--episodes", "9" * 5000),
-         "…' is not a valid episode; write numbers and ranges"),
-        ((*RUN_RANDOM, "--stages", "5-1"), "the possible lists are 1,5;"),
-        ((*RUN_RANDOM, "--out", ""), "The run's folder is ''; it must be a path"),
-        (("report", "x" * 260), "xxx' cannot be used: File name too long."),
-        ((*RUN_RANDOM, "--policy", "../../x=random"), "is '../../x' (in '../../x=random')"),
-        (run_with_plan_file(actions="joints"), "known: joint_angle, ee_pose, waypoint, choice."),
-        (run_with_plan_file(episode_timeout_s=1e30), "it must be at most 2147483."),
-        (run_with_plan_file(distractor="nutral"), "Did you mean 'neutral'?"),
-        (run_with_plan_file(instruction={"distracter": "neutral"}), "distracter"),
-        (run_with_plan_file(instruction={"setting": "direct"}), "no key of instruction 'setting'"),
-        (("run", "--plan", "paper"), "No policy given"),
-        (("play",), "play"),
-        (("report", "nowhere"), "nowhere"),
-        (("show", "PickXtimes", "50"), "There is no episode 50"),
-        (("show", "PickXtimes", "0", "--out", "sheet.gif"), "must end in .png"),
-    ],
-)  # fmt: skip
-def test_a_wrong_command_line_is_one_sentence_with_exit_code_2_and_writes_nothing(
-    roboirg, tmp_path, monkeypatch, words, sentence
-):
-    monkeypatch.chdir(tmp_path)
+def check_refused(roboirg, words, sentence):
+    """Assert that a command with these words is refused in one sentence, with exit code 2."""
     result = roboirg(*words)
 
     assert (result.code, result.out, result.err.count("\n")) == (2, "", 1)
     assert result.err.startswith("roboirg: ")
     assert sentence in result.err
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--settings", "implicit"), "'implicit' is a form of the instruction"),
+        (("--episodes", "9" * 5000), "…' is not a valid episode; write numbers and ranges"),
+        (("--stages", "5-1"), "the possible lists are 1,5;"),
+        (("--out", ""), "The run's folder is ''; it must be a path"),
+        (("--policy", "../../x=random"), "is '../../x' (in '../../x=random')"),
+    ],
+)
+def test_a_run_with_a_wrong_option_is_refused_in_a_sentence_with_its_value(
+    roboirg, tmp_path, monkeypatch, words, sentence
+):
+    """The command, `roboirg run --policy random --tasks PickXtimes` and an option, writes nothing.
+    An overlong value is cut off in the sentence."""
+    monkeypatch.chdir(tmp_path)
+
+    check_refused(roboirg, [*RUN_RANDOM, *words], sentence)
+
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("fields", "sentence"),
+    [
+        ({"actions": "joints"}, "known: joint_angle, ee_pose, waypoint, choice."),
+        ({"episode_timeout_s": 1e30}, "it must be at most 2147483."),
+        ({"distractor": "nutral"}, "Did you mean 'neutral'?"),
+        ({"instruction": {"distracter": "neutral"}}, "distracter"),
+        ({"instruction": {"setting": "direct"}}, "no key of instruction 'setting'"),
+    ],
+)
+def test_a_run_with_a_wrong_field_in_its_plan_file_is_refused_in_a_sentence(
+    roboirg, fields, sentence
+):
+    """Names, numbers and keys of the plan are checked; the sentence has what would be right, or
+    what is wrong."""
+    check_refused(roboirg, [*RUN_RANDOM, "--plan", plan_file(**fields)], sentence)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["run", "--plan", "paper"], "No policy given"),
+        (["play"], "play"),
+        (["report", "nowhere"], "nowhere"),
+        (["report", "x" * 260], "xxx' cannot be used: File name too long."),
+        (["show", "PickXtimes", "50"], "There is no episode 50"),
+        (["show", "PickXtimes", "0", "--out", "sheet.gif"], "must end in .png"),
+    ],
+)
+def test_a_command_with_a_missing_or_wrong_argument_is_refused_in_a_sentence(
+    roboirg, tmp_path, monkeypatch, words, sentence
+):
+    """A policy is missing, a command, a folder or an episode does not exist, a file name is too
+    long or has an ending that cannot be written; nothing is written."""
+    monkeypatch.chdir(tmp_path)
+
+    check_refused(roboirg, words, sentence)
+
     assert not list(tmp_path.iterdir())
 
 
@@ -151,6 +189,8 @@ def test_help_has_a_short_option(roboirg):
 def test_without_pyav_a_run_with_videos_is_refused_before_anything_is_played(
     roboirg, tmp_path, monkeypatch
 ):
+    """PyAV, which writes videos, cannot be imported, as where it is not installed. The plan "demo"
+    asks for videos, so the run fails in one line, without a folder."""
     monkeypatch.setitem(sys.modules, "av", None)
     result = roboirg("run", "--plan", "demo", "--out", tmp_path / "out")
 
@@ -161,23 +201,26 @@ def test_without_pyav_a_run_with_videos_is_refused_before_anything_is_played(
 def test_videos_that_could_not_be_written_are_reported_once_and_change_no_verdict(
     roboirg, tmp_path, play_without_simulator
 ):
-    """The same command has then nothing to play."""
+    """The run has two episodes in each of five settings, ten in all. Each succeeds, but the disk is
+    full for its video, so the exit code is 0. The same command then has nothing left to play, and
+    nothing to report."""
     play_without_simulator("success", video_error="OSError: disk full")
-    words = (*RUN_TWO_EPISODES, tmp_path, "--video", "all")
 
-    result = roboirg(*words)
+    first = roboirg(*RUN_TEN_EPISODES, tmp_path, "--video", "all")
+    second = roboirg(*RUN_TEN_EPISODES, tmp_path, "--video", "all")
 
-    assert result.code == 0
-    assert result.err == (
+    assert first.code == 0
+    assert first.err == (
         "10 of 10 videos could not be written; the verdicts are not affected. "
         "First error: OSError: disk full\n"
     )
-    assert roboirg(*words).err == ""
+    assert second.err == ""
 
 
 @pytest.mark.usefixtures("play_without_simulator")
 def test_a_run_prints_a_line_and_stores_a_record_for_each_episode(roboirg, tmp_path):
-    result = roboirg(*RUN_TWO_EPISODES, tmp_path)
+    """Two episodes in each of five settings; the fixture has all succeed without a simulator."""
+    result = roboirg(*RUN_TEN_EPISODES, tmp_path)
 
     assert result.code == 0, result.err
     assert "[1/10] random PickXtimes test/0 direct: success" in result.out
@@ -186,9 +229,10 @@ def test_a_run_prints_a_line_and_stores_a_record_for_each_episode(roboirg, tmp_p
 
 @pytest.mark.usefixtures("play_without_simulator")
 def test_the_same_run_command_plays_nothing_twice(roboirg, tmp_path):
-    roboirg(*RUN_TWO_EPISODES, tmp_path)
+    """Two episodes in each of five settings, ten in all, are stored by the first call."""
+    roboirg(*RUN_TEN_EPISODES, tmp_path)
 
-    again = roboirg(*RUN_TWO_EPISODES, tmp_path)
+    again = roboirg(*RUN_TEN_EPISODES, tmp_path)
 
     assert "10 of 10 episodes already stored." in again.out
     assert len((tmp_path / "records.jsonl").read_text().splitlines()) == 10
@@ -196,7 +240,8 @@ def test_the_same_run_command_plays_nothing_twice(roboirg, tmp_path):
 
 @pytest.mark.usefixtures("play_without_simulator")
 def test_report_prints_the_results_then_the_path_of_the_page_that_it_writes(roboirg, tmp_path):
-    roboirg(*RUN_TWO_EPISODES, tmp_path)
+    """The run has ten episodes of PickXtimes, which the fixture has succeed without a simulator."""
+    roboirg(*RUN_TEN_EPISODES, tmp_path)
 
     result = roboirg("report", tmp_path)
 
@@ -205,20 +250,32 @@ def test_report_prints_the_results_then_the_path_of_the_page_that_it_writes(robo
     assert (tmp_path / "report.html").exists()
 
 
-def test_a_run_with_errors_has_exit_code_2_until_they_were_played_again(
+def test_a_run_with_errors_has_exit_code_2_and_names_the_first_cause(
     roboirg, tmp_path, play_without_simulator
 ):
+    """The run has two episodes in each of five settings; `play_without_simulator` has all ten end
+    in an error of the policy, which is no failure of it."""
     cause = "invalid action: Action value 3 is nan"
     play_without_simulator("error", error="invalid_action", cause=cause)
 
-    result = roboirg(*RUN_TWO_EPISODES, tmp_path)
+    result = roboirg(*RUN_TEN_EPISODES, tmp_path)
 
     assert result.code == 2
     assert "10 of 10 episodes ended in an error" in result.err
     assert "Action value 3 is nan" in result.err
 
+
+def test_a_run_with_errors_has_exit_code_0_once_they_were_played_again(
+    roboirg, tmp_path, play_without_simulator
+):
+    """`play_without_simulator` has all episodes end in an error at first; when the same command
+    plays them again, they succeed."""
+    play_without_simulator("error", error="invalid_action", cause="nan")
+    roboirg(*RUN_TEN_EPISODES, tmp_path)
+
     play_without_simulator("success")
-    assert roboirg(*RUN_TWO_EPISODES, tmp_path).code == 0
+
+    assert roboirg(*RUN_TEN_EPISODES, tmp_path).code == 0
 
 
 def test_show_words_prints_the_utterances_of_an_instruction(roboirg):
@@ -311,26 +368,35 @@ __main__.main()
 """
 
 
-def test_ctrl_c_at_any_moment_prints_one_sentence_and_no_traceback():
-    """The command is interrupted up to 0.24 s after it has begun to handle Ctrl-C. It stops with
-    one sentence and exit code 130; the last ones may have ended before, or be Python's again."""
-    ends = set()
-    for delay_s in (0, 0.06, 0.12, 0.18, 0.24):
-        with subprocess.Popen(
-            [sys.executable, "-c", PRINT_WHEN_CTRL_C_IS_HANDLED, "run", "--help"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        ) as command:
-            command.stdout.readline()  # what comes before is Python's
-            time.sleep(delay_s)
-            command.send_signal(signal.SIGINT)
-            _, errors = command.communicate()
-        ends.add((command.returncode, errors))
+def interrupt_help_after(delay_s):
+    """Interrupt `roboirg run --help` so long after it has begun to handle Ctrl-C.
 
-    stopped = (130, "roboirg: stopped.\n")
-    assert stopped in ends
-    assert ends <= {stopped, (0, ""), (-signal.SIGINT, "")}
+    Before that, Python handles it. Returns the exit code and what is printed as errors.
+    """
+    command = [sys.executable, "-c", PRINT_WHEN_CTRL_C_IS_HANDLED, "run", "--help"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True) as process:
+        process.stdout.readline()
+        time.sleep(delay_s)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate()
+    return process.returncode, errors
+
+
+def test_ctrl_c_as_a_command_begins_prints_one_sentence():
+    """It is pressed as soon as the command handles it. 130 is the usual exit code for it."""
+    assert interrupt_help_after(0.0) == (130, "roboirg: stopped.\n")
+
+
+@pytest.mark.parametrize("delay_s", [0.06, 0.12, 0.18, 0.24])
+def test_ctrl_c_at_any_moment_prints_no_traceback(delay_s):
+    """The command takes about as long as the longest delay. So it is stopped with one sentence, has
+    ended before without an error, or is at its very end, where Python lets the signal end it."""
+    code, errors = interrupt_help_after(delay_s)
+
+    assert errors in ("", "roboirg: stopped.\n")
+    assert code in (130, 0, -signal.SIGINT)
+    assert (code == 130) == (errors != "")
 
 
 INTERRUPT_IN_A_CLASS_BODY = """
@@ -361,6 +427,7 @@ def test_ctrl_c_within_a_class_definition_prints_one_sentence():
 
 
 def test_a_run_with_missing_episodes_has_exit_code_2_and_asks_for_the_same_command(capsys):
+    """Of ten planned episodes seven were played, and three are missing."""
     planned = 10
     played = 7
     missing = 3
@@ -374,6 +441,8 @@ def test_a_run_with_missing_episodes_has_exit_code_2_and_asks_for_the_same_comma
 
 @pytest.mark.usefixtures("play_without_simulator")
 def test_an_option_on_the_command_line_replaces_that_of_the_plan_file(roboirg, tmp_path):
+    """The plan's file has three episodes, and the command line two, 0 and 1. What only the file
+    has, the task, stays."""
     plan = tmp_path / "plan.yaml"
     plan.write_text("policies: [random]\ntasks: StopCube\nsettings: explicit\nepisodes: 3\n")
 
@@ -384,15 +453,18 @@ def test_an_option_on_the_command_line_replaces_that_of_the_plan_file(roboirg, t
 
 
 def test_a_dry_run_prints_episodes_and_model_calls(roboirg):
+    """The paper's plan has 50 test episodes of 11 tasks with 3 seeds, 150 for each task: once in
+    the setting *explicit*, and in two forms, "150 + 150", in *direct*, *reasoning*, *contextual*
+    and, for 7 tasks, *spatial*. The planner asks a model, whose calls are counted."""
     model = "p=planner:stateless?model=x&base_url=http://localhost:1/v1"
 
     result = roboirg("run", "--plan", "paper", "--policy", model, "--dry-run")
 
-    assert result.code == 0
-    assert "least calls of models" in result.out
-    assert "150 + 150" in result.out
     words = " ".join(result.out.split())
-    assert "13,650 episodes, 0 already stored. Workers: one per core" in words
+    episodes = 11 * 150 + 3 * 11 * 300 + 7 * 300
+    assert "150 + 150" in words
+    assert f"{episodes:,} episodes, 0 already stored. Workers: one per core" in words
+    assert "least calls of models" in words
 
 
 def test_a_dry_run_counts_model_calls_only_for_episodes_that_are_not_stored(roboirg, tmp_path):
@@ -438,6 +510,7 @@ def check_refused_before_and_in_a_run(roboirg, out, sentence):
 
 @pytest.mark.parametrize("below", ["", "/deep/er"])
 def test_a_file_is_refused_as_an_output_folder(roboirg, tmp_path, below):
+    """The output folder is a file, or would be below one; neither can be made, and nothing is."""
     file = tmp_path / "file"
     file.write_text("x")
 
@@ -455,16 +528,21 @@ def test_a_folder_with_records_of_another_version_of_words_is_refused(roboirg, t
 
 @pytest.mark.usefixtures("play_without_simulator")
 def test_the_plan_that_a_run_has_written_plays_the_same_run_again(roboirg, tmp_path):
-    words = "--settings contextual,direct --stages 1,5;1-5 --episodes 3,"
-    words += f" --plan {plan_file(retry_on='none', frame='camera')}"
-    words += " --wordings train --forms implicit,resolved --workers 0 --out"
-    roboirg(*RUN_RANDOM, *words.split(), tmp_path / "a")
-    plan = tmp_path / "a" / "plan.json"
+    """A run whose options are not the usual ones, on the command line and in a plan file, writes
+    its plan as plan.json. A run from that file alone has the same plan. The fixture has all
+    episodes succeed without a simulator."""
+    plan = plan_file(
+        policies=["random"], tasks="PickXtimes", settings="contextual,direct", stages="1,5;1-5",
+        wordings="train", retry_on="none", frame="camera",
+    )  # fmt: skip
+    first = tmp_path / "first"
+    again = tmp_path / "again"
 
-    again = roboirg("run", "--plan", plan, "--workers", "0", "--out", tmp_path / "b")
+    roboirg("run", "--plan", plan, "--episodes", "3,", "--forms", "both", "--out", first)
+    roboirg("run", "--plan", first / "plan.json", "--out", again)
 
-    assert again.code == 0, again.err
-    assert read_plan(tmp_path / "b") == read_plan(tmp_path / "a")
+    assert read_plan(again) == read_plan(first)
+    assert (again / "records.jsonl").exists()
 
 
 class Wanderer(CannedPlayer):
@@ -480,6 +558,8 @@ class Wanderer(CannedPlayer):
 def test_a_relative_output_folder_stays_the_same_although_a_policy_changes_directory(
     roboirg, tmp_path, monkeypatch
 ):
+    """The command is called in the folder "home" with the output folder "mine". A policy, stood in
+    for by `Wanderer`, changes to "away" at each episode; all records must be in "home/mine"."""
     home = tmp_path / "home"
     away = tmp_path / "away"
     home.mkdir()
@@ -488,7 +568,7 @@ def test_a_relative_output_folder_stays_the_same_although_a_policy_changes_direc
     monkeypatch.setattr("roboirg.runs.run.runner.EpisodeRunner", Wanderer)
     monkeypatch.setattr(Wanderer, "away", away)
 
-    result = roboirg(*RUN_TWO_EPISODES, "mine")
+    result = roboirg(*RUN_TEN_EPISODES, "mine")
 
     assert result.code == 0, result.err
     assert (home / "mine" / "records.jsonl").exists()
@@ -497,41 +577,47 @@ def test_a_relative_output_folder_stays_the_same_although_a_policy_changes_direc
 
 @pytest.mark.usefixtures("play_without_simulator")
 def test_a_run_deletes_the_unfinished_videos_of_one_that_died_and_no_other_file(roboirg, tmp_path):
+    """A video is written as ".NAME.mp4.part" and gets its name at the end. A finished video, a file
+    with another ending and a folder with that of a part must stay."""
     videos = tmp_path / "videos"
     videos.mkdir()
     for name in (".a.mp4.part", "b.mp4", ".c.mp4.part.keep"):
         (videos / name).write_bytes(b"x")
     (videos / ".d.mp4.part").mkdir()  # not ours
 
-    roboirg(*RUN_TWO_EPISODES, tmp_path)
+    roboirg(*RUN_TEN_EPISODES, tmp_path)
 
     assert {path.name for path in videos.iterdir()} == {"b.mp4", ".c.mp4.part.keep", ".d.mp4.part"}
 
 
 def test_help_groups_the_many_options_of_run_in_four_panels(roboirg, monkeypatch):
-    """A panel is a frame with two to nine options, told by lines that begin with "--"; there is no
-    color where there is no terminal."""
+    """A panel is a frame, which begins with "╭─ " and its title; each of its options begins a line
+    with "--". In a terminal of 80 columns a reader sees two to nine of them at once. The output of
+    the test is no terminal, so there are no colors, whose codes begin with "\\x1b"."""
     monkeypatch.setenv("COLUMNS", "80")
 
     out = roboirg("run", "--help").out
 
-    panels = out.split("╭─ ")[1:]
-    numbers = [len(re.findall(r"(?m)^│ [ *] {0,3}--|^│ --", panel)) for panel in panels]
-    assert len(numbers) == 4
-    assert min(numbers) >= 2
-    assert max(numbers) <= 9
+    _, *panels = out.split("╭─ ")
+    numbers_of_options = [panel.count("\n│ --") for panel in panels]
+    assert len(panels) == 4
+    assert min(numbers_of_options) >= 2
+    assert max(numbers_of_options) <= 9
     assert "\x1b" not in out
 
 
 def test_progress_in_a_pipe_is_plain_lines_even_if_colors_are_forced(monkeypatch, capsys):
-    """At most a line in some seconds, with the time left by the pace since the first of them."""
+    """The work begins at 0 s with 3 of 10 records, and the clock then reads 20, 60, 65, 100 and 101
+    s. At 60 s 2 more are done, 30 s each: the other five take 150 s, over 2 minutes. At 65 s it is
+    too soon for another line. At 100 s it is 6 more, in 17 s each, which the last one takes."""
     monkeypatch.setenv("FORCE_COLOR", "1")
     times = iter([0, 20, 60, 65, 100, 101])
     monkeypatch.setattr(progress_bar, "time", SimpleNamespace(monotonic=times.__next__))
 
     with progress_bars() as report:
-        for done in (3, 5, 6, 9, 10):
-            report("record", done, 10, "done" if done == 10 else "")
+        for done in (3, 5, 6, 9):
+            report("record", done, 10, "")
+        report("record", 10, 10, "done")
 
     assert not progress_console().is_terminal
     assert capsys.readouterr().err.splitlines() == [

@@ -25,6 +25,8 @@ def test_an_instruction_delivered_as_a_prompt_is_heard_whole_at_step_0():
 
 
 def test_a_prompt_stays_the_same_for_the_whole_episode():
+    """Delivered as a prompt, both utterances are heard at step 0; at step 100 there is nothing
+    new."""
     spoken = SpokenInstruction(("It is red.", "Take it."), "prompt")
 
     spoken.hear(100)
@@ -84,6 +86,7 @@ def test_settings_declare_that_they_can_come_in_turns_if_they_have_several_utter
 
 
 def test_the_words_are_the_same_in_either_delivery():
+    """In turns, utterances are said one after the other; as a prompt, all at once."""
     episode = get_episode("PickXtimes", "test", 1)
 
     prompt = language.instruct_with(episode, InstructionOptions("contextual", delivery="prompt"))
@@ -154,7 +157,8 @@ def test_the_instruction_of_an_observation_is_what_is_new_since_the_last_one(pla
 
 @pytest.mark.sim
 def test_the_history_has_what_was_said_last_at_each_of_its_steps(played_in_turns):
-    """At steps 5, 10, ..., 60."""
+    """Utterances 0 to 4 are said at steps 0, 10, 20, 30 and 40. The history has an observation of
+    the steps 5, 10, ..., 60, each with the last utterance until then."""
     policy, env = played_in_turns
 
     said = [env.instruction.turns.index(words) for words in policy.history]
@@ -164,6 +168,8 @@ def test_the_history_has_what_was_said_last_at_each_of_its_steps(played_in_turns
 
 @pytest.mark.sim
 def test_at_the_reset_of_an_episode_with_turns_the_first_utterance_is_heard():
+    """Of the instruction's utterances only the first is said before the first step; it is in the
+    observation, and in `info` with its step."""
     env = roboirg.make("PickXtimes", setting="contextual", cameras=(), delivery="turns")
 
     observation, info = env.reset()
@@ -197,18 +203,59 @@ def test_all_turns_of_a_stopcube_episode_come_before_its_earliest_press():
     assert play(env, make_policy("listener", 0))["status"] == "success"
 
 
-@pytest.mark.sim
-def test_a_run_in_turns_records_the_step_of_each_utterance(tmp_path):
-    words = ["--policy", "listener", "--tasks", "VideoUnmask", "--settings", "explicit,direct"]
-    words += ["--plan", plan_file(delivery="turns", episodes=1, video="all"), "--workers", "0"]
-    result = CliRunner().invoke(app, ["run", *words, "--out", str(tmp_path)])
+@pytest.fixture(scope="module")
+def run_in_turns(tmp_path_factory):
+    """The folder of a run in turns: an episode in *explicit* and the same one in *direct*."""
+    folder = tmp_path_factory.mktemp("run")
+    plan = plan_file(
+        tasks="VideoUnmask", settings="explicit,direct", delivery="turns", episodes=1, video="all"
+    )
+    words = ["run", "--plan", plan, "--policy", "listener", "--workers", "0", "--out", str(folder)]
+    result = CliRunner().invoke(app, words)
     assert result.exit_code == 0, result.output
+    return folder
 
-    direct, explicit = read_records(tmp_path)
-    assert (explicit.options.delivery, direct.options.delivery) == ("prompt", "turns")
-    assert [turn.step for turn in explicit.instruction] == [0]
-    assert [turn.step for turn in direct.instruction] == [0, 20]
+
+@pytest.fixture
+def records_of_run_in_turns(run_in_turns):
+    """The record of the listener's episode in each setting."""
+    return {record.options.setting: record for record in read_records(run_in_turns)}
+
+
+@pytest.mark.sim
+def test_a_run_in_turns_records_the_step_of_each_utterance(records_of_run_in_turns):
+    """In the setting *direct* the instruction has two utterances, which are 20 steps apart."""
+    direct = records_of_run_in_turns["direct"]
+
+    assert direct.options.delivery == "turns"
+    assert [utterance.step for utterance in direct.instruction] == [0, 20]
+
+
+@pytest.mark.sim
+def test_a_single_utterance_in_a_run_in_turns_is_recorded_as_a_prompt(records_of_run_in_turns):
+    """An instruction of the setting *explicit* is one command, which is said at once, whatever the
+    plan asks for."""
+    explicit = records_of_run_in_turns["explicit"]
+
+    assert explicit.options.delivery == "prompt"
+    assert [utterance.step for utterance in explicit.instruction] == [0]
+
+
+@pytest.mark.sim
+def test_a_listener_in_a_run_in_turns_waits_for_the_last_utterance(records_of_run_in_turns):
+    """The listener solves the episode from its explicit command, said at step 0, and in the setting
+    *direct*, where the second utterance comes at step 20. It acts then, and needs as many steps."""
+    explicit = records_of_run_in_turns["explicit"]
+    direct = records_of_run_in_turns["direct"]
+
+    assert (explicit.outcome, direct.outcome) == ("success", "success")
     assert direct.steps == explicit.steps + 20
-    for record in (explicit, direct):
-        assert record.outcome == "success"
-        assert (tmp_path / record.video).stat().st_size > 1000
+
+
+@pytest.mark.sim
+def test_a_run_in_turns_has_a_video_of_each_episode(run_in_turns):
+    """The plan asks for the videos of both episodes; one has thousands of bytes."""
+    sizes = [path.stat().st_size for path in run_in_turns.glob("videos/*.mp4")]
+
+    assert len(sizes) == 2
+    assert min(sizes) > 1000

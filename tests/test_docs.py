@@ -22,8 +22,15 @@ from roboirg.records.record import Job, Record
 from roboirg.tasks import find_tasks
 
 ROOT = Path(__file__).parent.parent
+
+
+def text_of(name):
+    """Return the text of a file of the repository."""
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
-README = (ROOT / "README.md").read_text()
+README = text_of("README.md")
 MOST_WORDS = 1800
 SETTINGS = ("explicit", "direct", "reasoning", "contextual", "spatial")
 """The columns of the tables of results."""
@@ -43,7 +50,7 @@ def test_every_link_to_a_file_leads_to_one(page):
 
 
 def test_the_page_about_records_lists_exactly_the_keys_of_a_record():
-    table = (ROOT / "docs" / "record.md").read_text().split("## In Python")[0]
+    table = text_of("docs/record.md").split("## In Python")[0]
     keys = " ".join(line.split("|")[1] for line in table.splitlines() if line.startswith("| "))
     assert set(re.findall(r"`(\w+)`", keys)) == {*Record.__struct_fields__, "schema_version"}
 
@@ -58,41 +65,62 @@ def fields_of(kind: inspect.Type) -> list[str]:
 
 
 def test_the_page_about_records_lists_exactly_the_fields_of_objects_in_a_record():
-    """They stand in braces: ``list of `{stage, text, step}```."""
-    table = (ROOT / "docs" / "record.md").read_text().split("## In Python")[0]
-    row = r"^\| \*?`(\w+)`\*? \| [^|]*\{([\w, ]+)\}"
-    listed = dict(re.findall(row, table, flags=re.MULTILINE))
+    """Where a key of a record holds an object, or a list of some, its row on the page has the names
+    in braces, such as "| `instruction` | list of `{stage, text, step}` |". They must be those of
+    the class that `Record` declares for the key, in the same order."""
+    table = text_of("docs/record.md").split("## In Python")[0]
+    key_then_names_in_braces = r"^\| \*?`(\w+)`\*? \| [^|]*\{([\w, ]+)\}"
+    on_page = dict(re.findall(key_then_names_in_braces, table, flags=re.MULTILINE))
 
-    in_record = {
-        field.encode_name: fields_of(field.type) for field in inspect.type_info(Record).fields
-    }
+    declared = {}
+    for field in inspect.type_info(Record).fields:
+        if names := fields_of(field.type):
+            declared[field.encode_name] = ", ".join(names)
 
-    assert listed == {key: ", ".join(names) for key, names in in_record.items() if names}
+    assert declared["instruction"] == "stage, text, step"
+    assert on_page == declared
+
+
+def project_of(pyproject):
+    """Return what a pyproject.toml says of its package."""
+    return tomllib.loads(text_of(pyproject))["project"]
+
+
+def required_by(pyproject):
+    """Return the names of the packages that a pyproject.toml requires, also in its extras."""
+    project = project_of(pyproject)
+    extras = project.get("optional-dependencies", {}).values()
+    requirements = itertools.chain(project["dependencies"], *extras)
+    return {re.split(r"[\[<>=]", requirement)[0] for requirement in requirements}
 
 
 def test_every_dependency_is_explained_once_on_the_page_of_dependencies():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    extras = project["optional-dependencies"].values()
-    learn = tomllib.loads((ROOT / "packages" / "learn" / "pyproject.toml").read_text())["project"]
-    wanted = [*project["dependencies"], *itertools.chain(*extras), *learn["dependencies"]]
-    names = {re.split(r"[\[<>=]", requirement)[0] for requirement in wanted}
-    names -= {"roboirgbench", "roboirg-learn"}
-    table = (ROOT / "docs" / "dependencies.md").read_text()
+    """A row of the page's table begins with the name of a package; behind it the reason stands in
+    backquotes or brackets. There must be one for each package that the benchmark or roboirg-learn
+    requires, in any extra, but for these two themselves."""
+    required = required_by("pyproject.toml")
+    required |= required_by("packages/learn/pyproject.toml")
+    page = text_of("docs/dependencies.md")
 
-    explained = re.findall(r"^\| ([\w-]+) \| [`(]", table, flags=re.MULTILINE)
+    explained = re.findall(r"^\| ([\w-]+) \| [`(]", page, flags=re.MULTILINE)
 
-    assert sorted(explained) == sorted(names)
+    assert sorted(explained) == sorted(required - {"roboirgbench", "roboirg-learn"})
 
 
 def test_the_version_is_the_same_in_all_files_that_name_it():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    """The package's own is compared with that of its metadata, the change log, the file for
+    citations, and the BibTeX entry in README."""
+    project = project_of("pyproject.toml")
     assert project["version"] == roboirg.__version__
-    assert f"## {roboirg.__version__}" in (ROOT / "CHANGELOG.md").read_text()
-    assert f"\nversion: {roboirg.__version__}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f"## {roboirg.__version__}" in text_of("CHANGELOG.md")
+    assert f"\nversion: {roboirg.__version__}\n" in text_of("CITATION.cff")
     assert f"version = {{{roboirg.__version__}}}" in README
 
 
 def test_the_policy_in_readme_has_at_most_15_lines_and_answers_with_an_action():
+    """The block of README that defines `MyPolicy` is executed. It must fit into 15 lines, without
+    blank ones and comments; the policy must have what the protocol `Policy` asks for, and answer an
+    observation with one action of eight numbers."""
     block = next(block for block in python_blocks(README) if "class MyPolicy" in block)
     body = [line for line in block.splitlines() if line.strip() and not line.startswith("#")]
     assert len(body) <= 15
@@ -121,97 +149,139 @@ def test_a_page_has_at_most_1800_words_of_prose(page):
     assert page.name == GENERATED or len(prose.split()) <= MOST_WORDS
 
 
-def table_row_with(name: str, page: str = (ROOT / "docs" / "floors.md").read_text()) -> str:
-    return next(line for line in page.splitlines() if name in line and line.startswith("|"))
+def table_row_with(name, page):
+    """Return the first row of a table of a page that has a text."""
+    lines = text_of(f"docs/{page}.md").splitlines()
+    return next(line for line in lines if name in line and line.startswith("|"))
 
 
-def test_percentages_in_readme_are_those_of_the_published_table():
-    best = [row for row in published_rows("main") if row.model == "FrameS-Modul"]
-    rows = {row.options.setting: row for row in best}
-    explicit = rows["explicit"].average
-    spatial = rows["spatial"].average
-    with_spatial = [task for task, rate in rows["spatial"].rates.items() if rate is not None]
-    same_tasks = rows["explicit"].average_over(with_spatial)
+@pytest.fixture
+def best_published():
+    """The rates of RoboMME's best published model, FrameS-Modul, in percent, by setting."""
+    rows = [row for row in published_rows("main") if row.model == "FrameS-Modul"]
+    return {row.options.setting: row for row in rows}
 
-    assert f"succeeds in {explicit:.0f} %" in README
-    assert f"{rows['reasoning'].average:.0f} % is left with reasoning" in README
-    assert f"covers 7 tasks: {spatial:.0f} %, next to {same_tasks:.0f} % explicit" in README
-    # Lost are, as it says, a third in the direct setting and more than half in the others.
-    assert 0.6 < rows["direct"].average / explicit < 0.7
-    assert rows["reasoning"].average / explicit < 0.5
-    assert rows["contextual"].average / explicit < 0.5
-    assert spatial / same_tasks < 0.5
+
+def tasks_with_rates(row):
+    """Return the tasks for which a published row has a rate: of spatial instructions, seven."""
+    return [task for task, rate in row.rates.items() if rate is not None]
+
+
+def test_percentages_in_readme_are_those_of_the_published_table(best_published):
+    """README quotes means over tasks of the best published model. Spatial instructions exist for
+    seven tasks alone, so their mean is next to that of explicit ones for the same seven."""
+    explicit = best_published["explicit"]
+    spatial = best_published["spatial"]
+
+    same_tasks = explicit.average_over(tasks_with_rates(spatial))
+
+    assert f"succeeds in {explicit.average:.0f} %" in README
+    assert f"{best_published['reasoning'].average:.0f} % is left with reasoning" in README
+    assert f"7 tasks: {spatial.average:.0f} %, next to {same_tasks:.0f} % explicit" in README
+
+
+def test_readme_rightly_says_that_a_third_is_lost_with_direct_and_over_half_with_others(
+    best_published,
+):
+    """README says so in words, of the best published model. What is left, as a share of the rate
+    with explicit instructions: of direct ones about two thirds, of the others less than half.
+    Spatial ones exist for seven tasks alone, and are compared with explicit ones for these."""
+    explicit = best_published["explicit"].average
+    seven_tasks = tasks_with_rates(best_published["spatial"])
+    explicit_of_seven = best_published["explicit"].average_over(seven_tasks)
+
+    assert 0.6 < best_published["direct"].average / explicit < 0.7
+    assert best_published["reasoning"].average / explicit < 0.5
+    assert best_published["contextual"].average / explicit < 0.5
+    assert best_published["spatial"].average / explicit_of_seven < 0.5
 
 
 def test_results_published_since_the_paper_are_on_the_pages_as_in_their_file():
-    """Means over the tasks of a CSV file, for each system."""
+    """The file has a row for each system and task, with the success in percent. A system's mean
+    over its tasks stands in its row on the page about comparability, and in README."""
     rates = defaultdict(list)
-    with (ROOT / "docs" / "robomme-since.csv").open(encoding="utf-8") as file:
-        for line in csv.DictReader(file):
-            rates[line["system"].split()[0]].append(float(line["success_percent"]))
-    means = {system: np.mean(found) for system, found in rates.items()}
+    for row in csv.DictReader(text_of("docs/robomme-since.csv").splitlines()):
+        rates[row["system"]].append(float(row["success_percent"]))
+    planner = np.mean(rates["GPT-6 Astra planner + Qwen3-VL monitor + pi0.5 hands"])
+    memory = np.mean(rates["agentic memory + Qwen3-VL-4B planner + GroundSG hands"])
 
-    page = (ROOT / "docs" / "comparability.md").read_text()
-
-    assert f"| {means['GPT-6']:.1f} |" in table_row_with("GPT-6 Astra", page)
-    assert f"| {means['agentic']:.1f} " in table_row_with("memory agent", page)
-    assert f"reaches {means['GPT-6']:.0f} %" in README
+    assert f"| {planner:.1f} |" in table_row_with("GPT-6 Astra", "comparability")
+    assert f"| {memory:.1f} " in table_row_with("memory agent", "comparability")
+    assert f"reaches {planner:.0f} %" in README
 
 
 def test_the_table_of_earlier_words_has_the_rates_of_its_csv_file():
-    rows = defaultdict(list)
-    with (ROOT / "results" / "earlier-words.csv").open(encoding="utf-8") as file:
-        for line in csv.DictReader(file):
-            row = (line["row"], line["learned from"], line["split"], line["seeds"])
-            rows[row].append(f"{line['percent']} ({line['low']}–{line['high']})")
+    """The file has a row for each policy and setting. The table has one for each policy, such as
+    "| small-none | explicit | test | 1 | 24 (20–27) | 22 (18–25) |": what it learned from, the
+    split, the number of seeds, and for each setting the rate with its interval, in percent."""
+    rates_of_policies = defaultdict(list)
+    for row in csv.DictReader(text_of("results/earlier-words.csv").splitlines()):
+        policy = f"{row['row']} | {row['learned from']} | {row['split']} | {row['seeds']}"
+        rates_of_policies[policy].append(f"{row['percent']} ({row['low']}–{row['high']})")
 
-    lines = [f"| {' | '.join([*row, *rates])} |" for row, rates in rows.items()]
+    lines = [f"| {policy} | {' | '.join(rates)} |" for policy, rates in rates_of_policies.items()]
 
-    assert "\n" + "\n".join(lines) + "\n\n" in (ROOT / "docs" / "earlier-words.md").read_text()
+    assert lines
+    assert "\n".join(["", *lines, "", ""]) in text_of("docs/earlier-words.md")
 
 
 def test_the_success_of_guessing_is_the_same_number_on_all_pages():
-    statistics = (ROOT / "docs" / "statistics.md").read_text()
+    """The page about statistics has the percentages in a sentence, by setting; the page about
+    floors has them in the row of `forgetful`, which guesses; README rounds them."""
+    statistics = text_of("docs/statistics.md")
     direct, reasoning, spatial = re.search(
         r"([\d.]+) in direct and contextual, ([\d.]+) in reasoning, ([\d.]+) in spatial", statistics
     ).groups()
 
-    assert table_row_with("`forgetful` hears").endswith(
+    assert table_row_with("`forgetful` hears", "floors").endswith(
         f"100 | {direct} | {reasoning} | {direct} | {spatial} |"
     )
     assert f"{float(reasoning):.0f} to {float(spatial):.0f} % of the implicit" in README
 
 
+def percent_on_the_page_of_floors(row, setting):
+    """Return the number in the row of the table that has a text, in the column of a setting."""
+    _, *percentages = table_row_with(row, "floors").strip("| ").split(" | ")
+    return float(percentages[SETTINGS.index(setting)])
+
+
+def computed_percent(floor, setting):
+    """Return the success of a shortcut, a mean over all tasks of 50 test episodes each, percent."""
+    levels = []
+    for task in find_tasks(["all"]):
+        job = Job(
+            policy="", task=task, split="test", episode=0, options=InstructionOptions(setting)
+        )
+        jobs = [msgspec.structs.replace(job, episode=number) for number in range(50)]
+        levels.append(floor_level(floor, jobs))
+    return 100 * float(sum(levels) / len(levels))
+
+
 @pytest.mark.parametrize(
     ("row", "floor", "setting"),
     [
-        ("surface rule", "surface", "reasoning"),
-        ("`forgetful` h", "command", "contextual"),
-        ("chance: ", "chance", "direct"),
+        ("surface rule: key words", "surface", "reasoning"),
+        ("`forgetful` hears the last utterance", "command", "contextual"),
+        ("chance: a guess", "chance", "direct"),
     ],
 )
 def test_rates_of_shortcuts_on_the_page_of_floors_are_those_that_the_program_computes(
     row, floor, setting
 ):
-    """A mean over all tasks of 50 test episodes each, in percent."""
-    options = InstructionOptions(setting)
-    levels = []
-    for task in find_tasks(["all"]):
-        job = Job(policy="", task=task, split="test", episode=0, options=options)
-        jobs = [msgspec.structs.replace(job, episode=number) for number in range(50)]
-        levels.append(floor_level(floor, jobs))
+    """A floor is what a shortcut reaches without understanding: key words, a guess from the command
+    alone, or one from the command and what the words list. The page has a row for each and a
+    column for each setting, in percent with one decimal."""
+    on_page = percent_on_the_page_of_floors(row, setting)
 
-    written = table_row_with(row).strip("| ").split(" | ")[1 + SETTINGS.index(setting)]
-
-    assert float(written) == round(100 * float(sum(levels) / len(levels)), 1)
+    assert on_page == round(computed_percent(floor, setting), 1)
 
 
 def test_the_six_tasks_named_as_without_video_are_those_of_the_table_of_tasks():
-    page = (ROOT / "docs" / "own-checkpoint.md").read_text()
+    """The page about own checkpoints lists them in a sentence. In the table of tasks their last
+    column, whether there is a video, is "no"; tasks that are not of RoboMME's are left out."""
+    page = text_of("docs/own-checkpoint.md")
     listed = re.search(r"Six are left: ([\w,\s]+)\.", page)[1]
 
-    rows = re.findall(
-        r"^\|[^|]*\| (\w+) \|[^|]*\| no \|$", (ROOT / "docs" / "tasks.md").read_text(), re.M
-    )
+    rows = re.findall(r"^\|[^|]*\| (\w+) \|[^|]*\| no \|$", text_of("docs/tasks.md"), re.M)
 
     assert set(re.findall(r"[A-Z]\w+", listed)) == set(rows) & {*find_tasks(["all"])}

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import warnings
 import weakref
+from typing import NamedTuple
 
 import gymnasium
 import numpy as np
@@ -36,6 +37,7 @@ pytestmark = pytest.mark.sim
     ("task", "options"), [("ButtonUnmask", {}), ("VideoUnmask", {"observe_every": 1})]
 )
 def test_the_environment_passes_gymnasiums_own_checker(task, options):
+    """It resets, steps and compares spaces, once without and once with a video and a history."""
     env = roboirg.make(task, setting="direct", cameras=(), **options)
     with warnings.catch_warnings():
         # Joint targets are in radians and positions in meters, not in [-1, 1].
@@ -54,6 +56,7 @@ def reset_with_video():
 
 
 def test_the_first_observation_has_the_declared_shapes_and_the_words(reset_with_video):
+    """Both cameras take pictures of 256 by 256 pixels; the instruction is the episode's."""
     env, observation, _ = reset_with_video
 
     assert observation in env.observation_space
@@ -126,55 +129,65 @@ def test_a_grounded_subgoal_points_at_the_pixel_of_its_object():
     assert (row, column) == pytest.approx((90, 105), abs=6)
 
 
-def test_the_pixel_of_a_subgoal_stays_the_same_until_its_act_is_done():
-    """Lifting moves the container, not its pixel; after the end the last one stays."""
-    env = roboirg.make("VideoUnmask", episode=1, cameras=(), grounded=True)
-    _, info = env.reset()
-    policy = make_policy("oracle", 0)
-    policy.attach(env)
-    policy.reset(env.instruction.text, info["demonstration"])
-    grounded = []
+class Change(NamedTuple):
+    """A change of subgoals: at which step, and what is shown from then on."""
 
-    while info["status"] == "ongoing":
-        grounded.append(info["grounded_subgoal"])
-        *_, info = env.step_chunk(policy.act({}))
-
-    assert (info["status"], info["subgoal"]) == ("success", "All tasks completed")
-    assert info["grounded_subgoal"] == grounded[-1]
-    assert len(set(grounded)) == len(env.episode.stages)
+    step: int
+    subgoal: str
+    grounded: str
 
 
-@pytest.fixture(scope="module")
-def oracle_with_subgoals():
-    """The environment of an oracle's play, and the changes of its subgoals.
+def subgoals_of_the_oracle(task):
+    """Return the environment of an episode that the oracle has played, and all changes of subgoals.
 
-    A change is the step, the subgoal, and the same with pixels.
+    The first is at its first step.
     """
-    env = roboirg.make("PickXtimes", episode=1, cameras=(), grounded=True)
-    changes = [(0, None, None)]
+    env = roboirg.make(task, episode=1, cameras=(), grounded=True)
+    changes = [Change(0, "", "")]
 
-    def note(env, _demonstration):
+    def note(env, is_demonstration):
         info = env._info()
-        subgoals = (info["subgoal"], info["grounded_subgoal"])
-        if changes[-1][1:] != subgoals:
-            changes.append((env.session.world.elapsed, *subgoals))
+        shown = (info["subgoal"], info["grounded_subgoal"])
+        if not is_demonstration and changes[-1][1:] != shown:
+            changes.append(Change(env.session.world.elapsed, *shown))
 
     env.set_frame_hook(note)
     assert play(env, make_policy("oracle", 0))["status"] == "success"
     return env, changes[1:]
 
 
+def test_the_pixel_of_a_subgoal_stays_the_same_until_its_act_is_done():
+    """In VideoUnmask a container is lifted, so its pixel moves, but the one in the subgoal must
+    not: there is a change for each stage and one for the end, which keeps the last pixel."""
+    env, changes = subgoals_of_the_oracle("VideoUnmask")
+
+    assert len(changes) == len(env.episode.stages) + 1
+    assert changes[-1].subgoal == "All tasks completed"
+    assert changes[-1].grounded == changes[-2].grounded
+
+
+@pytest.fixture(scope="module")
+def oracle_with_subgoals():
+    """An episode of PickXtimes that the oracle has played, and all changes of its subgoals."""
+    return subgoals_of_the_oracle("PickXtimes")
+
+
 def test_a_subgoal_changes_one_step_after_its_act_and_the_last_one_at_once(oracle_with_subgoals):
+    """The fixture is an episode that the oracle has played, and each change of its subgoals with
+    its step, the first of them at step 1. A stage of the task is done when the fact that it expects
+    is first there. The next subgoal is shown one step later; after the last stage, where the
+    episode ends, that all is done is shown at once."""
     env, changes = oracle_with_subgoals
     first_steps = {}
     for event in env.events:
         first_steps.setdefault(event.fact, event.step)
-    *acts, last_act = [first_steps[stage.expects] for stage in env.episode.stages]
+    done = [first_steps[stage.expects] for stage in env.episode.stages]
 
-    _, *steps, last_step = [step for step, _, _ in changes]
+    changed = [change.step for change in changes]
 
-    assert steps == [step + 1 for step in acts]
-    assert last_step == last_act
+    assert changed[0] == 1
+    assert changed[1:-1] == [step + 1 for step in done[:-1]]
+    assert changed[-1] == done[-1]
 
 
 def test_a_subgoal_has_a_pixel_only_if_it_points(oracle_with_subgoals):
@@ -182,31 +195,46 @@ def test_a_subgoal_has_a_pixel_only_if_it_points(oracle_with_subgoals):
     and one for the end. Acts that point at a thing, such as to pick it up, have a pixel; to put
     it down need not."""
     env, changes = oracle_with_subgoals
-    for stage, (_, subgoal, grounded) in zip(env.episode.stages, changes, strict=False):
-        assert re.sub(r"at <\d+, \d+> ?", "", grounded).strip() == subgoal
-        assert ("<" in grounded) == (stage.points_at is not None)
+    for stage, shown in zip(env.episode.stages, changes, strict=False):
+        assert re.sub(r"at <\d+, \d+> ?", "", shown.grounded).strip() == shown.subgoal
+        assert ("<" in shown.grounded) == (stage.points_at is not None)
 
 
-def test_the_types_of_the_options_of_make_are_those_of_the_environment():
-    """Editors read them from one class; would find an option that is missing there."""
+def test_the_options_that_make_declares_are_those_of_the_environment():
+    """`EnvOptions` has the types of all keywords of `roboirg.make`, for editors. They are the
+    fields of `EnvSettings`, in which two, words and environment, stand for the options of their
+    own: those of instructions and those of environments."""
+    fields = {field.name: field.type for field in dataclasses.fields(EnvSettings)}
+    del fields["words"]
+    del fields["environment"]
+
     typed = {name: hint.__forward_arg__ for name, hint in EnvOptions.__annotations__.items()}
-    own = {option.name: option.type for option in dataclasses.fields(EnvSettings)}
-    del own["words"], own["environment"]  # whose fields are options
 
-    assert typed.keys() == {*own, *OPTION_NAMES, *ENVIRONMENT_OPTIONS}
-    assert {name: typed[name] for name in own} == own
-    for made in (roboirg.make, RoboIRGEnv):
-        annotation = inspect.signature(made).parameters["options"].annotation
-        assert annotation == "Unpack[EnvOptions]"
+    assert typed.keys() == {*fields, *OPTION_NAMES, *ENVIRONMENT_OPTIONS}
+    assert fields.items() <= typed.items()
 
 
-def test_every_option_of_make_is_in_its_docstring_and_an_unknown_one_is_refused():
+@pytest.mark.parametrize("made", [roboirg.make, RoboIRGEnv])
+def test_editors_know_the_options_of_make_and_of_the_environment(made):
+    """`EnvOptions` has the types of all keywords; with this annotation editors offer them."""
+    options = inspect.signature(made).parameters["options"]
+
+    assert options.annotation == "Unpack[EnvOptions]"
+
+
+def test_every_option_of_make_is_in_its_docstring():
+    """Under "Keyword Args:", up to "Raises:", it explains the options in order, each on a line
+    "    name: ...". Those of instructions and of environments, which commands share, are explained
+    elsewhere."""
     _, _, documented = inspect.getdoc(roboirg.make).partition("Keyword Args:")
     documented, _, _ = documented.partition("Raises:")
     shared = {*OPTION_NAMES, *ENVIRONMENT_OPTIONS}
     own = [name for name in EnvOptions.__annotations__ if name not in shared]
 
     assert re.findall(r"^    (\w+): ", documented, re.MULTILINE) == own
+
+
+def test_an_unknown_option_of_make_is_refused_with_the_nearest_name():
     with pytest.raises(UnknownNameError, match=r"option of make\(\) 'camera'.*mean 'cameras'"):
         roboirg.make("PickXtimes", camera=("front",))
 
@@ -221,6 +249,8 @@ def test_a_policy_is_not_played_in_an_environment_of_another_action_space():
 def test_a_policy_is_not_played_in_an_environment_without_the_depth_or_calibration_it_needs(
     attribute,
 ):
+    """A policy says by attributes what it needs. The random one is given a need, and the
+    environment has no cameras at all."""
     policy = make_policy("random", 0)
     setattr(policy, attribute, True)
     policy.cameras = ("front",)
@@ -231,6 +261,7 @@ def test_a_policy_is_not_played_in_an_environment_without_the_depth_or_calibrati
 
 @pytest.mark.parametrize("actions", ACTION_SPACES)
 def test_a_run_makes_the_environment_with_the_action_space_that_the_policy_declares(actions):
+    """The lower limits of its actions are those of the declared action space."""
     job = job_of(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
 
     env = make_env(PreparedJob(job), PolicyNeeds(cameras=(), actions=actions))
@@ -240,6 +271,8 @@ def test_a_run_makes_the_environment_with_the_action_space_that_the_policy_decla
 
 
 def test_a_task_without_a_video_has_a_demonstration_of_no_frames():
+    """PickXtimes has none, so each array has length 0. Without the front camera there are no
+    pictures of it; one step goes by at the reset, in which the robot rests."""
     env = roboirg.make("PickXtimes", cameras=("wrist",))
     observation, info = env.reset()
 
@@ -255,18 +288,22 @@ def test_a_task_without_a_video_has_a_demonstration_of_no_frames():
 
 
 def test_the_frame_hook_is_called_every_eighth_step_and_at_the_end():
-    """With the environment, and whether the step is of the video, as the first 66 are."""
+    """In VideoUnmask the video takes 66 steps, and going home one more; the policy's turn follows,
+    which is cut off after 14. So there are 67 + 14 = 81 steps. The hook is told which are of the
+    video."""
     env = roboirg.make("VideoUnmask", cameras=(), max_steps=14)
-    calls = []
+    in_video = []
+    in_turn = []
 
     def note(env, is_demonstration):
-        calls.append((env.session.world.elapsed, is_demonstration))
+        steps = in_video if is_demonstration else in_turn
+        steps.append(env.session.world.elapsed)
 
     env.set_frame_hook(note, every=8)
     play(env, make_policy("oracle", 0))
 
-    assert [step for step, _ in calls] == [8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 81]
-    assert [step for step, is_demonstration in calls if not is_demonstration] == [72, 80, 81]
+    assert in_video == [8, 16, 24, 32, 40, 48, 56, 64]
+    assert in_turn == [72, 80, 81]
 
 
 ACTIONS = HOME_ACTION + np.random.default_rng(0).normal(0, 0.1, (27, 8))
@@ -316,20 +353,6 @@ def test_the_history_of_a_chunk_has_every_fourth_observation(single_steps):
     check_same_observation(twelfth, single_steps[12][0])
 
 
-def test_the_history_of_a_chunk_has_the_words_of_each_of_its_moments():
-    """Utterances are said at steps 0 and 20; kept are steps 19 and 38."""
-    env = roboirg.make(
-        "PickXtimes", setting="direct", cameras=(), observe_every=19, delivery="turns"
-    )
-    env.reset()
-
-    observation, *_ = env.step_chunk(np.tile(HOME_ACTION, (40, 1)))
-
-    first, second = env.instruction.turns
-    heard = [seen["instruction"] for seen in observation["history"]]
-    assert heard == [first, second]
-
-
 def test_the_history_of_a_chunk_draws_only_the_cameras_it_was_asked_for(monkeypatch):
     """Of 20 steps the 8th and 16th from the front, then both cameras at the end."""
     drawn = []
@@ -354,17 +377,18 @@ def test_the_history_of_a_chunk_draws_only_the_cameras_it_was_asked_for(monkeypa
 
 
 class NeedsHistory:
-    """Requires its own observations and video."""
+    """Requires its own observations and video, and notes what it gets of them."""
 
     cameras = ()
     observe_every = 5
     demonstration_frames = "none"
 
     def reset(self, instruction, demonstration):
-        self.seen = [len(demonstration)]
+        self.keys_of_video = sorted(demonstration)
+        self.history_lengths = []
 
     def act(self, observation):
-        self.seen.append(len(observation["history"]))
+        self.history_lengths.append(len(observation["history"]))
         return np.tile(HOME_ACTION, (7, 1))
 
 
@@ -375,17 +399,33 @@ def test_a_policy_is_not_played_in_an_environment_without_the_history_it_needs()
         play(env, NeedsHistory())
 
 
-def test_a_policy_gets_the_history_and_the_video_that_it_declares():
-    """Every 5th step of chunks of 7: none at the reset, then step 5, then step 10."""
-    policy = NeedsHistory()
+@pytest.fixture
+def policy_that_needs_history():
+    """A policy after an episode of 20 steps, in the environment that a run makes for its needs.
+
+    It needs an observation of every 5th step and no pictures, and acts in chunks of 7 steps.
+    """
     job = job_of(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
     needs = PolicyNeeds(cameras=(), demonstration_frames="none", observe_every=5)
     env = make_env(PreparedJob(job), needs)
     env.max_steps = 20
-
+    policy = NeedsHistory()
     play(env, policy)
+    return policy
 
-    assert policy.seen == [3, 0, 1, 1]
+
+def test_a_policy_gets_the_history_that_it_declares(policy_that_needs_history):
+    """The policy, from the fixture, declares that it needs an observation of every 5th step. It
+    acts at steps 0, 7 and 14: the history since it acted last has nothing, step 5, step 10."""
+    assert policy_that_needs_history.history_lengths == [0, 1, 1]
+
+
+def test_a_policy_gets_the_video_that_it_declares(policy_that_needs_history):
+    """The policy, from the fixture, declares that it needs no pictures of the video. What is left
+    are the states of the robot."""
+    keys = policy_that_needs_history.keys_of_video
+
+    assert keys == ["end_effector", "gripper", "joint_positions"]
 
 
 def test_the_tools_angles_in_observations_do_not_jump_by_a_full_turn():
@@ -416,6 +456,7 @@ def test_closing_an_environment_frees_its_world():
 
 
 def test_a_step_after_the_end_of_an_episode_asks_for_a_reset():
+    """One step is allowed, so the episode has timed out after it."""
     env = roboirg.make("PickXtimes", cameras=(), max_steps=1)
     env.reset()
     env.step(HOME_ACTION)

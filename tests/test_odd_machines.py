@@ -76,6 +76,8 @@ def test_an_address_that_no_proxy_lists_has_no_proxy(host):
 def test_a_proxy_that_cannot_be_used_is_refused_without_printing_its_password(
     environment_without_proxies, given, shown
 ):
+    """A proxy for SOCKS needs a package, which cannot be imported here; others have a port that is
+    no number, or a password that ends the address. A model behind it is refused."""
     environment_without_proxies.setenv("ALL_PROXY", given)
     environment_without_proxies.setitem(sys.modules, "socksio", None)
 
@@ -91,22 +93,30 @@ def test_a_proxy_that_cannot_be_used_is_no_hindrance_to_a_model_on_this_machine(
     make_model(ModelOptions(model="m", base_url="http://127.0.0.1:8/v1"))
 
 
+def no_such_user(uid):
+    raise KeyError(uid)
+
+
 def test_a_user_without_a_home_gets_a_private_folder_among_the_temporary_ones(
     monkeypatch, tmp_path
 ):
+    """As in a container that runs as a user without an entry of its own: HOME is empty, and Python
+    finds no user of this number. Temporary files are in `tmp_path`; the folder there has the
+    user's number in its name and can be entered by that user alone, which is mode 700."""
     monkeypatch.setenv("HOME", "")
-    monkeypatch.setattr("pwd.getpwuid", {}.__getitem__)
+    monkeypatch.setattr("pwd.getpwuid", no_such_user)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr("os.getuid", lambda: tmp_path.stat().st_uid)
 
-    folder = tmp_path / f"roboirgbench-{os.getuid()}"
+    folder = user_folder("data", below="servers")
 
-    assert user_folder("data", below="servers") == folder / "servers"
-    assert folder.stat().st_mode & 0o777 == 0o700
+    assert folder == tmp_path / f"roboirgbench-{os.getuid()}" / "servers"
+    assert folder.parent.stat().st_mode & 0o777 == 0o700
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root gives a link to another user")
 def test_a_temporary_folder_that_another_user_made_a_link_is_refused(monkeypatch, tmp_path):
+    """All users share the folder of temporary files. Another one, number 12345, has put a link
+    there with the name of this user's folder, to read or change what is written to it."""
     (tmp_path / "ours").mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     link = tmp_path / f"roboirgbench-{os.getuid()}"
@@ -118,24 +128,34 @@ def test_a_temporary_folder_that_another_user_made_a_link_is_refused(monkeypatch
 
 
 def begin_a_phase_and_wait(connection, watchdog):
-    """Begin a phase, and wait."""
+    """What the child process does: it notes the phase in which it is, and waits for its end."""
     watchdog.write("policy's act()", 1e9)
     connection.send(None)
     connection.recv()
 
 
-@pytest.mark.parametrize("has_memory", [True, False])
-def test_a_worker_is_watched_without_shared_memory(monkeypatch, has_memory):
-    monkeypatch.setattr("multiprocessing.heap.Arena", None)  # what is in /dev/shm
-    if not has_memory:  # as in Pythons that are built for old systems
+@pytest.fixture
+def _without_shared_memory(monkeypatch):
+    """As without /dev/shm, where `multiprocessing` has its shared memory: making some fails."""
+    monkeypatch.setattr("multiprocessing.heap.Arena", None)
+
+
+@pytest.mark.usefixtures("_without_shared_memory")
+@pytest.mark.parametrize("has_memory_files", [True, False])
+def test_a_worker_is_watched_without_shared_memory(monkeypatch, has_memory_files):
+    """A watchdog shows this process in which phase a child is. The fixture breaks the usual shared
+    memory, so the phase goes through a file in memory, which `os.memfd_create` makes; Pythons that
+    are built for old systems lack that function, and a temporary file takes its place."""
+    if not has_memory_files:
         monkeypatch.delattr(os, "memfd_create")
     watchdog = Watchdog()
+
     child = ChildProcess.spawn(begin_a_phase_and_wait, watchdog)
     child.receive()
-
-    assert watchdog.phase == "policy's act()"
-
+    phase = watchdog.phase
     child.end()
+
+    assert phase == "policy's act()"
 
 
 @pytest.mark.parametrize(
@@ -144,6 +164,8 @@ def test_a_worker_is_watched_without_shared_memory(monkeypatch, has_memory):
 def test_a_character_that_the_terminal_cannot_show_is_printed_as_a_question_mark(
     monkeypatch, encoding, shown
 ):
+    """The command, replaced by a function that prints "≠", writes to a terminal of this encoding.
+    Only UTF-8 has the character; the others must not end the command."""
     terminal = io.TextIOWrapper(io.BytesIO(), encoding)
     monkeypatch.setattr(sys, "stdout", terminal)
     monkeypatch.setattr(cli, "app", lambda **_: terminal.write("≠"))
@@ -164,6 +186,8 @@ def test_the_doctor_names_a_missing_temporary_folder(monkeypatch, tmp_path):
 
 
 def test_the_doctor_names_a_wrong_path_of_the_cache(monkeypatch):
+    """`~nobody-here` is the home of a user that there is not. The doctor's third check of files is
+    the cache."""
     monkeypatch.setenv("ROBOIRG_CACHE", "~nobody-here/x")
 
     cache = doctor._check_files()[2]

@@ -71,20 +71,28 @@ def test_every_page_of_the_docs_is_on_the_site(folder_of_the_site, links_of_page
     assert len(pages) == len(wanted) + 5
 
 
+def is_dead(page, link, links_of_pages):
+    """Return whether a link of a page leads to no file of the site, or to no name inside one."""
+    address = urlsplit(link)
+    if address.scheme:
+        return False  # to another site
+    target = (page.parent / unquote(address.path)).resolve() if address.path else page
+    if not target.is_file():
+        return True
+    if not address.fragment or target not in links_of_pages:
+        return False
+    return unquote(address.fragment) not in links_of_pages[target].names
+
+
 def test_no_link_is_dead(links_of_pages):
-    """Neither to a file nor to a name inside a page."""
+    """The fixture has for each page of the built site its links, what it loads, and the names that
+    a link may point to. Each link inside the site must lead to a file and, behind a `#`, to one of
+    the names in it."""
     dead = []
     for page, found in links_of_pages.items():
-        for target in (*found.links, *found.loaded):
-            scheme, _, path, _, name = urlsplit(target)
-            if scheme:
-                continue
-            other = (page.parent / unquote(path)).resolve() if path else page
-            names = {unquote(name)}
-            if other in links_of_pages:
-                names = {"", *links_of_pages[other].names}
-            if not other.is_file() or unquote(name) not in names:
-                dead.append((page.name, target))
+        links = found.links + found.loaded
+        assert links, page
+        dead += [(page.name, link) for link in links if is_dead(page, link, links_of_pages)]
 
     assert dead == []
 
@@ -110,6 +118,8 @@ def names(links_of_pages):
 
 
 def test_the_reference_has_the_public_names(names):
+    """The fixture has all names that links to the built site may point to. Those of `roboirg`
+    itself are there, and a method, an attribute and a class below it."""
     assert {f"roboirg.{name}" for name in roboirg.__all__ if not name.startswith("_")} <= names
     assert "roboirg.envs.environment.RoboIRGEnv.step" in names
     assert "roboirg.policies.Policy.act" in names

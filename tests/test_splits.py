@@ -85,6 +85,8 @@ def test_episodes_that_robomme_has_published_are_its_own(task):
 
 
 def test_all_episodes_of_the_benchmark_are_published_but_for_the_few_robomme_cannot_build():
+    """The fixed splits are RoboMME's. Six of its episodes, named by task, split and number, cannot
+    be built there, so the benchmark samples its own."""
     sampled = []
     for task in all_tasks():
         sampled += [episode.key for episode in episodes_of(task) if published(episode) is None]
@@ -105,17 +107,28 @@ def episodes_of_our_own(task):
 
 
 @each_task
-def test_episodes_of_our_own_repeat_the_difficulties_and_have_seeds_by_one_rule(task):
-    """The first seed of an episode's range, or the next one for which a scene can be made.
+def test_episodes_of_our_own_repeat_easy_easy_medium_hard(task):
+    """Where RoboMME has published no episode of a split, the benchmark samples one, whose
+    difficulty follows from its number."""
+    for episode in episodes_of_our_own(task):
+        assert episode.difficulty == ("easy", "easy", "medium", "hard")[episode.index % 4]
 
-    *passed_over* counts the seeds of an episode for which none could be made.
-    """
+
+@each_task
+def test_episodes_of_our_own_have_the_first_seed_of_their_range_that_gives_a_scene(task):
+    """Each sampled episode has a range of seeds, from `slot_seed` on. The shipped file of splits
+    has, as `passed_over`, how many of them give no scene; the one after these must be taken."""
+    passed_over = shipped_splits()[task].passed_over
     for episode in episodes_of_our_own(task):
         first = slot_seed(get_task(task), episode.split, episode.index)
-        key = f"{episode.split}/{episode.index}"
-        assert episode.difficulty == ("easy", "easy", "medium", "hard")[episode.index % 4]
-        assert episode.seed == first + shipped_splits()[task].passed_over.get(key, 0)
-        assert not episode.recorded
+        without_scene = passed_over.get(f"{episode.split}/{episode.index}", 0)
+        assert episode.seed == first + without_scene
+
+
+@each_task
+def test_episodes_of_our_own_are_not_among_robomme_s_recorded_ones(task):
+    """RoboMME has recorded what it has published, and nothing that this benchmark has sampled."""
+    assert not any(episode.recorded for episode in episodes_of_our_own(task))
 
 
 @pytest.mark.parametrize("task", ["PickXtimes", "StopCube"])
@@ -126,6 +139,8 @@ def test_episodes_of_our_own_repeat_the_difficulties_and_have_seeds_by_one_rule(
 def test_random_episodes_repeat_the_difficulties_and_have_seeds_of_their_own_range(
     task, index, difficulty
 ):
+    """The split *random* has no end; the difficulty of an episode follows from its number, modulo
+    4. Each has a range of seeds, so that no two share one, and is the same whenever it is made."""
     episode = get_episode(task, "random", index)
 
     first = slot_seed(get_task(task), "random", index)
@@ -136,6 +151,8 @@ def test_random_episodes_repeat_the_difficulties_and_have_seeds_of_their_own_ran
 
 @each_task
 def test_seeds_passed_over_are_of_our_own_episodes_and_never_reach_the_next_ones_range(task):
+    """For each episode that the benchmark samples, the shipped file of splits may have how many
+    seeds give no scene. There are fewer of these than seeds before the next episode's."""
     own = {f"{episode.split}/{episode.index}" for episode in episodes_of_our_own(task)}
 
     passed_over = shipped_splits()[task].passed_over

@@ -48,6 +48,7 @@ def test_a_run_of_a_package_that_is_not_installed_has_tables_with_a_warning(run_
 
 
 def test_a_run_of_a_package_that_is_not_installed_has_a_page(run_of_absent_package):
+    """The run's task *TheirTask*, setting *theirs* and policy are not known on this machine."""
     call("report", run_of_absent_package)
 
     page = (run_of_absent_package / "report.html").read_text()

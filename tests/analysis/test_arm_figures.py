@@ -5,15 +5,13 @@ from __future__ import annotations
 import pytest
 from flat_jobs import frame_of, make_result
 
-from roboirg.analysis.measures.arm_figures import arm_figures
-from roboirg.analysis.measures.chance import silent_chance
+from roboirg.analysis.measures.arm_figures import arm_figures, silent_chance
 from roboirg.analysis.measures.measure import mean_rate
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.tables.arm_table import language_use_sentences, make_arm_table
 from roboirg.analysis.tables.rendering import get_format
 from roboirg.core.errors import InvalidValueError
 from roboirg.records.record import GoalOutcomes
-from roboirg.stats.cells import rate_interval
 
 TASKS = ("PickXtimes", "VideoUnmask")
 SCENES = range(12)
@@ -62,12 +60,7 @@ def results_of_policy(policy, acts, scenes=SCENES, **fields):
 
 DOES_WHAT_IT_HEARS = {"told": "own", "other-goal": "other", "silent": "none", "scrambled": "none"}
 SAME_GOAL_IN_EVERY_ARM = {"told": "own", "other-goal": "own", "silent": "own", "scrambled": "own"}
-ALWAYS_THE_OTHER_GOAL = {
-    "told": "other",
-    "other-goal": "other",
-    "silent": "other",
-    "scrambled": "other",
-}
+ALWAYS_THE_OTHER_GOAL = dict.fromkeys(DOES_WHAT_IT_HEARS, "other")
 
 
 def run_data_of(*results):
@@ -83,83 +76,76 @@ def figure_named(data, name):
 
 
 @pytest.mark.parametrize(
-    ("acts", "use", "habit"),
-    [
-        (DOES_WHAT_IT_HEARS, 1.0, 0.0),
-        (SAME_GOAL_IN_EVERY_ARM, 0.0, 1.0),
-        (ALWAYS_THE_OTHER_GOAL, 0.0, 1.0),
-    ],
+    ("if_own_is_stated", "if_other_is_stated", "each_reached", "same_reached"),
+    [("own", "other", 1.0, 0.0), ("own", "own", 0.0, 1.0), ("other", "other", 0.0, 1.0)],
     ids=["does what it hears", "always its own goal", "always the other goal"],
 )
-def test_who_follows_the_words_is_told_from_who_does_the_same_whatever_it_hears(acts, use, habit):
-    """*Language use* is a difference of two rates in the arm *other-goal*.
+def test_who_follows_the_words_is_told_from_who_does_the_same_whatever_it_hears(
+    if_own_is_stated, if_other_is_stated, each_reached, same_reached
+):
+    """Each of 12 scenes of 2 tasks is played twice: its own goal is stated, then another goal.
 
-    There the instruction states the other goal of the scene. `acts` is the goal that a policy
-    reaches in each arm; `use` is how often the other goal is reached, which was stated, and `habit`
-    how often the own one is, which was not. Would find one arm counted as another.
+    Given is which of the two the policy reaches each time, in all scenes alike. *Language use* is
+    the share of scenes in which each goal was reached when it was stated, less the share in which
+    the same one was reached both times. Would find one arm counted as another.
     """
-    results = results_of_policy("mine", acts)
+    reached = {"told": if_own_is_stated, "other-goal": if_other_is_stated}
+    results = results_of_policy("mine", reached, scenes=range(12))
 
     found = figure_named(run_data_of(results), "language use")
 
-    assert both_rates(found) == (use, habit)
-    assert found.gap.value == use - habit
-    assert found.gap.episodes == 24, "12 scenes of 2 tasks"
-    assert found.p_holm < 0.001
-    assert found.interval.low <= use <= found.interval.high
-    low, high = rate_interval(found.others.values())
-    assert low <= habit <= high
+    assert both_rates(found) == (each_reached, same_reached)
+    assert found.gap.value == each_reached - same_reached
+    assert found.gap.episodes == 12 * 2
 
 
-@pytest.mark.parametrize("contrast", ["words' worth", "order's worth"])
 @pytest.mark.parametrize(
-    ("acts", "worth"),
-    [
-        (DOES_WHAT_IT_HEARS, 1.0),
-        (SAME_GOAL_IN_EVERY_ARM, 0.0),
-    ],
-    ids=["does what it hears", "always its own goal"],
+    ("contrast", "arm"), [("words' worth", "silent"), ("order's worth", "scrambled")]
 )
+@pytest.mark.parametrize(("reached", "worth"), [("none", 1.0), ("own", 0.0)])
 def test_words_are_worth_what_success_loses_in_silence_and_their_order_when_scrambled(
-    contrast, acts, worth
+    contrast, arm, reached, worth
 ):
-    """`acts` is the goal that a policy reaches in each arm; if told or silent, `own` is a success.
+    """With the instruction (`told`) the policy always reaches the scene's own goal: a success.
 
-    Who does what it hears wins all if told and nothing without words or in a scrambled order: both
-    are worth 1. Who does the same in every arm loses nothing.
+    Without words, or in a scrambled order, it reaches nothing and loses all, a worth of 1, or still
+    its own goal and loses nothing.
     """
-    found = figure_named(run_data_of(results_of_policy("mine", acts)), contrast)
+    results = results_of_policy("mine", {"told": "own", arm: reached})
+
+    found = figure_named(run_data_of(results), contrast)
 
     assert found.gap.value == worth
 
 
-def test_the_success_with_paraphrases_is_their_mean_less_that_with_the_instruction():
-    """Of 8 episodes in 2 tasks the first paraphrase wins all, the second half: 0.75 on average.
+def test_success_with_all_paraphrases_is_compared_with_the_mean_over_paraphrases():
+    """Of 8 scenes in each of 2 tasks, the first paraphrase is solved in all, the second in 0 to 3.
 
-    The instruction itself wins all. Would find paraphrases that are pooled.
+    So half of the 16 episodes are solved in both wordings (0.5), and on average 1 and 0.5 (0.75).
+    Would find paraphrases that are pooled. Success with the instruction itself (told) has no part.
     """
     results = [
-        *results_of_policy("mine", {"told": "own", "paraphrase-1": "own"}, range(8)),
-        *results_of_policy("mine", {"paraphrase-2": "own"}, range(4)),
-        *results_of_policy("mine", {"paraphrase-2": "none"}, range(4, 8)),
+        *results_of_policy("mine", {"told": "own", "paraphrase-1": "own"}, scenes=range(8)),
+        *results_of_policy("mine", {"paraphrase-2": "own"}, scenes=range(4)),
+        *results_of_policy("mine", {"paraphrase-2": "none"}, scenes=range(4, 8)),
     ]
 
     found = figure_named(run_data_of(results), "paraphrases")
 
     assert both_rates(found) == (0.5, 0.75)
-    assert found.gap.value == -0.25
-    assert found.gap.episodes == 16
+    assert found.gap.value == 0.5 - 0.75
+    assert found.gap.episodes == 8 * 2
 
 
 def test_an_episode_that_lacks_a_verdict_in_some_arm_is_left_out():
-    """Three scenes of two tasks were played in all arms: six episodes count.
+    """Three scenes of two tasks were played with and without words: six episodes count.
 
-    Scene 7 was played only as told, and scene 8 ended in an error in each arm.
+    Scene 7 was played only with words (`told`), and scene 8 ended in an error both times.
     """
-    results = results_of_policy("mine", DOES_WHAT_IT_HEARS, range(3))
-    results.append(make_result("success", 7, policy="mine", task=TASKS[0]))
-    for arm in DOES_WHAT_IT_HEARS:
-        results.append(make_result("error", 8, policy="mine", task=TASKS[0], arm=arm))
+    results = results_of_policy("mine", {"told": "own", "silent": "none"}, scenes=range(3))
+    results.append(make_result("success", episode=7, policy="mine"))
+    for arm in ("told", "silent"):
+        results.append(make_result("error", episode=8, policy="mine", arm=arm))
 
     found = figure_named(run_data_of(results), "words' worth")
 
@@ -208,6 +194,10 @@ def test_rates_of_arms_are_rounded_half_up():
 
 
 def test_sentences_that_compare_the_language_use_of_two_policies_are_as_stored(snapshot):
+    """*mine* mostly follows the words; *knows* does the same whatever is said.
+
+    The sentence has the difference of their language use, its interval and p-value.
+    """
     mine = frame_of(results_of_a_policy_that_mostly_listens())
     knows = frame_of(results_of_policy("knows", SAME_GOAL_IN_EVERY_ARM))
 
@@ -215,6 +205,7 @@ def test_sentences_that_compare_the_language_use_of_two_policies_are_as_stored(s
 
 
 def test_a_run_without_control_arms_has_neither_their_table_nor_a_sentence_about_them():
+    """Control arms play a scene again, for example without words; here is the usual arm alone."""
     mine = run_data_of(results_of_policy("mine", DOES_WHAT_IT_HEARS))
     told = run_data_of(results_of_policy("knows", {"told": "own"}))
 

@@ -35,7 +35,8 @@ PLAN = Plan(
     settings=("explicit", "direct", "reasoning", "contextual", "direct-rival"),
     episodes=tuple(range(8)),
 )
-BY_LETTERS = Breakdown("letters", "letter", "Made up.")
+BY_LABEL = Breakdown("labels", "label", "Made up.")
+"""By the column `labels`."""
 
 
 def record_of_job(job):
@@ -78,7 +79,8 @@ def test_a_rival_is_labeled_with_the_words_that_single_it_out(records_of_two_pol
 def test_an_episode_is_labeled_with_the_expressions_of_its_command_alone(records_of_two_policies):
     """A contextual instruction also has turns before the command, such as a reinforcement.
 
-    These turns refer with expressions of their own, which must not become labels.
+    These turns refer with expressions of their own, such as *it*, which must not become labels. So
+    the labels are some of the expressions that were said in all turns, and not all of them.
     """
     read = record_columns()["expression"].read
     labels = set()
@@ -101,70 +103,76 @@ def test_an_instruction_with_references_spelled_out_has_no_expression():
 # Numbers
 
 
-def labeled_by_letters(results):
-    """Return results of which even episodes have the labels "9" and "zebra", odd ones "10 b"."""
+def labeled(results, labels):
+    """Return results with a column of labels, of which an episode may have several.
+
+    Args:
+        results: of some episodes.
+        labels: those of each episode, as in ``[("2 cubes",), ("2 cubes", "red")]``.
+    """
     frame = frame_of(results)
-    labels = [("10 b",) if episode % 2 else ("9", "zebra") for episode in frame["episode"]]
-    return frame.extended({"letters": as_column(labels)})
+    column = [labels[episode] for episode in frame["episode"]]
+    return frame.extended({"labels": as_column(column)})
 
 
 def test_the_gap_of_a_label_is_over_the_episodes_with_that_label():
-    """A letter is an episode: 1 won, 0 lost, ! an error, which counts nowhere.
+    """Episodes 0 to 5 have the label "10", 6 has "10" and "9", 7 and 8 have "9". Explicit wins all.
 
-    Even episodes have the labels "9" and "zebra": explicit wins 0, 2, 4 and direct 0, 2, a gap of
-    -1 of 6. Odd ones have "10 b": explicit wins 1, 3, 5 and direct 1, -2 of 6.
+    Direct loses (0) those with "10": a gap of -1, and 7 pairs that differ have p = 2 / 2**7, after
+    Holm's correction for two labels twice that. Of those with "9" it loses 6 and wins 7, a gap of
+    -1/2 with p = 1; episode 8 ends in an error (!) and counts nowhere. Labels sort as numbers.
     """
-    explicit = make_results("111111000000")
-    direct = make_results("111000000000!", "direct")
+    labels = [("10",)] * 6 + [("10", "9")] + [("9",)] * 2
+    explicit = make_results("111111111", "explicit")
+    direct = make_results("00000001!", "direct")
 
-    rows = break_down(labeled_by_letters([*explicit, *direct]), BY_LETTERS)
+    nine, ten = break_down(labeled([*explicit, *direct], labels), BY_LABEL)
 
-    found = []
-    for row in rows:
-        gap = row.gap
-        assert gap is not None
-        found.append((row.key.label, row.counts.episodes, round(gap.value * 6), gap.p_value))
-    # Tests of 1 and of 2 episodes that differ; corrected for 3 tests, all reach the most, 1.
-    assert found == [("9", 6, -1, 1.0), ("10 b", 6, -2, 0.5), ("zebra", 6, -1, 1.0)]
-    assert [row.p_holm for row in rows] == [1.0, 1.0, 1.0]
+    assert (ten.key.label, ten.counts.episodes, ten.gap.value) == ("10", 7, -1)
+    assert (ten.gap.p_value, ten.p_holm) == pytest.approx((2 / 2**7, 2 * 2 / 2**7))
+    assert (nine.key.label, nine.counts.episodes, nine.gap.value) == ("9", 2, -0.5)
+    assert (nine.gap.p_value, nine.p_holm) == (1, 1)
 
 
 def test_without_explicit_results_a_label_has_a_rate_and_no_gap():
-    """Of the six even episodes two are won; would find a gap to episodes that were not played."""
-    direct = make_results("111000000000!", "direct")
+    """Of four red episodes in direct one is won (1), two are lost (0), and one is an error (!).
 
-    table = make_breakdown_table(BY_LETTERS, labeled_by_letters(direct))
+    So 3 episodes have a rate of 1 / 3. Gap, interval and p-value would need explicit episodes:
+    would find a gap to episodes that were not played.
+    """
+    direct = make_results("100!", "direct")
 
-    assert [entry.text for entry in table.rows[0].entries] == ["6", "33.33", "–", "–", "–"]
+    table = make_breakdown_table(BY_LABEL, labeled(direct, [("red",)] * 4))
+
+    (row,) = table.rows
+    assert [entry.text for entry in row.entries] == ["3", "33.33", "–", "–", "–"]
     assert "– without explicit on the same episodes." in table.notes
     assert table.notes[-1].startswith("Incomplete: 1 trial without a verdict")
 
 
 def test_two_policies_are_compared_on_the_episodes_of_each_label():
-    """Even episodes have the labels "9" and "zebra", odd ones "10 b".
+    """Episodes 0 to 3 are red, 4 and 5 are red and blue. Policy *better* wins all 6 (1).
 
-    The better policy wins all 12, so it gains 4 of 6, 5 of 6 and again 4 of 6 episodes.
+    The listener wins 0 and 1: of the red ones 4 of 6 differ, p = 2 / 2**4 in the exact test, and
+    of the blue ones 2 of 2, p = 2 / 2**2. Of two tests Holm's correction doubles the smaller one.
     """
-    better = labeled_by_letters(make_results("1" * 12, "direct", policy="better"))
-    direct = labeled_by_letters(make_results("111000000000", "direct"))
+    labels = [("red",)] * 4 + [("red", "blue")] * 2
+    better = labeled(make_results("111111", "direct", policy="better"), labels)
+    listener = labeled(make_results("110000", "direct"), labels)
 
-    found = compare(better, direct, [BY_LETTERS])
+    found = compare(better, listener, [BY_LABEL])
 
-    parts = found.parts["letter"]
-    assert [(part.key.label, round(part.gap.value * 6)) for part in parts] == [
-        ("9", 4), ("10 b", 5), ("zebra", 4),
-    ]  # fmt: skip
-    # All n episodes that differ do so to one side, 2 / 2^n; Holm: the rarest times 3, others 2.
-    assert [part.p_holm for part in parts] == pytest.approx(
-        [2 * 2 / 2**4, 3 * 2 / 2**5, 2 * 2 / 2**4]
-    )
-    assert "  direct, 9: " in "\n".join(sentences(found, "better", "listener"))
+    blue, red = found.parts["label"]
+    assert (red.gap.value, red.p_holm) == pytest.approx((4 / 6, 2 * 2 / 2**4))
+    assert (blue.gap.value, blue.p_holm) == pytest.approx((1, 2 / 2**2))
+    assert "  direct, red: " in "\n".join(sentences(found, "better", "listener"))
 
 
 # Commands
 
 
 def test_compare_prints_the_breakdowns_that_were_asked_for_and_no_other(folder_of_two_policies):
+    """Two policies of one run are compared by the pattern of reasoning, and by the rival object."""
     sides = call(
         "compare",
         f"{folder_of_two_policies}:listener",
@@ -190,15 +198,21 @@ def test_results_of_explicit_instructions_alone_cannot_be_broken_down(
 def test_breakdowns_read_a_file_of_records_without_holding_it_in_memory(
     records_of_two_policies, tmp_path
 ):
-    """Of 2,000 records of 20 kB less than a fifth is ever in memory: long parts are dropped."""
-    long = replace(records_of_two_policies[1], details="x" * 20_000)
-    store(tmp_path, [replace(long, episode=episode) for episode in range(2000)])
+    """The file has 2,000 records of an episode with a long text, 20 kB each: 40 MB.
+
+    Columns for breakdowns are read from it, among them *slots*, the parts of the goal that the
+    instruction hides. Records are read one by one and their long texts dropped, so less than a
+    fifth of the file is ever in memory.
+    """
+    record = replace(records_of_two_policies[1], details="x" * 20_000)
+    store(tmp_path, [replace(record, episode=episode) for episode in range(2000)])
+    size_of_file = (tmp_path / RECORDS_FILE).stat().st_size
     reads = {name: column.read for name, column in record_columns().items()}
 
     tracemalloc.start()
-    frame = with_columns(frame_of([long]), iterate_records(tmp_path), reads)
-    _, peak = tracemalloc.get_traced_memory()
+    frame = with_columns(frame_of([record]), iterate_records(tmp_path), reads)
+    _, most_memory = tracemalloc.get_traced_memory()
     tracemalloc.stop()
 
-    assert frame["slots"].tolist() == [long.metadata["hidden_slots"] or None]
-    assert peak < (tmp_path / RECORDS_FILE).stat().st_size / 5
+    assert frame["slots"].tolist() == [record.metadata["hidden_slots"] or None]
+    assert most_memory < size_of_file / 5

@@ -8,7 +8,7 @@ import pytest
 from flat_jobs import job_of
 
 from roboirg.analysis.measures.chance import CHANCE, floor_level
-from roboirg.runs.job_instruction import instruct_job
+from roboirg.language.word_sampler import LANGUAGE_VERSION
 from roboirg.tasks import all_tasks
 
 
@@ -57,6 +57,10 @@ def test_the_chance_level_of_several_jobs_is_their_mean():
 
 
 def test_an_episode_counts_once_however_many_policies_and_seeds_play_it():
+    """Chance is 1 / 2 in episode 2 and 1 / 4 in episode 3, a mean of 3 / 8.
+
+    If the three jobs of episode 2 counted three times, it would be 7 / 16.
+    """
     first = job_in("StopCube", "reasoning", 2)
     again = job_in("StopCube", "reasoning", 2, policy="else", policy_seed=3)
     other = job_in("StopCube", "reasoning", 3)
@@ -80,15 +84,26 @@ def test_no_jobs_have_no_chance_level():
     assert floor_level(CHANCE, []) is None
 
 
-def test_a_learned_floor_is_known_for_the_usual_options_in_the_version_of_the_language_alone():
-    """*text-only* learned from words of this version; other stages and versions were not learned.
+@pytest.mark.parametrize(
+    ("options", "language_version", "is_known"),
+    [
+        ({}, LANGUAGE_VERSION, True),
+        ({"stages": (1, 5)}, LANGUAGE_VERSION, False),
+        ({}, "0.9", False),
+    ],
+    ids=["measured", "a shorter context", "an older language version"],
+)
+def test_a_learned_floor_is_known_only_for_the_kind_of_instruction_that_it_was_measured_on(
+    options, language_version, is_known
+):
+    """The floor *text-only* is the success of a learner that guesses the goal from words alone.
 
-    Would find a floor that belongs to other instructions.
+    The package has it for the current version of the language, with all five stages of a context.
+    A context of stages 1 and 5 alone, or version 0.9, was not measured: the result is None instead
+    of the success with other instructions.
     """
-    usual = job_in("PickXtimes", "contextual", 2)
-    short = job_in("PickXtimes", "contextual", 2, stages=(1, 5))
-    version = str(instruct_job(usual).metadata["language_version"])
+    job = job_in("PickXtimes", "contextual", episode=2, **options)
 
-    assert floor_level("text-only", [usual], version) is not None
-    assert floor_level("text-only", [short], version) is None
-    assert floor_level("text-only", [usual], "0.9") is None
+    level = floor_level("text-only", [job], language_version)
+
+    assert (level is not None) == is_known

@@ -73,21 +73,26 @@ def test_each_difference_to_how_the_paper_played_is_named(fields, expected):
 
 
 def test_errors_and_planned_trials_without_a_result_are_named():
-    """Of 100 planned trials (50 episodes, 2 seeds) one is an error and two were not played.
+    """Planned are episodes 0 to 49 with policy seeds 0 and 1; seed 0 played all of them.
 
+    Seed 1 played episodes 0 to 46, and 47 ended in an error; 48 and 49 are still to be played.
     Would find an incomplete rate that stands next to a published one without a sign.
     """
-    first_seed = results_like_the_papers()
-    second_seed = results_like_the_papers(policy_seed=1)
-    planned = [result.identity for result in [*first_seed, *second_seed]]
-    error = replace(second_seed[10], outcome="error", error="policy")
+    seed_0 = results_like_the_papers(episodes=range(50), policy_seed=0)
+    seed_1 = results_like_the_papers(episodes=range(50), policy_seed=1)
+    planned = [result.identity for result in [*seed_0, *seed_1]]
+    error = replace(seed_1[47], outcome="error", error="policy")
 
-    played = [*first_seed, *second_seed[:10], error, *second_seed[13:]]
+    found = named_differences([*seed_0, *seed_1[:47], error], planned)
 
-    assert named_differences(played, planned) == ("1 error", "2 trials still to be played")
+    assert found == ("1 error", "2 trials still to be played")
 
 
 def test_a_planned_trial_counts_as_played_although_policy_and_words_came_from_another_place():
+    """The 50 episodes were planned for a policy on a server, with the words of a file elsewhere.
+
+    None of them is reported as still to be played.
+    """
     results = results_like_the_papers()
     elsewhere = {"ref": unknown_policy("openpi://other:1"), "wordings_file": "elsewhere.toml"}
     planned = [replace(result.identity, **elsewhere) for result in results]
@@ -116,13 +121,20 @@ def test_a_cell_of_which_nothing_was_played_is_not_compared():
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_marks_the_cells_and_says_what_differs(snapshot, name):
-    """Of two tasks, one with too few episodes, in explicit and in a setting of other words."""
-    whole = results_like_the_papers(settings=("explicit", "direct"))
-    partial = results_like_the_papers(range(4), ("StopCube",))
-    table = make_table("main", run_data_of(whole, partial), published=True)
-    shown = tuple(row for row in table.rows if row.source == "ours" or row.name == "MemER")
+    """In explicit, the rate of 50 episodes of PickXtimes can be compared with the paper's (=).
 
-    assert FORMATS[name].draw(dataclasses.replace(table, rows=shown)) == snapshot
+    Marked ≠ with their reasons are the rate of 4 episodes of StopCube, too few, and that of
+    PickXtimes in direct, for which the paper's words are not published. The stored table has our
+    rows and, of the paper's, those of MemER.
+    """
+    comparable = results_like_the_papers(tasks=("PickXtimes",), settings=("explicit", "direct"))
+    too_few = results_like_the_papers(episodes=range(4), tasks=("StopCube",))
+    table = make_table("main", run_data_of(comparable, too_few), published=True)
+    shown = [row for row in table.rows if row.source == "ours" or row.name == "MemER"]
+
+    drawn = FORMATS[name].draw(dataclasses.replace(table, rows=shown))
+
+    assert drawn == snapshot
 
 
 def test_a_table_without_published_rates_marks_the_best_rate_alone():
@@ -162,13 +174,20 @@ def test_a_note_on_differences_names_the_policy_that_alone_has_them():
 
 
 def test_in_the_terminal_only_explicit_rates_are_marked_as_comparable_or_not():
-    """50 episodes in one task (=), and 4 in the other (≠): 40 of 50 and 3 of 4 are won."""
-    settings = ("explicit", "direct")
-    whole = results_like_the_papers(settings=settings)
-    partial = results_like_the_papers(range(4), ("StopCube",), settings)
+    """Of PickXtimes 40 of 50 episodes are won, as many as the paper has (=), of StopCube 3 of 4.
+
+    In direct the same are won, a change of ±0 to explicit; no such rate can be compared, so none
+    has a sign. Neither has the mean over both tasks, (80 + 75) / 2 = 77.5, rounded up.
+    """
+    both = ("explicit", "direct")
+    whole = results_like_the_papers(range(50), tasks=("PickXtimes",), settings=both)
+    partial = results_like_the_papers(range(4), tasks=("StopCube",), settings=both)
 
     (table,) = make_run_tables(frame_of(whole, partial))
 
-    assert [str(row.entries[0]) for row in table.rows[:2]] == ["80 =", "75 ≠"]
-    assert not any(row.entries[1].signs for row in table.rows)
+    assert [list(map(str, row.entries)) for row in table.rows] == [
+        ["80 =", "80 (±0)"],
+        ["75 ≠", "75 (±0)"],
+        ["78", "78 (±0)"],
+    ]
     assert "≠ not comparable with the published rate: 4 of 50 episodes (StopCube)." in table.notes

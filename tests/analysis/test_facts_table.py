@@ -37,20 +37,13 @@ def facts_of_run(folder, *records):
     return found
 
 
-def test_the_table_of_facts_says_what_was_planned_played_and_begun_again(tmp_path):
-    """Of four records one is a failed first attempt; three planned trials were not played.
+def test_the_table_of_facts_says_under_which_conditions_the_episodes_were_played(tmp_path):
+    """Of two episodes of PickXtimes, number 0 was played in explicit and number 3 in direct.
 
-    Would find a repeated episode that counts twice, or an error that vanishes.
+    All else is as usual: the words of the benchmark, all in one prompt, and its step limit. The
+    records do not name the device that drew the pictures.
     """
-    records = [
-        record_of(0, "error", error="policy"),
-        record_of(0, attempt=2),
-        record_of(2, "error", error="timeout", code="0a", verdict_code=None),
-        record_of(3, setting="direct"),
-    ]
-    write_plan(make_plan(["mine=random"], tasks="PickXtimes", settings="direct"), tmp_path)
-
-    found = facts_of_run(tmp_path, *records)
+    facts = facts_of_run(tmp_path, record_of(0), record_of(3, setting="direct"))
 
     expected = {
         "tasks": "PickXtimes",
@@ -58,28 +51,59 @@ def test_the_table_of_facts_says_what_was_planned_played_and_begun_again(tmp_pat
         "step limit": "1300 at 20 a second",
         "words": "our own words",
         "delivery": "prompt",
-        "episodes": "3, from 0 to 3",
-        "trials played": "3",
-        "errors, in no rate": "timeout 1",
-        "trials planned and not played": "3",
-        "trials begun again": "1",
-        "render device": NOT_REPORTED,
-        "package code": f"{records[0].code}; 0a",
-        "verdict code": records[0].verdict_code,
+        "episodes": "2, from 0 to 3",
+        "render device": "not reported",
     }
-    assert found[RUN].items() >= expected.items()
+    assert facts["the run"].items() >= expected.items()
+
+
+def test_the_table_of_facts_counts_what_was_planned_played_and_begun_again(tmp_path):
+    """Of the planned episodes 0 to 3, number 0 failed and was begun again, 1 ran out of time.
+
+    The other two were not played. Would find a repeated episode that counts twice, or an error
+    that vanishes; the failed first attempt counts as begun again and not as an error.
+    """
+    plan = make_plan(["mine=random"], tasks="PickXtimes", settings="explicit", episodes="4")
+    write_plan(plan, tmp_path)
+    failed = record_of(0, "error", error="policy")
+    again = record_of(0, attempt=2)
+    out_of_time = record_of(1, "error", error="timeout")
+
+    facts = facts_of_run(tmp_path, failed, again, out_of_time)
+
+    expected = {
+        "trials played": "2",
+        "errors, in no rate": "timeout 1",
+        "trials planned and not played": "2",
+        "trials begun again": "1",
+    }
+    assert facts["the run"].items() >= expected.items()
+
+
+def test_the_table_of_facts_lists_each_version_of_the_code_once(tmp_path):
+    """One record has our code; the other has another one and does not say what code judged it."""
+    ours = record_of(0)
+    other = record_of(2, code="0a", verdict_code=None)
+
+    facts = facts_of_run(tmp_path, ours, other)
+
+    assert facts["the run"]["package code"] == f"{ours.code}; 0a"
+    assert facts["the run"]["verdict code"] == ours.verdict_code
 
 
 def test_steps_per_call_are_over_all_episodes_and_without_failed_attempts(tmp_path):
-    """61 steps by 4 calls, 15.25, is rounded up; a mean of the episodes' numbers would be 20.7."""
+    """The failed attempt does not count: 30 + 31 steps by 3 + 1 calls are 15.25, rounded up.
+
+    A mean of the two episodes' numbers would be (30 / 3 + 31 / 1) / 2 = 20.5.
+    """
     failed = record_of(0, "error", error="policy", steps=50, calls=1, executed=20)
     again = record_of(0, attempt=2, steps=30, calls=3, executed=16)
     other = record_of(1, steps=31, calls=1, executed=10)
 
-    found = facts_of_run(tmp_path, failed, again, other)
+    facts = facts_of_run(tmp_path, failed, again, other)
 
-    assert found["mine"]["control steps per call, mean"] == "15.3"
-    assert found["mine"]["actions executed per call, most"] == "16"
+    assert facts["mine"]["control steps per call, mean"] == "15.3"
+    assert facts["mine"]["actions executed per call, most"] == "16"
 
 
 UNKNOWN_UNLESS_DECLARED = ("version", "cameras", "trained on", "dtype", "python", "prompts")
@@ -91,7 +115,7 @@ FACTS_OF_A_NETWORK = InferenceFacts(
 @pytest.mark.parametrize(
     ("fields", "metadata", "expected"),
     [
-        pytest.param(
+        (
             {},
             {},
             {
@@ -100,9 +124,8 @@ FACTS_OF_A_NETWORK = InferenceFacts(
                 ),
                 "reads the simulator's state": "no",
             },
-            id="nothing is declared",
         ),
-        pytest.param(
+        (
             {
                 "needs": {"cameras": ["front"], "actions": "ee_pose", "lowers_prompt": True},
                 "inference": FACTS_OF_A_NETWORK,
@@ -120,23 +143,20 @@ FACTS_OF_A_NETWORK = InferenceFacts(
                 "libraries": "torch 2.9",
                 "python": "3.12.1",
             },
-            id="declared and reported",
         ),
         # The client's process of a server has libraries, too, but computes nothing.
-        pytest.param(
+        (
             {"inference": FACTS_OF_A_NETWORK},
             {"server": "openpi://host:8000", "dtype": "float16"},
             {"dtype": "float16", "python": NOT_REPORTED, "libraries": NOT_REPORTED},
-            id="on a server",
         ),
-        pytest.param(
+        (
             {},
             {"network": "none"},
             {"dtype": NO_NETWORK, "preprocessing": NO_NETWORK, "device": NOT_REPORTED},
-            id="no network",
         ),
         # The policy behind a planner does not speak for the planner.
-        pytest.param(
+        (
             {},
             {
                 "planner": {"model": "large"},
@@ -149,8 +169,14 @@ FACTS_OF_A_NETWORK = InferenceFacts(
                 "dtype": NOT_REPORTED,
                 "device": "a card",
             },
-            id="behind a planner",
         ),
+    ],
+    ids=[
+        "nothing is declared",
+        "declared and reported",
+        "on a server",
+        "no network",
+        "behind a planner",
     ],
 )
 def test_the_facts_of_a_policy_are_what_it_declares_and_what_its_process_reports(
@@ -201,6 +227,7 @@ def test_types_and_devices_of_a_network_are_found_wherever_the_policy_keeps_it(
 
 
 def test_of_a_policy_without_a_network_only_its_python_is_known(networks_are_modules_of_torch):
+    """The policy is an object without attributes; the fixture stands in for PyTorch."""
     found = inference_facts(object())
 
     assert (found.dtypes, found.devices) == ((), ())

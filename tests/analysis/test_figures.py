@@ -7,6 +7,7 @@ from collections import defaultdict
 from itertools import combinations
 
 import pytest
+from flat_jobs import make_result, make_results
 from msgspec.structs import replace
 from page_text import played
 from published_results import like_published
@@ -16,6 +17,7 @@ from roboirg.analysis.figures.gaps import WORDS
 from roboirg.analysis.figures.rates import Rate, RateRow, draw_rates
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.frame import make_frame
+from roboirg.records.record import Attribution
 from roboirg.runs.plan.plan import Plan
 from roboirg.stats.intervals import Interval
 
@@ -25,6 +27,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 
 PLAN = Plan(
     policies=("listener", "forgetful"),
@@ -84,23 +87,27 @@ def dot_positions(figure):
 
 
 @pytest.mark.slow
-def test_wanted_figures_are_written_byte_for_byte_the_same_from_results_in_any_order(tmp_path):
+def test_wanted_figures_are_written_in_every_format_if_they_have_something_to_show(tmp_path):
+    """The figure of contexts needs results of several lengths of the context; there are none."""
+    paths = write_figures(run_data(), tmp_path / "new" / "folder", ("gaps", "context"))
+
+    expected = {"gaps.png", "gaps.svg", "gaps.pdf", "gaps-dark.png", "gaps-dark.svg"}
+    assert {path.name for path in paths} == expected
+
+
+@pytest.mark.slow
+def test_figures_are_byte_for_byte_the_same_from_results_in_any_order(tmp_path):
     """Would find figures that change from run to run, so that a paper's cannot be made again."""
-    first = tmp_path / "a" / "b"
-    paths = write_figures(run_data(planned=PLAN.jobs()), first, ("gaps", "context", "failures"))
+    results = results_of_two_policies()
+    in_order = run_data(results, planned=PLAN.jobs())
+    reversed_order = run_data(results[::-1], planned=PLAN.jobs())
 
-    turned = run_data(results_of_two_policies()[::-1], planned=PLAN.jobs())
-    again = write_figures(turned, tmp_path / "again", ["gaps"])
+    paths = write_figures(in_order, tmp_path / "first", ["gaps"])
+    write_figures(reversed_order, tmp_path / "again", ["gaps"])
 
-    # The third, context, needs results of several context lengths; there are none.
-    assert {path.name for path in paths} == {
-        f"{name}{ending}"
-        for name in ("gaps", "failures")
-        for ending in (".png", ".svg", ".pdf", "-dark.png", "-dark.svg")
-    }
-    assert len(again) == 5
-    for path in again:
-        assert path.read_bytes() == (first / path.name).read_bytes(), path.name
+    assert len(paths) == 5, "formats"
+    for path in paths:
+        assert path.read_bytes() == (tmp_path / "again" / path.name).read_bytes(), path.name
 
 
 def test_a_link_with_the_name_of_a_figure_is_replaced_and_its_target_stays(tmp_path):
@@ -146,27 +153,24 @@ def bar_widths_by_color(panel):
     return found
 
 
-def test_each_part_of_a_bar_is_as_long_as_its_share_of_the_played_episodes(monkeypatch):
-    """Also parts too short for a number; would find one that is covered by the next.
+def test_each_part_of_a_bar_is_as_long_as_its_share_of_the_played_episodes():
+    """Of 20 episodes 10 are won; 9 failed with the wrong object, and in one it was dropped.
 
-    A bar is a setting, with 6 episodes. The forgetful policy loses all in four settings, so its
-    bars add up to 400 %; the listener loses none. Two causes of failure may share a color.
+    So the bar has parts of 45 and 5 %, and the rest is empty. The second is too short to have its
+    number in it. Would find a part that is covered by the next.
     """
-    monkeypatch.setattr(failures, "MIN_LABELED_PERCENT", 20.0)
-    colors = [
-        failures.COLORS[result.attribution.failure]
-        for result in results_of_two_policies()
-        if result.attribution is not None
-    ]
+    wrong_object = Attribution(kind="grounding", failure="wrong_object", sentence="Made up.")
+    dropped = Attribution(kind="execution", failure="dropped", sentence="Made up.")
+    results = make_results("1" * 10)
+    for episode in range(10, 19):
+        results.append(make_result("failure", episode, attribution=wrong_object))
+    results.append(make_result("failure", 19, attribution=dropped))
 
-    figure = drawn_figure("failures", run_data(planned=PLAN.jobs()))
+    figure = drawn_figure("failures", run_data(results))
 
-    listener, forgetful = (bar_widths_by_color(panel) for panel in figure.axes)
-    assert sum(listener.values()) == 0
-    assert sum(forgetful.values()) == pytest.approx(400)
-    for color in failures.COLORS.values():
-        share = 100 * colors.count(color) / 6
-        assert forgetful.get(color, 0) == pytest.approx(share), color
+    (panel,) = figure.axes
+    expected = {failures.COLORS["wrong_object"]: 45, failures.COLORS["dropped"]: 5}
+    assert bar_widths_by_color(panel) == pytest.approx(expected)
 
 
 def test_the_dots_of_a_policy_are_its_explicit_and_its_implicit_rate():
@@ -227,15 +231,20 @@ def figure_of_one_episode_next_to_the_paper():
 
 
 def test_published_rows_stand_below_a_line(figure_of_one_episode_next_to_the_paper):
-    """The line is between our only row and the heading *published*."""
+    """The rows of a panel are our only policy, a heading, and the five policies of the paper.
+
+    Between the first two is the only line that goes across the whole panel, from 0 to 1. Places of
+    rows and lines are counted from the top down.
+    """
     panel = figure_of_one_episode_next_to_the_paper.axes[0]
 
     labels = [text_without_line_breaks(label) for label in panel.get_yticklabels()]
-    (line,) = (line for line in panel.lines if [*line.get_xdata()] == [0, 1])
-    own, heading = panel.get_yticks()[:2]
-    assert labels[1] == "published, n = 50 × 3"
-    assert len(labels) == 2 + 5, "and five policies of the paper"
-    assert own < line.get_ydata()[0] < heading
+    (line,) = [line for line in panel.lines if [*line.get_xdata()] == [0, 1]]
+
+    assert labels[:2] == ["MemER, n = 1 ≠", "published, n = 50 × 3"]
+    assert len(labels) == 7
+    place_of_ours, place_of_heading, *_ = panel.get_yticks()
+    assert place_of_ours < line.get_ydata()[0] < place_of_heading
 
 
 def test_own_rates_that_cannot_be_compared_with_the_papers_have_a_sign(
@@ -251,6 +260,7 @@ def test_own_rates_that_cannot_be_compared_with_the_papers_have_a_sign(
 
 
 def test_a_figure_without_published_rates_does_not_mention_them():
+    """Results with the rates of the paper's MemER in one task are drawn alone."""
     found = [result for result in like_published("main", "MemER") if result.task == "PickXtimes"]
 
     figure = drawn_figure("gaps", run_data(found))
@@ -259,58 +269,69 @@ def test_a_figure_without_published_rates_does_not_mention_them():
 
 
 def test_rates_of_each_context_length_are_drawn_from_those_of_the_shortest():
-    """A context has up to five stages; the shortest, (1, 5), has the rate 29.11 in the paper.
+    """A row has two dots: the rate with the shortest context, stages 1 and 5, and the panel's.
 
-    Our results have the same rate without rounding: 131 of 450 trials are 29.111….
+    In the paper the policy FrameS-Modul has 29.11 % with stages 1 and 5, 30.22 % with 1, 2, 5 and
+    26.45 % with 1, 2, 3, 5. Results with as many wins as in the paper, 131 and 136 of 450 trials,
+    have a row of their own (≠), whose rates are not rounded.
     """
-    figure = drawn_figure("context", run_data(like_published("context")), published=True)
+    results = like_published("context")
 
-    shown = dot_positions(figure)
-    assert {title for title, _ in shown} == {"stages 1,2,5", "stages 1,2,3,5", "stages 1,2,3,4,5"}
-    assert shown["stages 1,2,5", "FrameS-Modul"] == pytest.approx([29.11, 30.22])
-    assert shown["stages 1,2,5", "FrameS-Modul, n = 50 × 3 ≠"] == pytest.approx(
-        [29.1111, 30.2222], abs=1e-4
-    )
-    assert shown["stages 1,2,3,5", "FrameS-Modul"] == pytest.approx([29.11, 26.45])
+    dots = dot_positions(drawn_figure("context", run_data(results), published=True))
+
+    assert {title for title, _ in dots} == {"stages 1,2,5", "stages 1,2,3,5", "stages 1,2,3,4,5"}
+    assert dots["stages 1,2,5", "FrameS-Modul"] == pytest.approx([29.11, 30.22])
+    assert dots["stages 1,2,3,5", "FrameS-Modul"] == pytest.approx([29.11, 26.45])
+    ours = dots["stages 1,2,5", "FrameS-Modul, n = 50 × 3 ≠"]
+    assert ours == pytest.approx([100 * 131 / 450, 100 * 136 / 450])
 
 
 def test_there_is_no_figure_of_the_shortest_context_alone():
+    """The figure shows how success changes with more stages of context than 1 and 5."""
     found = like_published("context")
     shortest = [result for result in found if result.options.stages == (1, 5)]
     assert draw_figure("context", run_data(shortest)) is None
 
 
-POLICIES_WITH_LONG_NAMES = (
-    "my_package.policies:NetWithAVeryLongName, frames of the video none",
-    "a" * 90,
-    "b",
-    "pickxtimes-recurrent-seed1",
-    "c",
-)
+def results_under_long_names(results, policy):
+    """Return the results of a policy again and again, under long and short names of policies."""
+    names = ("my.policies:NetWithAVeryLongName, frames of the video none", "a" * 90, "b")
+    own = [result for result in results if result.policy == policy]
+    found = []
+    for name in names:
+        found += [replace(result, policy=name) for result in own]
+    return found
 
 
-@pytest.mark.parametrize(("name", "count"), [("gaps", 5), ("context", 1), ("failures", 5)])
-def test_no_text_leaves_the_figure_or_lies_on_another(name, count):
-    """With long names of policies; two texts may touch by a pixel."""
-    found = like_published("context") if name == "context" else results_of_two_policies()
-    played = [result for result in found if result.policy in ("forgetful", "MemER")]
-    many = []
-    for policy in POLICIES_WITH_LONG_NAMES[:count]:
-        many += [replace(result, policy=policy) for result in played]
+def pixels_of_overlap(box, other):
+    """Return by how many pixels two boxes would have to move apart; below 0 they are apart."""
+    across = min(box.x1, other.x1) - max(box.x0, other.x0)
+    down = min(box.y1, other.y1) - max(box.y0, other.y0)
+    return min(across, down)
 
-    figure = drawn_figure(name, run_data(many), published=True)
 
-    texts = drawn_texts(figure)
-    assert any("NetWithA" in "".join(text.get_text().split()) for text in texts)
-    boxes = {text: text.get_window_extent() for text in texts}
-    edge = figure.bbox
+@pytest.mark.parametrize("name", ["gaps", "failures", "context"])
+def test_no_text_leaves_the_figure_or_lies_on_another(name):
+    """Each figure shows three policies, one with a long name and one with a name of 90 letters.
+
+    They are folded, so that there is room for all texts: two of them may touch by a pixel. The
+    figure of contexts has the results of the paper's MemER, the others those of the forgetful
+    policy.
+    """
+    if name == "context":
+        results = results_under_long_names(like_published("context"), "MemER")
+    else:
+        results = results_under_long_names(results_of_two_policies(), "forgetful")
+
+    figure = drawn_figure(name, run_data(results), published=True)
+
+    boxes = {text: text.get_window_extent() for text in drawn_texts(figure)}
+    assert any("VeryLong" in text.get_text() for text in boxes)
     for text, box in boxes.items():
-        assert edge.x0 <= box.x0 < box.x1 <= edge.x1, text
-        assert edge.y0 <= box.y0 < box.y1 <= edge.y1, text
+        with_text = Bbox.union([figure.bbox, box])  # larger if the text leaves the figure
+        assert with_text.extents.tolist() == figure.bbox.extents.tolist(), text
     for (text, box), (other, other_box) in combinations(boxes.items(), 2):
-        across = min(box.x1, other_box.x1) - max(box.x0, other_box.x0)
-        down = min(box.y1, other_box.y1) - max(box.y0, other_box.y0)
-        assert min(across, down) <= 1, (text, other)
+        assert pixels_of_overlap(box, other_box) <= 1, (text, other)
 
 
 @pytest.mark.parametrize(

@@ -59,17 +59,27 @@ def test_each_column_of_the_results_has_the_type_it_declares(run_with_wins_losse
 def test_the_results_have_a_row_for_each_played_episode_and_values_where_they_apply(
     run_with_wins_losses_and_errors,
 ):
-    """Three episodes of two tasks were played in five settings, but StopCube has no spatial one.
+    """In each task and setting the run has a success, a failure, and an error (episodes 0 to 2).
 
-    The fourth episode of each is planned and has no row.
+    PickXtimes was played in five settings, StopCube in four, as it has no spatial one. The fourth
+    episode of each is planned and has no row. An error has no success, true or false, but its kind;
+    only the setting *reasoning* has a pattern of reasoning.
     """
     found = roboirg.results(run_with_wins_losses_and_errors)
 
     is_error = found["outcome"] == "error"
-    assert len(found) == 2 * 5 * 3 - 3
+    assert len(found) == (5 + 4) * 3
     assert (found["success"].isna() == is_error).all()
     assert (found["error"].notna() == is_error).all()
     assert (found["pattern"].notna() == (found["setting"] == "reasoning")).all()
+
+
+def test_the_results_say_of_what_suite_a_task_is_and_that_the_oracle_is_privileged(
+    run_with_wins_losses_and_errors,
+):
+    """The run has the policy *oracle*, which reads the simulator, and two tasks of counting."""
+    found = roboirg.results(run_with_wins_losses_and_errors)
+
     assert found["privileged"].all()
     assert set(found["suite"]) == {"counting"}
 
@@ -89,15 +99,18 @@ def test_the_column_words_counts_the_words_of_all_turns_of_an_instruction(
 
 
 def test_policies_are_named_without_version_and_ordered_as_planned():
-    """Two policies with a version each need none in their names; would find it added anyway.
+    """Policies a and b played in one version each, b first. `names` has what tables call them.
 
-    Without a plan they are in alphabetical order.
+    Only a policy with several versions needs them in its name. Without a plan, the names are in
+    alphabetical order, or in `names_as_played` as the results come.
     """
-    played = [make_result(policy=name, policy_version=name) for name in ("b", "a")]
-    planned = [result.identity for result in played]
+    played = [
+        make_result(policy="b", policy_version="version 7"),
+        make_result(policy="a", policy_version="version 8"),
+    ]
 
     without_plan = frame_of(played)
-    with_plan = frame_of(played, planned=planned)
+    with_plan = frame_of(played, planned=[result.identity for result in played])
 
     assert list(without_plan.names.values()) == ["a", "b"]
     assert list(without_plan.names_as_played.values()) == ["b", "a"]
@@ -137,21 +150,24 @@ def test_a_planned_episode_without_result_is_missing_for_the_first_version_that_
 
 
 def test_results_in_two_runs_in_any_order_are_the_same_table_as_one_run_in_order():
-    """Two runs of one plan complete each other; the episode that neither played is missing."""
-    in_order = [
-        *make_results("10!1"),
-        *make_results("0011", "direct"),
-        *make_results("11", task="BinFill"),
-    ]
-    planned = [result.identity for result in [*in_order, make_result(episode=9)]]
+    """A letter is an episode: 1 won, 0 lost, ! an error. One run played the whole plan in order.
 
-    whole = make_frame([("whole", in_order)], planned)
-    parts = make_frame([("a", in_order[:2:-1]), ("b", in_order[2::-1])], planned)
+    Or run a played direct, and run b explicit, both backwards: the two complete each other. Episode
+    9 is planned in explicit, too; nobody played it. Explicit comes first in both tables.
+    """
+    explicit = make_results("10!1", "explicit")
+    direct = make_results("0011", "direct")
+    unplayed = make_result(episode=9)
+    planned = [result.identity for result in [*explicit, *direct, unplayed]]
+
+    whole = make_frame([("whole", [*explicit, *direct])], planned)
+    parts = make_frame([("a", direct[::-1]), ("b", explicit[::-1])], planned)
 
     for name in ("run", "outcome", "options", "task", "episode"):
         assert list(parts[name]) == list(whole[name]), name
-    assert repr(cells_of(parts)) == repr(cells_of(whole))
-    assert sum(cell.missing for cell in cells_of(parts).values()) == 1
+    counts = [cell.counts for cell in cells_of(parts).values()]
+    assert counts == [cell.counts for cell in cells_of(whole).values()]
+    assert [cell.missing for cell in counts] == [1, 0]
 
 
 def test_an_episode_played_in_two_runs_counts_in_each_under_a_name_of_its_own():
@@ -188,13 +204,16 @@ def test_added_columns_tell_equal_values_of_different_types_apart():
 
 
 def test_a_planned_policy_without_a_result_has_a_row_with_its_missing_episode():
-    """The plan has one episode of the policy *late*, and nothing was played."""
-    frame = make_frame([], [make_result(policy="late").identity], run_name="mine")
+    """The plan of the run *mine* has one episode of the policy *late*, and nothing was played.
 
-    ((key, cell),) = cells_of(frame).items()
+    So the versions of the policy and of all else (`Versions()`) are not known yet.
+    """
+    planned = make_result(policy="late").identity
 
-    policy, _, versions, run_name = key.policy_run[:4]
-    assert (policy, versions, run_name) == ("late", Versions(), "mine")
+    ((key, cell),) = cells_of(make_frame([], [planned], run_name="mine")).items()
+
+    late = key.policy_run
+    assert (late.policy, late.versions, late.run) == ("late", Versions(), "mine")
     assert cell.missing == 1
 
 

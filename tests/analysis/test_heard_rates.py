@@ -65,7 +65,10 @@ def test_a_table_has_rates_over_prompts_that_were_read_whole_next_to_rates_over_
 
 
 def test_a_note_below_the_table_of_a_policy_says_how_many_of_its_prompts_were_cut():
-    """3 to 4 of the listener's 8; the table of the other policy has no such note."""
+    """Of the listener's 8 prompts 3 were cut, and of one it is not known: 3 to 4, 38 to 50 %.
+
+    The table of the other policy, of whose only prompt it is not known, has no such note.
+    """
     listener, other = make_run_tables(frame_of(results_with_cut_and_unknown_prompts()))
 
     note = (
@@ -101,18 +104,28 @@ def run_with_three_prompt_limits(tmp_path):
     return store(tmp_path, records).folder
 
 
+def opened_episode_of(page, policy):
+    """Choose a policy in the page's filters, open its only episode, and return its element."""
+    page.select_option("#filters [name=policy]", policy)
+    page.locator("#rows h3 button").first.click()
+    return page.locator("#rows > li").first
+
+
 @pytest.mark.browser
 @pytest.mark.parametrize("policy", ["whole", "silent"])
 def test_the_page_strikes_out_nothing_of_a_prompt_that_was_read_whole_or_is_not_known(
     open_page, run_with_three_prompt_limits, policy
 ):
+    """*whole* reads up to 1,000 tokens, more than the instruction has; *silent* does not say.
+
+    What a model did not read would be struck out (`del`), with a line that it was cut.
+    """
     call("report", run_with_three_prompt_limits)
 
     with open_page((run_with_three_prompt_limits / "report.html").as_uri()) as page:
-        page.select_option("#filters [name=policy]", policy)
-        page.locator("#rows h3 button").first.click()
-        struck = page.locator("#rows .turns del").all_inner_texts()
-        shown = page.locator("#rows > li").first.inner_text()
+        episode = opened_episode_of(page, policy)
+        struck = episode.locator(".turns del").all_inner_texts()
+        shown = episode.inner_text()
 
     assert struck == []
     assert "cut: needs" not in shown
@@ -122,38 +135,40 @@ def test_the_page_strikes_out_nothing_of_a_prompt_that_was_read_whole_or_is_not_
 def test_the_page_strikes_out_the_words_that_the_model_did_not_read(
     open_page, run_with_three_prompt_limits
 ):
-    """The record of the cut prompt has, of each turn, how many characters were reached."""
-    record = long_record("cutting", 64)
+    """The policy *cutting* reads only the first 64 tokens of an instruction of several turns.
+
+    Its record says how many characters of each turn were read: what follows is struck out (`del`).
+    The page also warns at its top, and says at the episode what was cut.
+    """
+    record = long_record("cutting", tokens=64)
     unread = ""
-    for turn, end in zip(record.instruction, record.prompt.reached, strict=True):
-        unread += turn.text[end:].replace(" ", "")
+    for turn, characters_read in zip(record.instruction, record.prompt.reached, strict=True):
+        unread += turn.text[characters_read:]
     call("report", run_with_three_prompt_limits)
 
     with open_page((run_with_three_prompt_limits / "report.html").as_uri()) as page:
         warnings = " ".join(page.locator(".warning").all_inner_texts())
-        page.select_option("#filters [name=policy]", "cutting")
-        page.locator("#rows h3 button").first.click()
-        struck = "".join(page.locator("#rows .turns del").all_inner_texts())
-        shown = page.locator("#rows > li").first.inner_text()
+        episode = opened_episode_of(page, "cutting")
+        struck = "".join(episode.locator(".turns del").all_inner_texts())
+        shown = episode.inner_text()
 
     assert "cutting did not read every instruction to its end" in warnings
-    assert struck.replace(" ", "") == unread
+    assert struck.replace(" ", "") == unread.replace(" ", "") != ""
     assert re.search(r"cut: needs .* the model reads 64 .* mentions lost", shown)
 
 
 @pytest.mark.parametrize("guessed", [True, False])
 def test_a_note_counts_the_episodes_in_which_a_policy_had_to_guess_what_was_meant(guessed):
-    """One of four, or none; a fifth is still to be played.
+    """Of five planned episodes three (0 to 2) are won, number 3 is lost, and 4 is still to play.
 
+    In episode 3 the policy guessed a goal or did not: one of the four that were played, or none.
     Would find a guess that passes for an understood instruction.
     """
-    known = make_results("111")
-    last = make_result("failure", 3, guessed=guessed)
+    won = make_results("111")
+    last = make_result("failure", episode=3, guessed=guessed)
+    unplayed = make_result(episode=4).identity
 
-    explicit = InstructionOptions("explicit")
-    unplayed = Job(policy="listener", task="PickXtimes", split="test", episode=4, options=explicit)
-
-    (table,) = make_run_tables(frame_of([*known, last], planned=[unplayed]))
+    (table,) = make_run_tables(frame_of([*won, last], planned=[unplayed]))
 
     words = "guessed a goal in 1 of 4 episodes, whose words have no meaning for it."
     assert (words in " ".join(table.notes)) == guessed

@@ -103,6 +103,7 @@ def test_a_difference_within_a_policy_is_named(fields, sentence):
     ids=["version", "frames of the video"],
 )
 def test_two_policies_may_have_a_version_each(fields):
+    """Only versions or frames of one policy would be a mixture."""
     listener = results_of("listener")
     other = results_of("other", **fields)
 
@@ -110,6 +111,7 @@ def test_two_policies_may_have_a_version_each(fields):
 
 
 def test_runs_of_one_policy_with_other_step_limits_have_a_row_each():
+    """The usual limit is 1300 control steps; the second run has 9. Would find a mean of both."""
     frame = make_frame([("a", results_of("listener")), ("b", results_of("listener", max_steps=9))])
 
     table = make_table("main", RunData(frame))
@@ -136,6 +138,7 @@ def test_runs_with_other_splits_words_limits_or_meshes_are_not_compared(fields, 
     ids=["render device", "version"],
 )
 def test_runs_on_other_devices_or_of_other_policy_versions_are_compared(fields):
+    """A device draws nearly the same pictures, and two versions are what one wants to compare."""
     listener = frame_of(results_of("listener"))
     other = frame_of(results_of("other", **fields))
 
@@ -172,6 +175,7 @@ def test_results_of_one_task_in_other_words_are_not_compared():
 
 
 def test_results_of_one_task_in_other_words_are_pooled_in_a_table():
+    """They are one policy with one name, to which a note is added; only a comparison is refused."""
     old = make_result(words="PickXtimes/test@0a")
     new = make_result(words="PickXtimes/test@1b", episode=1)
 
@@ -188,6 +192,7 @@ def test_words_are_mixed_only_if_they_are_of_the_same_task_and_setting():
 
 
 def test_two_digests_of_the_words_of_a_setting_are_mixed():
+    """3d and 4e are digests of the words of the setting *lab*, of two states of its package."""
     first = make_result(words="PickXtimes/test/lab@3d", setting="lab")
     second = make_result(words="PickXtimes/test/lab@4e")
 
@@ -197,6 +202,7 @@ def test_two_digests_of_the_words_of_a_setting_are_mixed():
 
 
 def test_words_of_a_file_are_reported_once_although_their_digest_differs_too():
+    """The second result has the words of a file (mine@0a), the reason for its other digest."""
     first = make_result(words="PickXtimes/test@0a")
     other_words = make_result(words="PickXtimes/test@1b", wordings="mine@0a")
 

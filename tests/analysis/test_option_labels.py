@@ -24,6 +24,7 @@ def test_a_label_names_the_options_that_are_not_the_defaults(options, label):
 
 
 def test_options_are_sorted_by_setting_as_declared_with_unknown_settings_last():
+    """No setting is called zeta or alpha; these two come in alphabetical order."""
     names = ["zeta", *reversed(setting_names()), "alpha"]
 
     ordered = sorted([InstructionOptions(name) for name in names], key=options_sort_key)

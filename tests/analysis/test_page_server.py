@@ -48,9 +48,9 @@ def server(run_with_a_film_and_a_link):
         thread.join()
 
 
-def response_and_body(server, path, method="GET", **headers):
-    """Request a path of the server, and return its answer and the content of that."""
-    connection = http.client.HTTPConnection("127.0.0.1", server.port)
+def response_and_body(port, path, method="GET", **headers):
+    """Request a path of the server at a port, and return its answer and the content of that."""
+    connection = http.client.HTTPConnection("127.0.0.1", port)
     connection.request(method, path, headers=headers)
     response = connection.getresponse()
     body = response.read()
@@ -60,8 +60,8 @@ def response_and_body(server, path, method="GET", **headers):
 
 def test_a_video_is_served_whole_or_in_parts(server):
     """A browser asks for a range of bytes to seek; status 206 is a part."""
-    whole, whole_body = response_and_body(server, "/videos/a%20b.mp4")
-    part, part_body = response_and_body(server, "/videos/a%20b.mp4", Range="bytes=100-")
+    whole, whole_body = response_and_body(server.port, "/videos/a%20b.mp4")
+    part, part_body = response_and_body(server.port, "/videos/a%20b.mp4", Range="bytes=100-")
 
     assert (whole.status, whole_body) == (200, FILM_BYTES)
     assert whole.headers["Accept-Ranges"] == "bytes"
@@ -71,7 +71,7 @@ def test_a_video_is_served_whole_or_in_parts(server):
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE"])
 def test_a_request_that_would_write_is_refused(server, method):
-    response, _ = response_and_body(server, "/", method)
+    response, _ = response_and_body(server.port, "/", method)
 
     assert response.status == http.client.METHOD_NOT_ALLOWED
 
@@ -98,26 +98,21 @@ def test_no_path_or_link_leads_out_of_the_folder_that_is_served(server, path):
 def test_report_serve_prints_its_address_serves_the_page_and_ends_with_ctrl_c(
     run_with_a_film_and_a_link, wait_s
 ):
+    """The command is started as a process; the address that it prints is opened.
+
+    Ctrl-C (SIGINT) ends it with exit code 0.
+    """
     pytest.importorskip("jinja2")
-    command = [
-        sys.executable,
-        "-m",
-        "roboirg",
-        "report",
-        str(run_with_a_film_and_a_link),
-        "--serve",
-    ]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
-    ) as process:  # fmt: skip
-        line = process.stdout.readline()
-        found = re.match(r"http://127\.0\.0\.1:(\d+)/report.html ", line)
-        assert found is not None, line
-        connection = http.client.HTTPConnection("127.0.0.1", int(found[1]))
-        connection.request("GET", "/report.html")
-        text = connection.getresponse().read().decode()
-        connection.close()
-        assert "<title>run – RoboIRGBench</title>" in text
+    folder = str(run_with_a_film_and_a_link)
+    command = [sys.executable, "-m", "roboirg", "report", folder, "--serve"]
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}  # so that the address comes at once
+
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        printed = process.stdout.readline()
+        port = re.match(r"http://127\.0\.0\.1:(\d+)/report.html ", printed)[1]
+        _, page = response_and_body(int(port), "/report.html")
         process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=wait_s) == 0
+        exit_code = process.wait(timeout=wait_s)
+
+    assert "<title>run – RoboIRGBench</title>" in page.decode()
+    assert exit_code == 0

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+from collections import namedtuple
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 from flat_jobs import frame_of, make_result, make_results
@@ -36,36 +36,23 @@ from roboirg.stats.rates import points, whole_percent
 
 TASKS = ("PickXtimes", "BinFill")
 
-
-class ResultConditions(NamedTuple):
-    """What no rate is over two of, unless it is asked for."""
-
-    policy: str
-    policy_version: str
-    setting: str
-    form: str
-    delivery: str
-    arm: str
-    wordings: str | None
-    split: str
-    max_steps: int
-    language_version: str
-    environment_version: int
-
-
-ANY_CONDITIONS = st.builds(
-    ResultConditions,
-    policy=st.sampled_from(["one", "other"]),
-    policy_version=st.sampled_from(["a", "b"]),
-    setting=st.sampled_from(["explicit", "direct"]),
-    form=st.sampled_from(["implicit", "resolved"]),
-    delivery=st.sampled_from(["prompt", "turns"]),
-    arm=st.sampled_from(["told", "silent", "silent-empty", "scrambled"]),
-    wordings=st.sampled_from([None, "test"]),
-    split=st.sampled_from(["test", "val"]),
-    max_steps=st.sampled_from([40, 1300]),
-    language_version=st.sampled_from(["1", "2"]),
-    environment_version=st.sampled_from([1, 2]),
+CHOICES = {
+    "policy": ("one", "other"),
+    "policy_version": ("a", "b"),
+    "setting": ("explicit", "direct"),
+    "form": ("implicit", "resolved"),
+    "delivery": ("prompt", "turns"),
+    "arm": ("told", "silent", "silent-empty", "scrambled"),
+    "wordings": (None, "test"),
+    "split": ("test", "val"),
+    "max_steps": (40, 1300),
+    "language_version": ("1", "2"),
+    "environment_version": (1, 2),
+}
+"""Values of what no rate is over two of, unless it is asked for."""
+ResultConditions = namedtuple("ResultConditions", CHOICES)
+ANY_CONDITIONS = st.fixed_dictionaries(
+    {name: st.sampled_from(values) for name, values in CHOICES.items()}
 )
 USUAL_CONDITIONS = ResultConditions(
     "one", "a", "direct", "implicit", "prompt", "told", None, "test", 40, "1", 1
@@ -82,8 +69,8 @@ def conditions_that_nearly_agree(draw):
         draw(st.sampled_from([USUAL_CONDITIONS, USUAL_CONDITIONS._replace(setting="explicit")]))
     ]
     for other in draw(st.lists(ANY_CONDITIONS, min_size=1, max_size=5)):
-        changed = draw(st.lists(st.sampled_from(ResultConditions._fields), min_size=1, max_size=2))
-        found.append(found[-1]._replace(**{name: getattr(other, name) for name in changed}))
+        changed = draw(st.lists(st.sampled_from(list(CHOICES)), min_size=1, max_size=2))
+        found.append(found[-1]._replace(**{name: other[name] for name in changed}))
     return list(dict.fromkeys(found))
 
 
@@ -130,33 +117,74 @@ def results_of(data):
     return results
 
 
-@settings(max_examples=60, deadline=None)
-@given(conditions_that_nearly_agree(), st.data())
-def test_no_printed_rate_mixes_episodes_of_different_conditions(conditions, data):
-    """Conditions are policy, words, split, step limit and the like.
-
-    Episodes of the same conditions all end alike here: every honest rate is 0 or 100 %, and one
-    that mixes two conditions is in between.
-    """
+@st.composite
+def results_that_end_alike_under_the_same_conditions(draw):
+    """Draw results by their conditions: of each at least one, and all are won or all are lost."""
     places = st.lists(st.tuples(st.sampled_from(TASKS), st.integers(0, 2)), min_size=1, unique=True)
-    results = []
-    for condition in conditions:
+    found = {}
+    for condition in draw(conditions_that_nearly_agree()):
         fields = condition._asdict()
-        fields["prompt_verdict"] = data.draw(st.sampled_from(["heard", "cut"]))
-        outcome = data.draw(st.sampled_from(["success", "failure"]))
-        for task, episode in data.draw(places):
-            results.append(make_result(outcome, episode, task=task, **fields))
-    frame = frame_of(results)
+        fields["prompt_verdict"] = draw(st.sampled_from(["heard", "cut"]))
+        outcome = draw(st.sampled_from(["success", "failure"]))
+        found[condition] = [
+            make_result(outcome, episode, task=task, **fields) for task, episode in draw(places)
+        ]
+    return found
 
-    assert {abs(rate) for rate in all_rates_of(frame)} <= {0, 100}
 
-    with_instruction = [condition for condition in conditions if condition.arm == "told"]
-    rates = results_of(RunData(frame)).rates()
-    assert len(rates) == len(with_instruction or conditions), "none hides another one"
+@settings(max_examples=60, deadline=None)
+@given(results_that_end_alike_under_the_same_conditions())
+def test_no_printed_rate_mixes_episodes_of_different_conditions(results_by_conditions):
+    """Conditions are policy, setting, split, step limit and the like.
 
-    by = data.draw(st.lists(st.sampled_from([*KEPT_APART, "setting"]), unique=True))
-    with contextlib.suppress(InvalidValueError):  # refused
-        assert {row.rate for row in roboirg.measure(frame, by)} <= {0, 1}
+    All drawn results of the same conditions are won, or all are lost. So a rate of one condition is
+    0 or 100 %, a gap of two is 0 or 100 points, and a number in between has mixed two conditions.
+    """
+    frame = frame_of(*results_by_conditions.values())
+
+    rates = [abs(rate) for rate in all_rates_of(frame)]
+
+    assert set(rates) <= {0, 100}
+
+
+@settings(max_examples=30, deadline=None)
+@given(results_that_end_alike_under_the_same_conditions())
+def test_python_gives_the_results_of_each_condition_a_rate_of_their_own(results_by_conditions):
+    """`Results.rates()` maps labels to rates; two conditions with one label would be one rate.
+
+    Results without the instruction (other arms than *told*) are left out if there are any with it.
+    """
+    told = [conditions for conditions in results_by_conditions if conditions.arm == "told"]
+    expected = told or results_by_conditions
+
+    rates = results_of(RunData(frame_of(*results_by_conditions.values()))).rates()
+
+    assert len(rates) == len(expected)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    results_that_end_alike_under_the_same_conditions(),
+    st.lists(st.sampled_from([*KEPT_APART, "setting"]), unique=True),
+)
+def test_measure_refuses_to_mix_conditions_that_the_columns_do_not_keep_apart(
+    results_by_conditions, some_columns
+):
+    """All drawn results of the same conditions are won, or all are lost.
+
+    `KEPT_APART` names all columns that tell conditions apart: a group by them is of one condition,
+    with a rate of 0 or 1. By some of them alone it is the same, or the call is refused.
+    """
+    frame = frame_of(*results_by_conditions.values())
+
+    apart = roboirg.measure(frame, [*KEPT_APART, "setting"])
+    try:
+        by_some_columns = roboirg.measure(frame, some_columns)
+    except InvalidValueError:
+        by_some_columns = ()
+
+    assert len(apart) == len(results_by_conditions)
+    assert {row.rate for row in [*apart, *by_some_columns]} <= {0, 1}
 
 
 def test_the_rate_over_tasks_is_the_same_in_the_terminal_on_the_page_and_in_python():
@@ -181,54 +209,81 @@ def intervals_of(measured):
             yield from (gap.interval, gap.retention_interval)
 
 
-@pytest.mark.parametrize("wins", ["1" * 20, "0" * 20, "1", "0"])
-def test_no_printed_interval_has_a_width_of_zero(wins):
-    """All episodes end alike, in three settings. Would find a rate that looks certain.
+def all_intervals_of(outcomes):
+    """Return every interval that is measured of episodes with the same outcomes in three settings.
 
-    From too few episodes there is no interval.
+    They are those of rates, gaps, control arms, breakdowns, kinds of failure, and the headline.
+
+    Args:
+        outcomes: a letter for each episode, 1 if it is won and 0 if it is lost.
     """
     frame = frame_of(
-        make_results(wins), make_results(wins, "direct"), make_results(wins, "reasoning"),
-        make_results(wins, arm="silent"),
-    )  # fmt: skip
+        make_results(outcomes, "explicit"),
+        make_results(outcomes, "direct"),
+        make_results(outcomes, "reasoning"),
+        make_results(outcomes, arm="silent"),
+    )
     data = RunData(frame)
-
     measured = [*data.summaries.values(), *arm_figures(frame)]
     measured += break_down(frame, BREAKDOWNS["difficulty"])
     for ends in measure_ends(data, {ALL_TASKS}).values():
         measured += ends
-    found = []
+    _, told_run = frame.names  # after that of the arm silent
+    found = [measure_headline(data.cells, told_run, ("direct", "reasoning")).interval]
     for row in measured:
         found += intervals_of(row)
-    _, told = frame.names  # after that of the arm silent
-    found.append(measure_headline(data.cells, told, ("direct", "reasoning")).interval)
+    return [interval for interval in found if interval is not None]
 
-    intervals = [interval for interval in found if interval is not None]
-    assert bool(intervals) == (len(wins) == 20)
+
+@pytest.mark.parametrize("outcomes", ["1" * 20, "0" * 20], ids=["all won", "all lost"])
+def test_no_interval_has_a_width_of_zero_although_all_episodes_end_alike(outcomes):
+    """20 episodes are played in each of three settings and without instruction.
+
+    Would find a rate of 0 or 100 % that looks certain: the next episode may end otherwise.
+    """
+    intervals = all_intervals_of(outcomes)
+
+    assert intervals
     for low, high in intervals:
         assert low < high
 
 
+@pytest.mark.parametrize("outcomes", ["1", "0"], ids=["won", "lost"])
+def test_a_single_episode_gives_no_interval(outcomes):
+    """In each setting one episode of one task is played; an interval takes at least two."""
+    assert all_intervals_of(outcomes) == []
+
+
+def gap_and_interval(row):
+    """Return two entries of a row of a breakdown: episodes, success, gap, 95 % interval, p."""
+    _, _, gap, interval, _ = row.entries
+    return gap.text, interval.text
+
+
 @pytest.mark.parametrize(
-    ("wins", "ends"),
-    [
-        ("1", "too few episodes"),
-        ("1" * 20, "−100.0 to −66.4"),
-    ],
+    ("explicit", "direct", "interval"),
+    [("1", "0", "too few episodes"), ("1" * 20, "0" * 20, "−100.0 to −66.4")],
     ids=["one episode", "20 episodes"],
 )
-def test_a_gap_in_a_breakdown_has_an_interval_or_the_reason_why_there_is_none(wins, ends):
-    """All explicit episodes are won, all direct ones lost: a gap of −100 points."""
-    direct = make_results(wins.replace("1", "0"), "direct")
+def test_a_gap_in_a_breakdown_has_an_interval_or_the_reason_why_there_is_none(
+    explicit, direct, interval
+):
+    """All explicit episodes are won (1), and the same ones lost (0) in direct: −100 points.
 
-    table = make_breakdown_table(BREAKDOWNS["difficulty"], frame_of(make_results(wins), direct))
+    −66.4 is the end of the score interval for 20 pairs that differ to the same side; Wilson's
+    formula, 1 − 2 · 1.96² / (20 + 1.96²) = 67.8 %, is near it, without a correction for skewness.
+    """
+    frame = frame_of(make_results(explicit, "explicit"), make_results(direct, "direct"))
 
-    explicit, of_direct = table.rows
-    assert [entry.text for entry in explicit.entries[2:4]] == ["–", "–"]
-    assert [entry.text for entry in of_direct.entries[2:4]] == ["−100.0", ends]
+    table = make_breakdown_table(BREAKDOWNS["difficulty"], frame)
+
+    row_of_explicit, row_of_direct = table.rows
+    assert gap_and_interval(row_of_explicit) == ("–", "–")
+    assert gap_and_interval(row_of_direct) == ("−100.0", interval)
 
 
 def test_the_note_of_a_cell_says_if_there_are_too_few_episodes_for_an_interval():
+    """One episode was played, and won (1). The note is that of the mean over all tasks."""
     data = RunData(frame_of(make_results("1")))
 
     (whole,) = (summary for key, summary in data.summaries.items() if key.scope == ALL_TASKS)
@@ -265,6 +320,7 @@ def test_a_gap_that_rounds_to_zero_has_no_sign_of_its_own():
 
 
 def test_what_several_seeds_played_is_counted_in_trials_below_the_terminals_table():
+    """One episode was played with policy seeds 0 and 1: two trials of one cell."""
     results = [make_result(policy_seed=seed) for seed in (0, 1)]
 
     (table,) = make_run_tables(frame_of(results))

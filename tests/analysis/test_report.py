@@ -78,6 +78,7 @@ def written_film(folder, name="x"):
 
 
 def test_the_page_loads_nothing_from_elsewhere():
+    """It has no address of the web, imports no style, and forbids the browser to load anything."""
     text = render(records_with_an_error_last(), PLAN_OF_ONE_TASK)
 
     assert not re.search(r"https?:|@import|url\(", text)
@@ -101,35 +102,42 @@ def test_the_page_does_not_depend_on_the_order_of_the_records():
 
 
 def test_an_episode_shows_its_instruction_with_references_spelled_out():
-    """This *resolved* form is made anew if it was not played.
+    """The *resolved* form of an instruction spells out each reference of the *implicit* one, such
+    as *it*. A page of implicit episodes alone makes it anew.
 
-    Would find the words of another goal of the same scene.
+    Records of both forms are at hand here, so the page must show the texts of the resolved ones. In
+    the arm "other-goal", a policy hears of another goal in the same scene; would find its words.
     """
     plan = PLAN_OF_ONE_TASK.model_copy(update={"forms": PLAN.forms, "arms": ("told", "other-goal")})
-    implicit = []
-    resolved_texts = []
-    for record in played(plan):
-        if record.form == "resolved":
-            resolved_texts.append(" ".join(turn.text for turn in record.instruction))
-        elif record.setting != "explicit":
-            implicit.append(record)
+    records = [record for record in played(plan) if record.setting != "explicit"]
+    implicit = [record for record in records if record.form == "implicit"]
+    resolved = [record for record in records if record.form == "resolved"]
 
     page = Page(render(implicit))
 
     shown = [page.string(detail["resolved"]) for detail in page.details]
-    assert sorted(shown) == sorted(resolved_texts)
+    texts = [" ".join(turn.text for turn in record.instruction) for record in resolved]
+    assert sorted(shown) == sorted(texts)
 
 
-def test_an_episode_shows_where_in_its_instruction_mentions_stand():
-    """A mention is a span of an utterance, such as [0, 5, 7] for *it* in "Grab it."."""
-    records = {record.slug.rpartition("-")[2]: record for record in played(PLAN_OF_ONE_TASK)}
+@pytest.mark.parametrize(
+    ("setting", "mentions"),
+    [("direct", ["green", "it", "three times"]), ("contextual", ["green", "it", "three times"])],
+)
+def test_an_episode_shows_where_in_its_instruction_mentions_stand(setting, mentions):
+    """Episode 0 begins with "... how you handle the green cube." and ends with "Grab it and place
+    it on the target three times, ..."; in *contextual* there are three turns between the two.
 
-    page = Page(render([*records.values()]))
+    A mention is an utterance, counted from 0, and the places where its words begin and end.
+    """
+    record = listener_record(setting, 0)
 
-    for key, detail in zip(page.data["columns"]["key"], page.details, strict=True):
-        shown = [mention[:3] for mention in detail["mentions"]]
-        mentions = records[key].mentions
-        assert shown == [[mention.utterance, mention.start, mention.end] for mention in mentions]
+    page = Page(render([record]))
+
+    shown = []
+    for utterance, begin, end, *_ in page.details[0]["mentions"]:
+        shown.append(record.instruction[utterance].text[begin:end])
+    assert shown == mentions
 
 
 @pytest.mark.parametrize(
@@ -139,7 +147,6 @@ def test_an_episode_shows_where_in_its_instruction_mentions_stand():
         ({"language_version": "0.1"}, {"resolved"}),
         ({"environment_version": 9}, {"resolved", "stages"}),
     ],
-    ids=["this version", "other language", "other environment"],
 )
 def test_records_of_other_versions_are_shown_without_what_cannot_be_derived(changes, missing):
     """Another version of the language may have other words, of the environment other stages."""
@@ -149,17 +156,25 @@ def test_records_of_other_versions_are_shown_without_what_cannot_be_derived(chan
 
 
 def test_a_record_of_an_unknown_task_is_shown_with_its_events():
-    turn = UtteranceRecord(stage="command", text="Do it.")
-    mention = MentionSpan(
+    """This package has no task "Homemade", so an object has the words of its name, and neither
+    the spelled-out instruction (*resolved*) nor stages can be derived."""
+    taken_off = EventRecord(
+        step=70, kind="placed", subject="cube_green", place="target", holds=False
+    )
+    it = MentionSpan(
         utterance=0, start=3, end=5, role="anaphor", expression="it", slot="x", value=1
     )
     record = replace(
-        listener_record("direct", 0), task="Homemade", instruction=(turn,), mentions=(mention,)
+        listener_record("direct", 0),
+        task="Homemade",
+        instruction=(UtteranceRecord(stage="command", text="Do it."),),
+        mentions=(it,),
+        events=(taken_off,),
     )
 
     page = Page(render([record]))
 
-    assert texts_with_steps(page, "events")[-1] == (70, "took cube green off target")
+    assert texts_with_steps(page, "events") == [(70, "took cube green off target")]
     assert not {"resolved", "stages"} & page.details[0].keys()
 
 
@@ -175,7 +190,10 @@ def test_events_tell_equal_cubes_apart_by_number_and_leave_out_what_ends_by_itse
 
 
 def test_missing_episodes_and_errors_are_named_at_the_top_of_the_page():
-    """Five records before the last, which is an error, are lost."""
+    """Of the planned records of two policies, the five before the last are lost, and the last one
+    is an error of the policy; notes at the top of the page say so. Cells of the table count five
+    missing episodes in all.
+    """
     records = records_with_an_error_last()
     kept = [*records[:-6], records[-1]]
 
@@ -235,6 +253,7 @@ def test_an_episode_shows_when_each_stage_of_its_task_was_completed():
 
 
 def test_an_episode_shows_the_subgoals_of_a_planner_and_what_was_wrong_with_them():
+    """Three were named, at steps 0, 8 and 9; each has what was due then, and how it was judged."""
     subgoals = (
         SubgoalRecord(step=0, text="pick it up", due="pick it up", verdict="right", ended="done"),
         SubgoalRecord(
@@ -253,14 +272,23 @@ def test_an_episode_shows_the_subgoals_of_a_planner_and_what_was_wrong_with_them
 
 
 def test_an_episode_shows_how_much_of_each_turn_the_model_read():
-    """The prompt has room for 24 tokens: the command is cut, which is the fifth turn."""
+    """Of the five turns, 24 tokens are read (by the upper bound `most_tokens`, which counts 50 in
+    all): three turns and the first word of the fourth. `reached` counts characters.
+
+    The command after them, which is lost, has two mentions: "blue" and "once for that student",
+    which refers back.
+    """
     record = replace(listener_record("contextual", 2))
     audit_record(record, PreparedJob(record.identity), PromptLimit(24, 0, most_tokens, "a.model"))
 
     page = Page(render([record]))
 
     (details,) = page.details
-    assert details["reached"] == [35, 17, 17, 8, 0]
+    turns = zip(record.instruction, details["reached"], strict=True)
+    assert [turn.text[:reached] for turn, reached in turns] == [
+        "One of my students missed the demo.", "Her bus was late.", "It's always late.",
+        "Anyway, ", "",
+    ]  # fmt: skip
     assert page.string(details["prompt"]) == (
         "cut: needs 50 tokens, the model reads 24 (counted with a.model); 2 mentions lost, 1 of "
         "them referring back"
@@ -268,6 +296,9 @@ def test_an_episode_shows_how_much_of_each_turn_the_model_read():
 
 
 def test_an_episode_shows_the_conditions_under_which_it_was_played():
+    """The record is of the test split, of our own words, and of a policy whose server says that its
+    version is "9". Each record began on 2026-01-02 at 03:04, which the page says, too.
+    """
     page = Page(render([replace(listener_record("explicit", 1), server_version="9")]))
 
     shown = page.string(page.details[0]["conditions"])
@@ -306,7 +337,13 @@ def test_a_cell_of_the_table_has_a_note_with_its_rate_its_interval_and_its_gap_t
 
 
 def test_episodes_can_be_chosen_by_what_differs_between_them():
-    """Of two episodes, one is lost and played with another policy seed."""
+    """Of two episodes, one is lost and played with another policy seed.
+
+    A choice has a label, such as "task", and the values of the two episodes. Split, step limit and
+    what else is equal in all records is no choice; whether a failed one has a cause is. Of an
+    episode that succeeded, there is no reason why it failed (a place of -1). A *privileged* policy
+    reads the simulator's state.
+    """
     won = replace(listener_record("explicit", 0), policy_seed=8)
     lost = replace(listener_record("contextual", 2), policy_seed=9, outcome="failure")
 
@@ -362,7 +399,12 @@ def test_a_failed_episode_shows_the_goal_that_the_policy_understood_next_to_the_
     ("outcome", "text"), [("failure", "“dance”; due was “pick it up”"), ("success", None)]
 )
 def test_a_failed_episode_of_a_planner_shows_its_last_subgoal_up_to_the_failure(outcome, text):
-    """It failed at step 60. An episode that succeeded shows none."""
+    """Subgoals were given at steps 51, 60 and 61; the failed record has its first wrong act at step
+    60, so the second subgoal, "dance", is shown with what was due. An episode that succeeded shows
+    none.
+
+    The other text is the true goal.
+    """
     subgoals = tuple(
         SubgoalRecord(step=step, text=text, due="pick it up", verdict="lost")
         for step, text in ((51, "sing"), (60, "dance"), (61, "rest"))
@@ -374,7 +416,12 @@ def test_a_failed_episode_of_a_planner_shows_its_last_subgoal_up_to_the_failure(
 
 
 def test_the_same_policy_with_other_words_is_shown_as_another_with_a_warning():
-    """ "mine@1a" are words of another file; spelled-out references exist in our own words only."""
+    """Two records differ in their words alone: "mine@1a" names a user's file of words.
+
+    They are not averaged, so the policy has two lines in the table. References are spelled out
+    (*resolved*) in our own words alone, as the file is not here. A *privileged* policy reads the
+    simulator's state.
+    """
     ours = listener_record("direct", 0)
     theirs = ours.with_options(wordings="mine@1a")
 
@@ -399,7 +446,6 @@ def test_the_same_policy_with_other_words_is_shown_as_another_with_a_warning():
         ({"arm": "silent"}, [1, 1]),
         ({"split": "val"}, [1, 1]),
     ],
-    ids=["nothing", "seed", "arm", "split"],
 )
 def test_two_policies_are_paired_on_a_scene_only_with_equal_words_seed_and_split(changes, pairs):
     """`pairs` is how many results each group has that is compared."""
@@ -415,6 +461,7 @@ def test_two_policies_are_paired_on_a_scene_only_with_equal_words_seed_and_split
     ("changes", "scenes"), [({"policy_seed": 1}, [2]), ({"split": "val"}, [1, 1])]
 )
 def test_results_of_the_same_episode_belong_to_one_scene(changes, scenes):
+    """Episode 0 of another split is another scene; played with two policy seeds it is the same."""
     record = listener_record("direct", 0)
 
     page = Page(render([record, replace(record, **changes)]))
@@ -424,9 +471,8 @@ def test_results_of_the_same_episode_belong_to_one_scene(changes, scenes):
 
 @pytest.fixture
 def filmed_run(tmp_path):
-    """A run of two records. The film of one has 4 bytes, its picture 4; that of the other is lost.
-
-    The title picture of a video is shown before it plays.
+    """A run of two records. The first has a video of the 4 bytes "film", and a title picture of the
+    same bytes that is shown before it plays; the video of the second was lost for want of room.
     """
     first, second, *_ = records_with_an_error_last()
     filmed = replace(first, video=written_film(tmp_path, "a-b"))
@@ -435,9 +481,11 @@ def filmed_run(tmp_path):
 
 
 def test_videos_that_fit_are_stored_in_the_page(filmed_run, monkeypatch):
-    """Two files of four bytes, a film and its picture, and a page that may hold eight.
+    """The only video of `filmed_run` and its title picture have four bytes each, "film", and a page
+    may hold eight here. "ZmlsbQ==" is "film" in base64.
 
-    The second episode has lost its film, for which there was no room.
+    A script film-KEY holds the video of an episode, poster-KEY its picture. A film that is stored
+    is said to be at "#", inside the page; the second episode has lost its video.
     """
     monkeypatch.setattr(report, "MAX_EMBEDDED_BYTES", 8)
 
@@ -476,7 +524,10 @@ def test_videos_that_do_not_fit_are_linked_from_where_the_page_is(
 
 
 def test_videos_of_a_pack_that_do_not_fit_are_not_linked(filmed_run, monkeypatch):
-    """The files of a pack are gone when it is closed."""
+    """A pack is a zip file; it is unpacked to be read, and the files are gone afterwards, so that a
+    link to a video would lead nowhere. The video and its picture have four bytes each, and the page
+    may hold seven, so they are not stored in it either.
+    """
     monkeypatch.setattr(report, "MAX_EMBEDDED_BYTES", 7)
     pack = Source(filmed_run.folder / "a.roboirg.zip", filmed_run.folder)
 
@@ -504,7 +555,11 @@ def two_runs(tmp_path):
 
 
 def test_a_page_of_two_runs_compares_each_policy_with_itself(two_runs):
-    """Two policies in each run: 0 and 1 are of the first, 2 and 3 of the second run."""
+    """`two_runs` are the folders "ours" and "our theirs" with the same two policies.
+
+    The table has the policies of the first run, 0 and 1, and those of the second, which begin at 2
+    (`sides`). So the listener is compared with itself as 0 and 2.
+    """
     ours, theirs = two_runs
 
     page = Page(write_report(ours, against=theirs).read_text())
@@ -523,7 +578,12 @@ def test_a_page_of_two_runs_compares_each_policy_with_itself(two_runs):
 
 
 def test_a_page_of_two_runs_finds_videos_and_what_was_printed_in_the_other_run(two_runs):
-    """They carry a key of their own, as both runs have the same episodes."""
+    """In `two_runs`, the first episode of the second run, "our theirs", has a video and a log.
+
+    A script film-KEY holds a video; KEY is the end of the episode's name. Both runs have the same
+    episodes, so a key of the second run ends in -2. The page lies in the first run's folder, and
+    %20 is the space in the name of the second.
+    """
     ours, theirs = two_runs
     slug = records_with_an_error_last()[0].slug
 
@@ -536,7 +596,10 @@ def test_a_page_of_two_runs_finds_videos_and_what_was_printed_in_the_other_run(t
 
 
 def test_a_page_of_two_runs_says_what_each_lacks_and_which_code_made_them(two_runs):
-    """Other code that decides verdicts in the same way is a fact, and nothing to warn of."""
+    """The second of `two_runs` lacks four episodes, and its first record is of another state of the
+    package, "0". Its code that decides verdicts is the same, so the states are listed among the
+    facts (<dd>), without a warning (*Mixed*).
+    """
     ours, theirs = two_runs
 
     text = write_report(ours, against=theirs).read_text()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
 from pathlib import Path
 
 import pytest
@@ -39,7 +38,9 @@ def pack_of_the_run(run_of_two_policies):
 
 
 def test_tables_out_writes_a_file_for_each_table_into_a_new_folder(run_of_two_policies, tmp_path):
-    """And prints their paths."""
+    """With the published results, a run has five tables. The folder does not exist before; the
+    command prints the path of each file.
+    """
     out = tmp_path / "new" / "tables"
 
     printed = call(
@@ -52,6 +53,9 @@ def test_tables_out_writes_a_file_for_each_table_into_a_new_folder(run_of_two_po
 
 
 def test_published_tables_need_no_run(tmp_path):
+    """29.11 is a rate that RoboMME's paper publishes in its table of contexts; which settings a
+    task has is our own table, `coverage`.
+    """
     words = ("--format", "latex", "--out", tmp_path, "--published", "--which", "context")
 
     call("tables", *words)
@@ -63,17 +67,19 @@ def test_published_tables_need_no_run(tmp_path):
 def test_several_tables_in_json_or_csv_are_one_document_that_pandas_reads(run_of_two_policies):
     """Would find two documents one after the other, of which a reader takes the first.
 
-    CSV has a line for each of the five columns of a row.
+    JSON has a row for each line of a table, CSV one for each of the five columns of numbers in such
+    a line. The run's forgetful policy wins all in *explicit* and nothing in *direct*, so its gap is
+    -100 points.
     """
     pandas = pytest.importorskip("pandas")
     words = ("tables", run_of_two_policies, "--by", "difficulty,slots", "--format")
 
-    rows = pandas.read_json(io.StringIO(call(*words, "json")))
-    lines = pandas.read_csv(io.StringIO(call(*words, "csv")), na_values="–")
+    lines = pandas.read_json(io.StringIO(call(*words, "json")))
+    cells = pandas.read_csv(io.StringIO(call(*words, "csv")), na_values="–")
 
-    assert set(rows["table"]) == set(lines["table"]) == {"by_difficulty", "by_slots"}
-    assert len(lines) == 5 * len(rows)
-    gaps = lines[lines["column"] == "gap"]["word"].dropna().astype(float)
+    gaps = cells[cells["column"] == "gap"]["word"].dropna().astype(float)
+    assert set(lines["table"]) == set(cells["table"]) == {"by_difficulty", "by_slots"}
+    assert len(cells) == 5 * len(lines)
     assert gaps.min() == -100.0
 
 
@@ -89,7 +95,9 @@ def test_several_tables_in_json_or_csv_are_one_document_that_pandas_reads(run_of
 def test_tables_of_a_packed_run_are_those_of_its_folder(
     run_of_two_policies, pack_of_the_run, options
 ):
-    """But for the path, which the facts have."""
+    """A pack is a zip file of the run. The tables of facts name the path of the run or of its pack,
+    which is the only difference.
+    """
     of_folder = call("tables", *options, run_of_two_policies)
     of_pack = call("tables", *options, pack_of_the_run)
 
@@ -99,6 +107,10 @@ def test_tables_of_a_packed_run_are_those_of_its_folder(
 def test_policies_of_a_pack_and_of_a_folder_are_compared_alike(
     run_of_two_policies, pack_of_the_run
 ):
+    """The pack holds the run of the folder, so it makes no difference which of two policies comes
+    from where. The listener wins all episodes, the forgetful policy none in *direct*: +100 points.
+    *Privileged* are policies that read the simulator's state.
+    """
     listener_of_pack = call(
         "compare", f"{pack_of_the_run}:listener", f"{run_of_two_policies}:forgetful"
     )
@@ -117,7 +129,9 @@ def test_figures_of_a_pack_are_drawn_and_their_paths_printed(pack_of_the_run, tm
 
 
 def test_report_writes_the_page_into_a_run_or_next_to_a_pack(run_of_two_policies, pack_of_the_run):
-    """Both pages are equal but for the name of the run."""
+    """The page of the folder is report.html in it; that of shipped.roboirg.zip is shipped.html next
+    to it. Both are equal but for the name of the run, which is that of the folder or of the pack.
+    """
     call("report", run_of_two_policies)
     call("report", pack_of_the_run)
 
@@ -127,6 +141,7 @@ def test_report_writes_the_page_into_a_run_or_next_to_a_pack(run_of_two_policies
 
 
 def test_report_writes_the_page_of_two_runs_to_out(run_of_two_policies, pack_of_the_run, tmp_path):
+    """One is the listener of the packed run, the other the whole folder."""
     out = tmp_path / "page.html"
 
     call("report", f"{pack_of_the_run}:listener", "--against", run_of_two_policies, "--out", out)
@@ -135,6 +150,9 @@ def test_report_writes_the_page_of_two_runs_to_out(run_of_two_policies, pack_of_
 
 
 def test_run_colon_policy_shows_the_results_of_that_policy_alone(run_of_two_policies):
+    """The run has a listener and a forgetful policy. `RUN:forgetful` gives the header and those
+    lines of the whole table that are of the forgetful policy.
+    """
     options = ("--which", "main", "--format", "csv")
     head, *rows = call("tables", run_of_two_policies, *options).splitlines()
 
@@ -143,23 +161,32 @@ def test_run_colon_policy_shows_the_results_of_that_policy_alone(run_of_two_poli
     assert forgetful.splitlines() == [head, *(row for row in rows if "forgetful" in row)]
 
 
-def test_two_policies_named_apart_are_shown_as_their_whole_run_is(
+def test_two_policies_named_apart_are_shown_as_their_whole_run_is(run_of_two_policies):
+    """`RUN:forgetful` is one of the two policies of a run; with the other they are all of it."""
+    options = ("--which", "main", "--format", "csv")
+    policies = (f"{run_of_two_policies}:forgetful", f"{run_of_two_policies}:listener")
+
+    assert call("tables", *policies, *options) == call("tables", run_of_two_policies, *options)
+
+
+def test_a_policy_of_a_folder_and_one_of_its_pack_are_shown_as_the_whole_run_is(
     run_of_two_policies, pack_of_the_run
 ):
-    """Both of one run, and one of a folder with one of its pack."""
+    """The pack holds the same run as the folder; the order of the lines is that of the options."""
     options = ("--which", "main", "--format", "csv")
-    forgetful = f"{run_of_two_policies}:forgetful"
-    whole = call("tables", run_of_two_policies, *options)
+    policies = (f"{run_of_two_policies}:forgetful", f"{pack_of_the_run}:listener")
 
-    both = call("tables", forgetful, f"{run_of_two_policies}:listener", *options)
-    with_pack = call("tables", forgetful, f"{pack_of_the_run}:listener", *options)
+    lines = call("tables", *policies, *options).splitlines()
 
-    assert both == whole
-    assert sorted(with_pack.splitlines()) == sorted(whole.splitlines())
+    whole = call("tables", run_of_two_policies, *options).splitlines()
+    assert sorted(lines) == sorted(whole)
 
 
 @pytest.mark.parametrize("command", ["tables FIRST SECOND", "compare FIRST SECOND"])
 def test_a_command_on_two_runs_warns_if_they_were_rendered_on_different_devices(tmp_path, command):
+    """A software renderer (llvmpipe) and a graphics card draw slightly different pictures, so that
+    results of the two may differ for this reason alone.
+    """
     first = write_run(tmp_path / "listener", ("listener",), device="llvmpipe")
     second = write_run(tmp_path / "forgetful", ("forgetful",), device="NVIDIA H100")
     words = command.replace("FIRST", str(first)).replace("SECOND", str(second)).split()
@@ -168,6 +195,9 @@ def test_a_command_on_two_runs_warns_if_they_were_rendered_on_different_devices(
 
 
 def test_merging_runs_and_the_page_of_the_merged_run_warn_of_different_devices(tmp_path):
+    """A software renderer (llvmpipe) and a graphics card draw slightly different pictures, so that
+    results of the two may differ for this reason alone.
+    """
     first = write_run(tmp_path / "listener", ("listener",), device="llvmpipe")
     second = write_run(tmp_path / "forgetful", ("forgetful",), device="NVIDIA H100")
     warning = "Mixed render devices: NVIDIA H100, llvmpipe. Their pictures"
@@ -183,39 +213,43 @@ def test_a_run_whose_device_is_not_known_fits_any_other(run_of_two_policies, tmp
 
 
 @pytest.mark.parametrize(
-    ("words", "says"),
+    ("command", "message"),
     [
+        # what it needs is not there
         ("tables", "Tables need a run"),
         ("tables --which forms", "Tables need a run"),
-        ("tables RUN --which planer", "Did you mean 'planner'"),
+        ("figures --out {empty}", "Figures need a run"),
+        ("tables {empty}", "no records in"),
+        ("tables {file}", "is not a packed run"),
+        ("compare {run} nowhere", "There is no run at nowhere;"),
+        ("compare {run} {run}:forgetful", "name one as RUN:listener"),
+        # a name is unknown
+        ("tables {run} --which planer", "Did you mean 'planner'"),
         ("tables --format pdf", "There is no format 'pdf'"),
-        ("tables RUN --which failures --published", "show runs alone"),
-        ("tables RUN --which forms", "--forms implicit,resolved"),
-        ("tables RUN:listener --which failures", "No episode of the runs failed"),
-        ("tables RUN --by pattern,colour", "breakdown 'colour'.*pattern, expression, slots"),
-        ("tables RUN:listner", "Did you mean 'listener'"),
-        ("tables RUN --which real", "no results for the table 'real'"),
-        ("tables EMPTY", "no records in"),
-        ("tables FILE", "is not a packed run"),
-        ("tables RUN --out FILE", "Cannot write"),
-        ("figures --out EMPTY", "Figures need a run"),
-        ("figures RUN --out EMPTY --which gap", "Did you mean 'gaps'"),
-        ("figures RUN --out FILE --which gaps", "Cannot write "),
-        ("figures RUN:listener --out EMPTY --which failures", "nothing to draw for failures"),
-        ("figures --published --out EMPTY --which failures", "The paper's tables have nothing to"),
-        ("compare RUN nowhere", "There is no run at nowhere;"),
-        ("compare RUN RUN:forgetful", "name one as RUN:listener"),
-        ("report RUN --serve --out FILE", "--serve shows one run"),
+        ("tables {run} --by pattern,colour", "breakdown 'colour'.*pattern, expression, slots"),
+        ("tables {run}:listner", "Did you mean 'listener'"),
+        ("figures {run} --out {empty} --which gap", "Did you mean 'gaps'"),
+        # the run has no results of this kind: the listener never fails, no form was spelled out
+        ("tables {run} --which failures --published", "show runs alone"),
+        ("tables {run} --which forms", "--forms implicit,resolved"),
+        ("tables {run}:listener --which failures", "No episode of the runs failed"),
+        ("tables {run} --which real", "no results for the table 'real'"),
+        ("figures {run}:listener --out {empty} --which failures", "nothing to draw for failures"),
+        ("figures --published --out {empty} --which failures", "The paper's tables have nothing"),
+        # it cannot be written there
+        ("tables {run} --out {file}", "Cannot write"),
+        ("figures {run} --out {file} --which gaps", "Cannot write "),
+        ("report {run} --serve --out {file}", "--serve shows one run"),
     ],
 )
 def test_a_command_that_has_nothing_to_show_is_refused_with_the_reason(
-    run_of_two_policies, tmp_path, words, says
+    run_of_two_policies, tmp_path, command, message
 ):
-    """RUN is a run of a listener and a forgetful policy, EMPTY a folder, FILE an empty file."""
-    (tmp_path / "file").write_text("")
-    words = re.sub(r"\bRUN\b", str(run_of_two_policies), words)
-    words = re.sub(r"\bEMPTY\b", str(tmp_path), words)
-    words = re.sub(r"\bFILE\b", str(tmp_path / "file"), words)
+    """{run} stands for a run of a listener, which wins all, and of a forgetful policy, {empty} for
+    a folder without a run, and {file} for an empty file. Messages are patterns."""
+    file = tmp_path / "file"
+    file.touch()
+    command = command.format(run=run_of_two_policies, empty=tmp_path, file=file)
 
-    with pytest.raises(RoboIRGError, match=says):
-        call(*words.split())
+    with pytest.raises(RoboIRGError, match=message):
+        call(*command.split())

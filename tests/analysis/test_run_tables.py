@@ -5,8 +5,7 @@ from __future__ import annotations
 import io
 
 import pytest
-from flat_jobs import frame_of, make_result
-from flat_jobs import make_results as play
+from flat_jobs import frame_of, make_result, make_results
 from rich.console import Console
 
 from roboirg.analysis.measures.breakdowns import BREAKDOWNS
@@ -68,12 +67,12 @@ def test_a_finished_run_prints_its_rates_gaps_missing_episodes_and_failures():
     Their mean is 17 %, a gap of -33 to explicit on the same episodes. Would find 20 %, 1 of 5.
     """
     frame = frame_of(
-        play("1111"),
-        play("100!", "direct", cause=LONG_CAUSE),
-        play("0", "direct", form="resolved", policy_seed=2, cause=LONG_CAUSE),
-        play("00", task="VideoUnmask", cause=LONG_CAUSE),
-        play("00", "direct", task="VideoUnmask", cause=LONG_CAUSE),
-        planned=[result.identity for result in play("111111", "direct")],
+        make_results("1111"),
+        make_results("100!", "direct", cause=LONG_CAUSE),
+        make_results("0", "direct", form="resolved", policy_seed=2, cause=LONG_CAUSE),
+        make_results("00", task="VideoUnmask", cause=LONG_CAUSE),
+        make_results("00", "direct", task="VideoUnmask", cause=LONG_CAUSE),
+        planned=[result.identity for result in make_results("111111", "direct")],
     )
     assert printed(frame) == STORED_OUTPUT.replace("LONG", LONG_CAUSE)
 
@@ -83,16 +82,20 @@ EXECUTION = Attribution(kind="execution", failure="dropped", step=1, sentence="S
 UNDECIDED = Attribution(kind="undecided", failure="stopped", step=1, sentence="So.")
 
 FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL = frame_of(
-    play("110100!111", prompt_verdict="heard", difficulty="hard"),
-    play("10001!1001", "direct", prompt_verdict="cut", attribution=GROUNDING, difficulty="hard"),
-    play("0110111111", "direct", form="resolved", prompt_verdict="heard"),
-    play("1011", task="BinFill", prompt_verdict="heard"),
-    play("0010", "direct", task="BinFill", prompt_verdict="unknown", attribution=EXECUTION),
-    play("0110", "direct", task="BinFill", form="resolved", prompt_verdict="cut"),
-    play("0001", "direct", task="VideoUnmask", prompt_verdict="heard", attribution=EXECUTION),
-    play("0111", "direct", task="VideoUnmask", form="resolved", prompt_verdict="heard"),
-    play("0", policy="other", attribution=EXECUTION),
-    play("0", "direct", policy="other", attribution=EXECUTION),
+    make_results("110100!111", prompt_verdict="heard", difficulty="hard"),
+    make_results(
+        "10001!1001", "direct", prompt_verdict="cut", attribution=GROUNDING, difficulty="hard"
+    ),
+    make_results("0110111111", "direct", form="resolved", prompt_verdict="heard"),
+    make_results("1011", task="BinFill", prompt_verdict="heard"),
+    make_results("0010", "direct", task="BinFill", prompt_verdict="unknown", attribution=EXECUTION),
+    make_results("0110", "direct", task="BinFill", form="resolved", prompt_verdict="cut"),
+    make_results(
+        "0001", "direct", task="VideoUnmask", prompt_verdict="heard", attribution=EXECUTION
+    ),
+    make_results("0111", "direct", task="VideoUnmask", form="resolved", prompt_verdict="heard"),
+    make_results("0", policy="other", attribution=EXECUTION),
+    make_results("0", "direct", policy="other", attribution=EXECUTION),
 )
 """Other numbers of everything in every cell."""
 
@@ -119,68 +122,100 @@ def test_other_tables_are_as_stored(snapshot, name, kind):
     assert get_format(kind).draw(table) == snapshot
 
 
-END_OF_LETTER = {
-    "s": ("success", None),
-    "g": ("failure", GROUNDING),
-    "x": ("failure", EXECUTION),
-    "u": ("failure", UNDECIDED),
-    "-": ("failure", None),
-    "!": ("error", None),
+ENDINGS = {
+    "success": ("success", None),
+    "grounding": ("failure", GROUNDING),
+    "execution": ("failure", EXECUTION),
+    "undecided": ("failure", UNDECIDED),
+    "unattributed": ("failure", None),
+    "error": ("error", None),
 }
+"""How an episode can end: its outcome, and the kind of its failure."""
 
 
-def results_that_ended(letters, setting):
-    """Return an episode for each letter, which ended as `END_OF_LETTER` says."""
-    found = []
-    for episode, letter in enumerate(letters):
-        outcome, attribution = END_OF_LETTER[letter]
-        result = make_result(outcome, episode, setting=setting, attribution=attribution)
-        found.append(result)
-    return found
+def line_of_failures(explicit, direct):
+    """Return the line of *direct* in the table of failures: texts without intervals, by column.
+
+    Both name the ending of each episode (`ENDINGS`), from episode 0 on.
+    """
+    results = []
+    for setting, endings in (("explicit", explicit), ("direct", direct)):
+        for episode, ending in enumerate(endings.split()):
+            outcome, attribution = ENDINGS[ending]
+            results.append(make_result(outcome, episode, setting=setting, attribution=attribution))
+    table = make_failure_table(RunData(frame_of(results)))
+    _, line = table.rows
+    names = [column.name for column in table.columns]
+    return dict(zip(names, [entry.text.split(" (")[0] for entry in line.entries], strict=True))
+
+
+def test_success_and_three_kinds_of_failure_add_up_to_100_percent():
+    """One of four episodes ends in each way, the last one in a failure without a known kind, which
+    counts as undecided. Nothing fails in explicit, so no share of failures is known there."""
+    line = line_of_failures("success", direct="success grounding execution unattributed")
+
+    for kind in ("success", "grounding", "execution", "undecided"):
+        assert line[kind] == "25.00", kind
+    assert line["the same in explicit"] == "–"
+
+
+def test_changes_of_success_and_of_three_kinds_of_failure_add_up_to_0():
+    """Of four episodes, success falls from 3 to 1, which is -50 points; grounding rises from 0 to
+    1, execution stays at 1, and undecided rises from 0 to 1."""
+    explicit = "success success success execution"
+    direct = "success grounding undecided execution"
+
+    line = line_of_failures(explicit, direct)
+
+    assert line["gap to explicit"] == "−50.0"
+    assert line["grounding, change"] == line["undecided, change"] == "+25.0"
+    assert line["execution, change"] == "±0.0"
+
+
+def test_changes_are_of_the_episodes_that_have_no_error_in_either_setting():
+    """The first two of six episodes have an error in one of the settings.
+
+    In the other four, success rises from 1 to 2 and grounding falls from 2 to 1. The rate is of
+    five episodes, three of them successes.
+    """
+    explicit = "error success grounding grounding execution success"
+    direct = "success error success grounding execution success"
+
+    line = line_of_failures(explicit, direct)
+
+    assert line["success"] == "60.00"
+    assert line["gap to explicit"] == "+25.0"
+    assert line["grounding, change"] == "−25.0"
 
 
 @pytest.mark.parametrize(
-    ("explicit", "direct", "rates", "changes", "shares"),
+    ("failures", "share"),
     [
-        (
-            "ssssssssgx", "sssssgggxu", "50 30 10 10", "−30 +20 ±0 +10", "60–80 50"
-        ),
-        (
-            "ssssssssgx", "sssssggg-u", "50 30 0 20", "−30 +20 −10 +20", "60–100 50",
-        ),
-        (
-            "gg!sssxxss", "x!ssssssss", "89 0 11 0", "+25 −12 −12 ±0", "0 50"
-        ),
-        (
-            "ssssssssss", "sssssssssg", "90 10 0 0", "−10 +10 ±0 ±0", "100 –"
-        ),
-    ], ids=["each kind", "not attributed", "errors", "one failure"],
-)  # fmt: skip
-def test_success_and_three_kinds_of_failure_add_up_to_100_and_their_changes_to_0(
-    explicit, direct, rates, changes, shares
-):
-    """A letter is how an episode ended: s success, g grounding, x execution, u or - undecided.
+        ("grounding grounding grounding execution undecided", "60–80"),
+        ("grounding grounding grounding unattributed undecided", "60–100"),
+        ("execution", "0"),
+        ("grounding", "100"),
+    ],
+)
+def test_the_share_of_grounding_leaves_open_what_undecided_failures_are(failures, share):
+    """At most all undecided ones are failures of grounding, too: 3 of five failures and 1 that is
+    undecided are 60 to 80 %."""
+    line = line_of_failures("success", direct=failures)
 
-    Rates are the percentages of s, g, x and undecided in direct: in the first case 5, 3, 1 and 1 of
-    ten. Changes are those less the ones of explicit (8, 1, 1 and 0 of ten), over the same episodes:
-    in the third case, errors (!) leave eight of ten.
-    """
-    data = RunData(
-        frame_of(results_that_ended(explicit, "explicit"), results_that_ended(direct, "direct"))
-    )
+    assert line["grounding of failures"] == share
 
-    _, row = make_failure_table(data).rows
 
-    texts = [entry.text.split(".")[0] for entry in row.entries]
-    assert [f"{entry.percent:.0f}" for entry in row.entries[2:6]] == rates.split()
-    assert texts[6:10] == changes.split()
-    assert texts[10:] == shares.split()
+def test_the_share_of_grounding_in_explicit_stands_next_to_it():
+    """Explicit names every object, so a failure of grounding there is not due to references."""
+    line = line_of_failures(explicit="grounding execution", direct="success success")
+
+    assert line["the same in explicit"] == "50"
 
 
 def test_a_failure_whose_name_this_version_does_not_know_counts_as_not_attributed():
     """A record of another version calls it "renamed"; would find it lost, or a crash."""
     other = Attribution(kind="execution", failure="renamed", sentence="So.")
-    data = RunData(frame_of(play("10", attribution=other)))
+    data = RunData(frame_of(make_results("10", attribution=other)))
 
     (row,) = diagnostic_tables()["failure-names"].make(data).rows
 
@@ -195,8 +230,11 @@ def test_the_breakdown_by_difficulty_is_as_stored(snapshot):
 
 
 def test_the_first_ten_failures_are_listed_and_the_others_counted():
-    """Of 13 failures, in episodes 0 to 12; above them other lines stand, a summary of rates."""
-    lines = printed(frame_of(play("0000000000000", cause="late"))).splitlines()
+    """13 episodes, 0 to 12, are lost (0). The last eleven lines are ten failures and a count.
+
+    A line is such as "PickXtimes test/0 explicit: late", with the split and the episode.
+    """
+    lines = printed(frame_of(make_results("0000000000000", cause="late"))).splitlines()
 
     assert [line.split()[1] for line in lines[-11:-1]] == [
         "test/0", "test/1", "test/2", "test/3", "test/4",
@@ -206,18 +244,20 @@ def test_the_first_ten_failures_are_listed_and_the_others_counted():
 
 
 def test_a_run_without_failures_has_no_list_of_them():
-    assert "without success" not in printed(frame_of(play("1")))
+    assert "without success" not in printed(frame_of(make_results("1")))
 
 
 def test_the_legend_explains_privileged_policies_if_there_are_any():
+    """A policy that reads the simulator's state, or one that does not, loses an episode (0)."""
     legend = "success rate in %; privileged policies and scripted hands use the simulator's"
 
-    assert legend in printed(frame_of(play("0", privileged=True)))
-    assert "privileged" not in printed(frame_of(play("0")))
+    assert legend in printed(frame_of(make_results("0", privileged=True)))
+    assert "privileged" not in printed(frame_of(make_results("0")))
 
 
 def test_a_failure_of_a_control_arm_is_listed_with_its_arm():
-    (silent,) = play("0", arm="silent", cause="late", wordings="mine@1a")
+    """The episode was lost (0) in the arm *silent*, without words."""
+    (silent,) = make_results("0", arm="silent", cause="late", wordings="mine@1a")
 
     assert failure_text(silent) == "PickXtimes test/0 explicit (silent): late"
 
@@ -233,7 +273,7 @@ def test_what_a_model_named_instead_of_the_goal_follows_the_cause_of_the_failure
     """Of a model that never answers, *not done after 1300 steps* is not the reason."""
     named = "Understood red, twice; meant green, once."
     attribution = Attribution(kind="grounding", failure=failure, sentence=named)
-    (result,) = play("0", cause="late", attribution=attribution)
+    (result,) = make_results("0", cause="late", attribution=attribution)
 
     assert failure_text(result) == f"PickXtimes test/0 explicit: {text}"
 
@@ -242,18 +282,22 @@ def test_what_a_model_named_instead_of_the_goal_follows_the_cause_of_the_failure
     ("outcomes", "color"), [("1110", "green"), ("110", "yellow"), ("100", "red")]
 )
 def test_a_rate_is_green_from_75_percent_and_red_below_50(outcomes, color):
-    """3 of 4, 2 of 3 and 1 of 3 are won."""
-    (table,) = make_run_tables(frame_of(play(outcomes)))
+    """Won (1) are 3 of 4 episodes, 2 of 3 and 1 of 3: 75, 67 and 33 %."""
+    (table,) = make_run_tables(frame_of(make_results(outcomes)))
 
     assert table.rows[0].entries[0].style == color
 
 
 def test_each_split_step_limit_and_robot_has_a_table_of_its_own():
+    """The first episode is a usual one, on the test split and with a limit of 1300 steps.
+
+    The others are on another split, with another limit, and on a real robot; all are won (1).
+    """
     results = [
-        *play("1"),
-        *play("1", split="val"),
-        *play("1", max_steps=200),
-        *play("1", robot="Panda"),
+        *make_results("1"),
+        *make_results("1", split="val"),
+        *make_results("1", max_steps=200),
+        *make_results("1", robot="Panda"),
     ]
 
     titles = [table.title for table in make_run_tables(frame_of(results))]
@@ -269,7 +313,7 @@ def test_each_split_step_limit_and_robot_has_a_table_of_its_own():
 @pytest.mark.parametrize("order", [["listener", "random"], ["random", "listener"]])
 def test_tables_of_policies_stand_in_the_order_of_the_plan_and_the_legend_below_the_last(order):
     """`order` is the plan's; one of the two policies is privileged, which the legend explains."""
-    results = [*play("1"), *play("1", policy="random", privileged=True)]
+    results = [*make_results("1"), *make_results("1", policy="random", privileged=True)]
     planned = [make_result(policy=name).identity for name in order]
 
     tables = make_run_tables(frame_of(results, planned=planned))
@@ -279,8 +323,12 @@ def test_tables_of_policies_stand_in_the_order_of_the_plan_and_the_legend_below_
 
 
 def test_a_suite_that_was_played_in_part_is_marked_in_the_table_of_forms():
-    """One of the four tasks of counting was played in both forms."""
-    results = [*play("10", "direct"), *play("11", "direct", form="resolved")]
+    """A suite is a group of tasks, of which the table shows the mean. Only one of the four tasks of
+    counting was played, so the mean is marked by a star, which a note explains. The table needs
+    both forms of instructions: the implicit one, and the one with references spelled out
+    (resolved).
+    """
+    results = [*make_results("10", "direct"), *make_results("11", "direct", form="resolved")]
 
     table = diagnostic_tables()["forms"].make(RunData(frame_of(results)))
 

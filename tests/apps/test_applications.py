@@ -12,29 +12,25 @@ from selection import slow_but
 
 APPLICATIONS = sorted(path.parent.name for path in (layout.PACKAGE / "apps").glob("*/__init__.py"))
 
-RUN_COMMAND = "\nfrom roboirg.main import main; sys.argv[0] = 'roboirg'; main()"
-"""Behind `PRINT_COMMANDS`: the command of the process's arguments."""
-
 PRINT_COMMANDS = """
-left_out = ""
-import importlib.metadata, json, sys
+import importlib.metadata, json, os, sys
+hidden_package = os.environ.get("HIDDEN_PACKAGE")
 all_entry_points = importlib.metadata.entry_points
 def entry_points(**wanted):
     found = all_entry_points(**wanted)
-    return [one for one in found if not left_out or left_out not in one.value]
+    if hidden_package is None:
+        return found
+    return [entry for entry in found if hidden_package not in entry.value]
 importlib.metadata.entry_points = entry_points
 import typer
 from roboirg.core.errors import RoboIRGError
 from roboirg.main import app
 from roboirg.policies.by_name.policy_kinds import find_kind
 
-def applications(command, prefix=""):
-    # The modules that add each command; of a group, those of its commands.
-    found = {}
-    for name, one in getattr(command, "commands", {}).items():
-        inner = applications(one, f"{prefix}{name} ")
-        own = {one.callback.__module__} if not inner else set().union(*inner.values())
-        found |= inner | {f"{prefix}{name}": own}
+def names_in(command, prefix=""):
+    found = []
+    for name, inner in getattr(command, "commands", {}).items():
+        found += [f"{prefix}{name}", *names_in(inner, f"{prefix}{name} ")]
     return found
 
 kinds = []
@@ -44,74 +40,101 @@ for entry in entry_points(group="roboirg.policy_kinds"):
         kinds.append(entry.name)
     except RoboIRGError as error:
         assert entry.value in str(error), error
-commands = applications(typer.main.get_command(app))
-print(json.dumps([{name: sorted(own) for name, own in commands.items()}, sorted(kinds)]))
+print(json.dumps([names_in(typer.main.get_command(app)), kinds]))
 """
+"""A program that prints its commands and the kinds of policies that come from entry points.
+
+Entry points of the package that the variable HIDDEN_PACKAGE names are left out.
+"""
+
+RUN_COMMAND = "\nfrom roboirg.main import main; sys.argv[0] = 'roboirg'; main()"
+"""Behind `PRINT_COMMANDS`: the command of the process's arguments."""
+
+
+def start(*words, program=PRINT_COMMANDS, **variables):
+    """Run a program in a process of its own, as it replaces a function of Python's.
+
+    Returns:
+        its commands, the kinds of its policies, and what it printed after them.
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", program, *words],
+        capture_output=True, text=True, check=False, env=os.environ | variables,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    listed, _, printed = done.stdout.partition("\n")
+    commands, kinds = json.loads(listed)
+    return set(commands), set(kinds), printed
 
 
 @pytest.fixture(scope="module")
-def all_commands_and_kinds():
-    """The commands, with the modules that add them, and the kinds of policies of all applications.
+def all_commands():
+    """The names of the commands of the whole program."""
+    commands, kinds, _ = start()
+    assert kinds == {"learned", "trained"}
+    return commands
 
-    Listed by a process of its own, as the program replaces a function of Python's.
+
+def test_without_the_package_that_learns_only_its_commands_and_kinds_are_gone(all_commands):
+    """The package roboirg_learn, which is installed next to the benchmark, is hidden from the
+    program. It alone has the command `learn` with its three commands, and the only two kinds of
+    policies that come from outside.
     """
-    walked = subprocess.run([sys.executable, "-c", PRINT_COMMANDS], capture_output=True, check=True)
-    commands, kinds = json.loads(walked.stdout)
-    return commands, set(kinds)
+    commands, kinds, _ = start(HIDDEN_PACKAGE="roboirg_learn")
+
+    learns = {"learn", "learn listener", "learn policy", "learn reader"}
+    assert all_commands - commands == learns
+    assert kinds == set()
 
 
-def test_without_the_package_that_learns_only_its_commands_and_kinds_are_gone(
-    all_commands_and_kinds,
-):
-    """The package roboirg_learn is hidden from a process, which prints what is left.
-
-    `PRINT_COMMANDS` leaves out entry points of the package that its variable `left_out` names; that
-    line is replaced here. Only the package's four commands and two kinds of policies are lost; no
-    other kind comes from an entry point, so none is left.
-    """
-    all_commands, all_kinds = all_commands_and_kinds
-    program = PRINT_COMMANDS.replace('left_out = ""', "left_out = 'roboirg_learn'", 1)
-
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
-
-    commands, kinds = json.loads(done.stdout)
-    assert all_commands.keys() - commands.keys() == {
-        "learn", "learn listener", "learn policy", "learn reader",
-    }  # fmt: skip
-    assert (all_kinds, kinds) == ({"learned", "trained"}, [])
+def test_the_program_has_eight_applications():
+    """They are folders, each of which is left out in turn below."""
+    assert APPLICATIONS == [
+        "demonstrations", "grounding", "integrations", "language_lab", "leaderboard",
+        "policy_check", "real", "show",
+    ]  # fmt: skip
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("application", slow_but(["show"], APPLICATIONS))
+@pytest.mark.parametrize(
+    ("application", "lost"),
+    slow_but(
+        [("show", {"show"})],
+        [
+            ("demonstrations", {"export demonstrations", "replay"}),
+            ("grounding", {"export grounding", "score", "score grounding"}),
+            ("integrations", set()),
+            (
+                "language_lab",
+                {
+                    "export instructions", "language", "language check-scenarios",
+                    "language import-robomme", "language sample", "language shortcuts",
+                    "language stats",
+                },
+            ),
+            ("leaderboard", {"leaderboard", "leaderboard pack", "leaderboard verify"}),
+            ("policy_check", {"check-policy"}),
+            ("real", {"real", "real plan", "real score"}),
+            ("show", {"show"}),
+        ],
+    ),
+)  # fmt: skip
 def test_without_the_folder_of_an_application_the_program_runs_and_lacks_only_its_commands(
-    application, all_commands_and_kinds, tmp_path
+    application, lost, all_commands, tmp_path
 ):
-    """A copy of the program without an application's folder prints its commands and plays.
-
-    What may be lost are the commands that only this application adds, and it has some if and only
-    if it has a file of commands; all kinds of policies are still there.
+    """A copy of the program without the application's folder lists its commands and the kinds of
+    policies that come from elsewhere, then plays five steps of an episode, whose table names the
+    task. It lacks the commands that only this application adds, and nothing else.
     """
-    all_commands, all_kinds = all_commands_and_kinds
     shutil.copytree(layout.PACKAGE, tmp_path / "roboirg")
     shutil.rmtree(tmp_path / "roboirg" / "apps" / application)
-    words = "run --policy random --tasks StopCube --settings explicit --episodes 1"
-    words += f" --max-steps 5 --workers 0 --out {tmp_path / 'run'}"
+    run = "run --policy random --tasks StopCube --settings explicit --episodes 1 --max-steps 5"
 
-    played = subprocess.run(
-        [sys.executable, "-c", PRINT_COMMANDS + RUN_COMMAND, *words.split()],
-        capture_output=True, text=True, check=False,
-        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+    commands, kinds, printed = start(
+        *run.split(), "--workers", "0", "--out", str(tmp_path / "run"),
+        program=PRINT_COMMANDS + RUN_COMMAND, PYTHONPATH=str(tmp_path),
     )  # fmt: skip
 
-    assert played.returncode == 0, played.stderr
-    walked, _, shown = played.stdout.partition("\n")
-    assert "StopCube" in shown
-
-    lost = set()
-    for name, modules in all_commands.items():
-        if all(module.startswith(f"roboirg.apps.{application}.") for module in modules):
-            lost.add(name)
-    commands, kinds = json.loads(walked)
-    assert all_commands.keys() - commands.keys() == lost
-    assert bool(lost) == (layout.PACKAGE / "apps" / application / "commands.py").exists()
-    assert all_kinds == set(kinds)
+    assert all_commands - commands == lost
+    assert kinds == {"learned", "trained"}
+    assert "StopCube" in printed

@@ -27,7 +27,7 @@ OPTIONS = {
     "observe_every": 3,
     "delivery": "turns",
 }
-CHUNKS = np.random.default_rng(0).normal(0, 0.05, (3, 2, 4, 8)) + HOME_ACTION
+THREE_CHUNKS = np.random.default_rng(0).normal(0, 0.05, (3, 2, 4, 8)) + HOME_ACTION
 """Three chunks of four actions for two environments, whose episodes last two and a half."""
 
 
@@ -51,10 +51,11 @@ def check_second(batch, infos, observation, info):
         assert np.array_equal(infos["demonstration"][1][key], frames), key
 
 
-def test_sub_environments_that_take_chunks_equal_single_ones():
-    """The second one has episode 1, then 2, as a single environment has here, with the same chunks.
+@pytest.fixture(scope="module")
+def vector():
+    """Two sub-environments in processes of their own; a step of each is a chunk of four actions.
 
-    An episode ends after ten steps: in the middle of the third chunk of four.
+    Their episodes have at most ten steps (`OPTIONS`).
     """
     vector = gymnasium.make_vec(
         f"roboirg.envs.registration:{environment_id('VideoUnmaskSwap')}",
@@ -65,24 +66,41 @@ def test_sub_environments_that_take_chunks_equal_single_ones():
         episode=None,
         **OPTIONS,
     )
+    yield vector
+    vector.close()
+
+
+def test_sub_environments_that_take_chunks_equal_single_ones(vector):
+    """`vector` has two sub-environments. Seed 50 starts test episode 0 of 50 in the first and 1 in
+    the second, which goes on with episode 2 after its end. A single environment with the same
+    options plays these two with the same chunks, and gives the same, bit for bit (`check_second`).
+
+    `THREE_CHUNKS` are random, each of four actions for each sub-environment. An episode ends after
+    ten steps, so in the middle of the third chunk.
+    """
     single = roboirg.make("VideoUnmaskSwap", **OPTIONS)
 
     batch, infos = vector.reset(seed=50)
+
     check_second(batch, infos, *single.reset(options={"episode": 1}))
-    assert [video.length for video in infos["demonstration"]] == [114, 168]
-
-    for chunks in CHUNKS:
+    for chunks in THREE_CHUNKS:
         batch, rewards, terminated, truncated, infos = vector.step(chunks)
-        observation, *given, info = single.step_chunk(chunks[1])
+        observation, *ending, info = single.step_chunk(chunks[1])
         check_second(batch, infos, observation, info)
-        assert [rewards[1], terminated[1], truncated[1]] == given
-    assert infos["steps"].tolist() == [10, 10]
+        assert [rewards[1], terminated[1], truncated[1]] == ending
     assert truncated.all()
+    assert infos["steps"].tolist() == [10, 10]
 
-    batch, *_, infos = vector.step(chunks)  # starts the next episodes
+    batch, *_, infos = vector.step(THREE_CHUNKS[0])
+
     check_second(batch, infos, *single.reset(options={"episode": 2}))
 
-    vector.close()
+
+def test_a_reset_of_sub_environments_gives_the_demonstration_of_each(vector):
+    """Those of test episodes 0 and 1 have 114 and 168 frames, as long as the episodes' motions."""
+    _, infos = vector.reset(seed=50)
+
+    assert [video.length for video in infos["demonstration"]] == [114, 168]
 
 
 @pytest.mark.parametrize(
@@ -91,7 +109,9 @@ def test_sub_environments_that_take_chunks_equal_single_ones():
     ids=["two poses", "one pose", "not finite", "a text"],
 )
 def test_what_is_not_a_chunk_of_finite_numbers_is_refused_before_anything_moves(wrong):
-    """Here three poses of seven numbers are a chunk."""
+    """A chunk is three actions here, each a pose of six numbers and the gripper. An array of two
+    actions or of one, of numbers that are not finite, and a text are refused.
+    """
     env = ActionChunks(roboirg.make("PickXtimes", cameras=(), actions="ee_pose"), 3)
     env.reset()
 
@@ -114,12 +134,16 @@ def test_a_chunk_has_at_least_one_action():
 
 
 def test_the_documents_example_plays_a_chunk_of_16_actions_in_each_environment(tmp_path):
-    """It prints for each its success and its steps; here in two environments, not in 4."""
+    """It is the program of docs/environment.md with `make_vec`, as it stands there.
+
+    It has four environments that hold still for 16 steps, and prints for each whether it is solved
+    and its steps.
+    """
     page = (Path(__file__).parents[2] / "docs" / "environment.md").read_text()
     (example,) = re.findall(r"```python\n([^`]*make_vec[^`]*)```", page)
     script = tmp_path / "example.py"
-    script.write_text(example.replace("4", "2"))
+    script.write_text(example)
 
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
 
-    assert done.stdout == "[False False] [16 16]\n", done.stderr
+    assert done.stdout == "[False False False False] [16 16 16 16]\n", done.stderr

@@ -21,14 +21,16 @@ NAME = f"roboirg.envs.registration:{environment_id('PickXtimes')}"
 
 
 def test_a_reset_chooses_episode_and_words_for_that_episode_alone():
-    """The seed chooses nothing here, as the environment was made for an episode."""
+    """The environment is made for episode 3. A reset asks for another episode in another setting
+    and split, and gives what an environment that is made for it has. The next reset is back at
+    episode 3 with its words; its seed chooses nothing, as an episode was named."""
     env = roboirg.make("PickXtimes", cameras=(), episode=3)
-    made = roboirg.make("PickXtimes", cameras=(), episode=5, setting="spatial", split="val")
     words = env.instruction
+    other = roboirg.make("PickXtimes", cameras=(), episode=5, setting="spatial", split="val")
 
     chosen, _ = env.reset(options={"episode": 5, "setting": "spatial", "split": "val"})
-    assert chosen["instruction"] == made.instruction.text == env.instruction.text
-    assert env.episode == made.episode
+    assert chosen["instruction"] == other.instruction.text == env.instruction.text
+    assert env.episode == other.episode
 
     env.reset(seed=8)
     assert env.instruction == words
@@ -38,15 +40,13 @@ def test_a_reset_chooses_episode_and_words_for_that_episode_alone():
 @pytest.mark.parametrize(
     ("options", "error", "words"),
     [
-        (
-            {"cameras": ()},
-            UnknownNameError,
-            "no reset option 'cameras'; known: split, episode",
-        ),
+        ({"cameras": ()}, UnknownNameError, "no reset option 'cameras'; known: split, episode"),
         ({"episode": 50}, InvalidValueError, "no episode 50"),
     ],
 )
 def test_a_reset_refuses_unknown_options_and_episodes(options, error, words):
+    """Cameras are chosen when an environment is made, not at a reset. The split *test* has 50
+    episodes, 0 to 49."""
     env = roboirg.make("PickXtimes", cameras=())
 
     with pytest.raises(error, match=words):
@@ -63,8 +63,8 @@ def test_an_environment_of_an_episode_of_ones_own_may_change_its_words_and_not_t
 
 
 def test_seeds_choose_episodes_if_none_is_named():
-    """There are 50 episodes, so a seed chooses the rest of its division by 50; without one the next
-    episode is played, and after the last one the first."""
+    """There are 50 episodes, so a seed chooses the rest of its division by 50 (1049: 49); without
+    one the next episode is played, and after the last one the first."""
     env = roboirg.make("PickXtimes", cameras=(), episode=None)
     played = []
 
@@ -84,7 +84,9 @@ def vector():
 
 
 def test_gymnasium_s_vector_environment_gives_what_single_environments_give(vector):
-    """Seed 4 chooses episode 4 for the first one, and 5 for the second."""
+    """`vector` has two environments of PickXtimes. Gymnasium gives the first one the seed 4, and
+    the second one the next, 5, which choose episodes 4 and 5. So the second row of each part of the
+    observations must be that of a single environment of episode 5, made with the same OPTIONS."""
     batch, infos = vector.reset(seed=4)
 
     observation, _ = roboirg.make("PickXtimes", episode=5, **OPTIONS).reset()
@@ -94,23 +96,28 @@ def test_gymnasium_s_vector_environment_gives_what_single_environments_give(vect
 
 
 def test_gymnasium_s_vector_environment_goes_on_with_the_next_episodes(vector):
-    """Two environments begin with episodes 4 and 5, which end after two steps. Gymnasium's own
-    class resets an environment at the step after its end, so the third step begins the next
-    episode, of which 6 is the second one's."""
+    """`vector` has two environments with episodes of two steps. Seed 4 starts episode 4 in the
+    first and 5 in the second; each goes on with its own next one, 5 and 6. An episode ends at the
+    second step; the step after it only begins the next one, as Gymnasium's own class does it."""
+    at_rest = np.tile(HOME_ACTION, (2, 1))
     vector.reset(seed=4)
-    rest = np.tile(HOME_ACTION, (2, 1))
-    vector.step(rest)
 
-    *_, infos = vector.step(rest)
-    batch, *_ = vector.step(rest)
+    vector.step(at_rest)
+    *_, infos = vector.step(at_rest)
+    observations, *_ = vector.step(at_rest)
 
-    assert infos["cause"].tolist() == ["not done after 2 steps"] * 2
-    assert batch["instruction"][1] == roboirg.make("PickXtimes", episode=6).instruction.text
+    next_instructions = [
+        roboirg.make("PickXtimes", episode=index).instruction.text for index in (5, 6)
+    ]
+    assert list(infos["cause"]) == ["not done after 2 steps", "not done after 2 steps"]
+    assert list(observations["instruction"]) == next_instructions
 
 
 @pytest.mark.slow
 def test_a_fork_before_drawing_works():
-    """In a process of its own: forking is refused where pictures have been drawn."""
+    """Gymnasium's "async" vector environment forks a process for each of its two environments. The
+    program runs in a process of its own, since forking is refused where pictures have been drawn.
+    It prints the instructions; seed 4 chooses episodes 4 and 5."""
     program = (
         "import gymnasium\n"
         f"vector = gymnasium.make_vec({NAME!r}, 2, 'async', episode=None, **{OPTIONS})\n"
@@ -127,8 +134,9 @@ def test_a_fork_before_drawing_works():
 
 
 def test_a_fork_after_drawing_fails_at_once_with_the_reason():
-    """A picture was drawn in this process, and the driver does not survive a fork; "async" forks by
-    default."""
+    """The first line draws a picture in this process. The graphics driver does not survive a fork,
+    and Gymnasium's "async" vector environment forks by default; so it must fail, and name the
+    context that works."""
     roboirg.make("PickXtimes", **OPTIONS).reset()
     vector = gymnasium.make_vec(NAME, 2, "async", **OPTIONS)
     warnings.simplefilter("ignore")  # Gymnasium repeats the worker's traceback

@@ -46,7 +46,17 @@ def printed_by(words):
     return done.output
 
 
+@pytest.fixture
+def without_a_simulator(monkeypatch):
+    """Export synthetic trajectories instead of what the oracle does in the simulator."""
+    monkeypatch.setattr(export_run, "record_trajectory", synthetic_trajectories.record)
+    monkeypatch.setattr(export_run, "choose_policy", lambda job: None)
+
+
 def test_the_model_provider_of_the_page_sends_the_question_with_its_key(monkeypatch):
+    """A fixture has installed the code of docs/extend.md, as if it were a package: among it the
+    model provider *lab*. As the page says, it takes its key from the variable LAB_KEY, sends it in
+    the header X-Key, and writes each turn of a question as a role and a text."""
     monkeypatch.setenv("LAB_KEY", "secret")
     options = ModelOptions(provider="lab", model="lab-1")
     question = ModelQuery("you see", (ChatTurn("user", ("which?",)),))
@@ -58,7 +68,8 @@ def test_the_model_provider_of_the_page_sends_the_question_with_its_key(monkeypa
 
 
 def test_the_model_provider_of_the_page_counts_costs_at_its_prices():
-    """4 million tokens read and 1 million written cost 4 dollars."""
+    """The provider *lab* of docs/extend.md declares 0.5 dollars per million tokens read and 2 per
+    million written: 4 · 0.5 + 1 · 2 = 4 dollars."""
     options = ModelOptions(provider="lab", model="lab-1")
     reply = {"text": "red", "usage": {"read": 4_000_000, "written": 1_000_000}}
 
@@ -66,23 +77,26 @@ def test_the_model_provider_of_the_page_counts_costs_at_its_prices():
 
 
 def test_the_model_provider_of_the_page_has_no_prices_at_another_address():
+    """The provider *lab* of docs/extend.md declares its prices for its own address; what another
+    server with the same API costs is not known."""
     assert not ModelOptions(provider="lab", model="lab-1", base_url="http://here").has_prices
 
 
 def test_the_export_format_of_the_page_writes_its_files_and_describes_them(
-    folder_with_the_pages_code, monkeypatch
+    folder_with_the_pages_code, without_a_simulator
 ):
-    """One episode in two settings: a file of two lines."""
-    monkeypatch.setattr(export_run, "record_trajectory", synthetic_trajectories.record)
-    monkeypatch.setattr(export_run, "choose_policy", lambda job: None)
-
+    """A fixture has installed the code of docs/extend.md, as if it were a package: among it the
+    format *lab-lines*. As the page says, it writes a file for each trajectory, with a line of JSON
+    for each instruction: here one episode, instructed in two settings. Another fixture replaces the
+    recording in the simulator by a synthetic trajectory."""
     printed_by(
         "export demonstrations --format lab-lines --tasks PickXtimes --episodes 1 "
         "--settings explicit,direct --workers 0 --out data"
     )
 
-    assert len((folder_with_the_pages_code / "data/000000.jsonl").read_text().splitlines()) == 2
-    assert "Read the lines of" in (folder_with_the_pages_code / "data/README.md").read_text()
+    data = folder_with_the_pages_code / "data"
+    assert len((data / "000000.jsonl").read_text().splitlines()) == 2
+    assert "Read the lines of" in (data / "README.md").read_text()
 
 
 @pytest.fixture
@@ -94,17 +108,23 @@ def run(folder_with_the_pages_code):
 
 
 def test_the_column_of_the_page_is_in_the_results(run):
+    """The page's column *checkpoint* shows what a policy says in its metadata. The fixture's run
+    has one episode, by the checkpoint *mine*."""
     assert list(roboirg.results(run)["checkpoint"]) == ["mine"]
 
 
 def test_the_table_of_the_page_is_printed(run):
+    """The page's table *calls* has how often a policy was called for actions. The fixture's run has
+    one episode of the policy *random*, with 3 calls."""
     assert printed_by(f"tables {run} --which calls --format markdown").endswith("| random | 3 |\n")
 
 
 def test_the_help_of_tables_names_the_table_of_the_page():
+    """A fixture has installed the page's table *calls*, with the words *for actions*."""
     assert "calls (for actions)." in printed_by("tables --help")
 
 
 def test_the_figure_of_the_page_is_drawn(run, folder_with_the_pages_code):
+    """The page's figure is called *steps*; commands run in the folder of the fixture."""
     printed_by(f"figures {run} --which steps --out figures")
     assert (folder_with_the_pages_code / "figures/steps.svg").exists()

@@ -39,15 +39,7 @@ outside = "roboirg_outside.protocol"
 """
 LAB = ROOT / "docs" / "add-package.md"
 SETTING_PAGE = ROOT / "docs" / "add-setting.md"
-WITH_SETTING = "PickXtimes"
 """A task of the benchmark to which the recipe's setting applies."""
-PRINT_NAMES = """\
-from roboirg_outside.protocol import PROTOCOL
-from roboirg_outside.setting import SETTING
-from roboirg_outside.task import TASK
-import json
-print(json.dumps([TASK.name, SETTING.name, PROTOCOL.name]))
-"""
 CHECK_EPISODES_AND_WORDS = """\
 import sys
 sys.path[:0] = [{language!r}]
@@ -68,10 +60,7 @@ def recipe(page, heading, kind="python"):
     """The first block of a section in Python, or of another kind, as it stands in the docs."""
     text = (ROOT / "docs" / page).read_text()
     section = re.search(rf"^#+ {heading}\n(.*?)(?=^##|\Z)", text, flags=re.DOTALL | re.MULTILINE)
-    assert section, f"docs/{page} has no section {heading!r}"
-    block = re.search(rf"```{kind}\n(.*?)```", section[1], flags=re.DOTALL)
-    assert block, f"the section {heading!r} of docs/{page} has no {kind} block"
-    return block[1]
+    return re.search(rf"```{kind}\n(.*?)```", section[1], flags=re.DOTALL)[1]
 
 
 @pytest.fixture(scope="module")
@@ -109,15 +98,9 @@ def python_with_the_packages(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def names_of_additions(python_with_the_packages):
-    return json.loads(
-        subprocess.run([python_with_the_packages, "-c", PRINT_NAMES], check=True, stdout=-1).stdout
-    )
-
-
-@pytest.fixture(scope="module")
 def roboirg(python_with_the_packages, tmp_path_factory):
-    """Run a command in that environment and return what it prints."""
+    """A function that runs a command, given as words, in that environment, and returns what it
+    prints; ``roboirg.folder`` is where it runs."""
     folder = tmp_path_factory.mktemp("work")
 
     def run(*words):
@@ -133,59 +116,83 @@ def roboirg(python_with_the_packages, tmp_path_factory):
     return run
 
 
-def test_commands_list_the_task_setting_and_protocol_of_an_installed_package(
-    roboirg, names_of_additions
-):
-    """The package adds one of each; its setting is for a task of the benchmark (`WITH_SETTING`)."""
-    task, setting, protocol = names_of_additions
-    listed = {line.split()[0]: line for line in roboirg("tasks").splitlines()}
-    assert "explicit" in listed[task]
-    assert setting in listed[WITH_SETTING]
-    assert protocol in roboirg("serve", "--help")
+def records_of_run(folder):
+    """Return the records of a run, an episode each, as its file has them."""
+    return [json.loads(line) for line in (folder / "records.jsonl").open()]
+
+
+def test_tasks_lists_the_task_and_the_setting_of_an_installed_package(roboirg):
+    """The fixture has installed the recipes of the documentation: the task PlaceAndPress (recipe of
+    tasks), and the setting *colored* (recipe of settings), which is for PickXtimes and another task
+    of the benchmark. A line of `roboirg tasks` is a task and its settings."""
+    lines = roboirg("tasks").splitlines()
+
+    (own_task,) = [line for line in lines if line.startswith("PlaceAndPress ")]
+    (pick,) = [line for line in lines if line.startswith("PickXtimes ")]
+    assert "explicit" in own_task
+    assert "colored" in pick
+
+
+def test_serve_offers_the_protocol_of_an_installed_package(roboirg):
+    """The fixture has installed the recipes of the documentation: that of protocols adds *tiny*. A
+    policy is served by the protocol that is named on the command line."""
+    assert "tiny" in roboirg("serve", "--help")
 
 
 @pytest.mark.sim
-def test_an_episode_of_the_packages_task_and_setting_is_played_and_shown(
-    roboirg, names_of_additions
-):
-    """The listener plays the package's task, and PickXtimes with the package's setting."""
-    task, setting, *_ = names_of_additions
+def test_an_episode_of_the_packages_task_and_setting_is_played_and_shown(roboirg):
+    """The fixture has installed the recipes of the documentation: the task PlaceAndPress, and the
+    setting *colored* for PickXtimes. The built-in listener plays an episode of both tasks in all
+    their settings; it understands every one. The report of the run names what was added."""
     roboirg(
-        "run", "--policy", "listener", "--tasks", f"{task},{WITH_SETTING}", "--settings", "all",
+        "run", "--policy", "listener", "--tasks", "PlaceAndPress,PickXtimes", "--settings", "all",
         "--episodes", "1", "--out", "played",
     )  # fmt: skip
-    records = [json.loads(line) for line in (roboirg.folder / "played/records.jsonl").open()]
-    played = {(record["task"], record["options"]["setting"]) for record in records}
-    assert {(task, "direct"), (WITH_SETTING, "direct"), (WITH_SETTING, setting)} <= played
-    assert {record["outcome"] for record in records} == {"success"}
     roboirg("report", "played")
+
+    records = records_of_run(roboirg.folder / "played")
+    played = {(record["task"], record["options"]["setting"]) for record in records}
     page = (roboirg.folder / "played/report.html").read_text()
-    assert task in page
-    assert setting in page
+    assert {("PlaceAndPress", "direct"), ("PickXtimes", "colored")} <= played
+    assert {record["outcome"] for record in records} == {"success"}
+    assert "PlaceAndPress" in page
+    assert "colored" in page
+
+
+def test_a_function_of_the_page_s_package_is_a_command(roboirg):
+    """The fixture has installed the package of docs/add-package.md. Its entry point *lab* is a
+    function that prints *hello* some times and whose docstring is *Greet the lab.*"""
+    assert roboirg("lab", "--times", "2") == "hello hello\n"
+    assert "Greet the lab." in roboirg("--help")
 
 
 @pytest.mark.sim
-def test_the_package_of_the_page_adds_a_task_a_setting_a_kind_a_command_and_a_plan(roboirg):
-    assert roboirg("lab", "--times", "2") == "hello hello\n"
-    assert "Greet the lab." in roboirg("--help")
+def test_the_plan_of_the_page_s_package_plays_its_task_setting_and_kind_of_policy(roboirg):
+    """The fixture has installed the package of docs/add-package.md, with the task LabPick, the
+    setting *lab* and the kind of policies *lab:*, which acts at random. Its plan *lab-quick* has an
+    episode of this task in two settings, for the oracle, which succeeds, and for *lab:any*."""
     roboirg("run", "--plan", "lab-quick", "--max-steps", "400", "--out", "lab")
-    records = [json.loads(line) for line in (roboirg.folder / "lab/records.jsonl").open()]
-    played = {
-        (record["policy"], record["task"], record["options"]["setting"]) for record in records
-    }
-    assert played == {
-        (who, "LabPick", own) for who in ("oracle", "lab:any") for own in ("explicit", "lab")
-    }
-    assert {record["outcome"] for record in records if record["policy"] == "oracle"} == {"success"}
-    assert {record["error"] for record in records} == {None}
+
+    records = records_of_run(roboirg.folder / "lab")
+    played = [(row["policy"], row["task"], row["options"]["setting"]) for row in records]
+    assert sorted(played) == [
+        ("lab:any", "LabPick", "explicit"),
+        ("lab:any", "LabPick", "lab"),
+        ("oracle", "LabPick", "explicit"),
+        ("oracle", "LabPick", "lab"),
+    ]
+    assert {row["outcome"] for row in records if row["policy"] == "oracle"} == {"success"}
+    assert {row["error"] for row in records} == {None}
 
 
 def test_an_installed_package_does_not_change_the_benchmarks_own_episodes_and_words(
-    python_with_the_packages, names_of_additions
+    python_with_the_packages,
 ):
-    """A script compares both with the stored ones, in an environment with the package installed."""
-    _, added, _ = names_of_additions
+    """In an environment with two packages installed, which add the settings *colored* and *lab*, a
+    script compares fingerprints of our episodes, and digests of our words in all other settings,
+    with the stored ones; it ends with an error where one differs."""
     script = CHECK_EPISODES_AND_WORDS.format(
-        language=str(ROOT / "tests" / "language"), added=(added, "lab")
+        language=str(ROOT / "tests" / "language"), added=("colored", "lab")
     )
+
     subprocess.run([python_with_the_packages, "-c", script], check=True)

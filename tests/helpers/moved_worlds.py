@@ -1,4 +1,4 @@
-"""What tests of the simulator do with a world: let it rest, and let the expert work."""
+"""What tests of the simulator do with a world: let it rest, let the expert work, find objects."""
 
 import itertools
 
@@ -18,3 +18,8 @@ def execute(world, primitive):
     pieces = MotionPrimitives(world).execute(primitive)
     for action in itertools.chain.from_iterable(pieces):
         world.step(action)
+
+
+def seen_entity(body):
+    """Return the part of a body that moves and is seen: of a button its cap, else all of it."""
+    return body.entity if body.button is None else body.button.links[1].entity

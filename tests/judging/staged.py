@@ -55,10 +55,10 @@ class Staged:
         for item in episode.scene.objects:
             if item.kind in kinds:
                 self.now.add(Fact(kinds[item.kind], item.name))
-        self.tick()
+        self.wait()
         self._show()
-        self.tick()
-        self.turn = self.step
+        self.wait()
+        self.policy_start = self.step
 
     def _show(self):
         """Whatever the video is about; only its end matters here."""
@@ -67,11 +67,11 @@ class Staged:
             rest = self.now
             self.now = shown
             for _ in range(stage.lasting + 1):
-                self.tick()
+                self.wait()
             self.now = rest
         assert self.judge.index == len(self.episode.demonstration)
 
-    def tick(self, steps=1):
+    def wait(self, steps=1):
         """Let time pass."""
         for _ in range(steps):
             if self.judge.status is not Status.ONGOING:
@@ -89,7 +89,7 @@ class Staged:
 
     def until(self, step):
         """Let time pass until a step since reset."""
-        return self.tick(step - self.step)
+        return self.wait(step - self.step)
 
     def _run_shuttle(self):
         for run in self.episode.scene.motions:
@@ -105,34 +105,34 @@ class Staged:
                 if run.stopped_by in self.now:
                     self.now.add(Fact("stopped", run.subject, "target"))
 
-    def set(self, *facts, off=()):
+    def change(self, *begun, ended=()):
         """Facts begin and cease to hold, and it is a step later."""
-        self.now = (self.now - set(off)) | set(facts)
-        return self.tick()
+        self.now = (self.now - set(ended)) | set(begun)
+        return self.wait()
 
-    def attempt(self, *facts):
-        """Facts of attempts hold for a step."""
+    def attempt(self, *facts, steps=1):
+        """Facts of attempts hold for some steps, and then no longer."""
         self.tried |= set(facts)
-        self.tick()
+        self.wait(steps)
         self.tried -= set(facts)
-        return self.tick()
+        return self.wait()
 
     def rest(self, steps=250):
         """The hand stays where it is."""
-        self.tick(60).tried.add(Fact("lingering", "robot"))
-        return self.tick(steps)
+        self.wait(60).tried.add(Fact("lingering", "robot"))
+        return self.wait(steps)
 
     def reach(self, name):
-        return self.set(Fact("reached", name))
+        return self.change(Fact("reached", name))
 
     def miss(self, name):
         """The fingers close on nothing next to it and the hand goes away."""
-        return self.attempt(Fact("clutched", name)).tick(5)
+        return self.attempt(Fact("clutched", name)).wait(5)
 
     def lift(self, name):
         gone = tuple(f for f in self.now if f.subject == name and f.kind in RESTING)
-        self.reach(name).set(Fact("held", name), off=gone)
-        return self.tick(3).set(self._up(name))
+        self.reach(name).change(Fact("held", name), ended=gone)
+        return self.wait(3).change(self._up(name))
 
     def _up(self, name):
         kind = self.episode.scene[name].kind
@@ -141,28 +141,28 @@ class Staged:
     def put(self, name, place=None):
         """Lower it, let go, and take the hand away."""
         rest = "put_down" if self.episode.scene[name].kind == "container" else "lying"
-        self.set(off=(self._up(name),)).tick(3)
+        self.change(ended=(self._up(name),)).wait(3)
         there = () if place is None else (Fact("placed", name, place),)
-        self.set(Fact(rest, name), *there, off=(Fact("held", name),))
-        return self.set(off=(Fact("reached", name),))
+        self.change(Fact(rest, name), *there, ended=(Fact("held", name),))
+        return self.change(ended=(Fact("reached", name),))
 
     def fill(self, name, place):
         """Let it fall in; in a bin it is gone at once."""
-        self.set(off=(self._up(name), Fact("held", name), Fact("reached", name))).tick(2)
-        return self.set(Fact("binned", name, place))
+        self.change(ended=(self._up(name), Fact("held", name), Fact("reached", name))).wait(2)
+        return self.change(Fact("binned", name, place))
 
     def carry(self, name, place):
         """Bring it over a place from afar, and away again."""
         over = Fact("over", name, place)
-        return self.tick(20).set(over).tick(3).set(off=(over,))
+        return self.wait(20).change(over).wait(3).change(ended=(over,))
 
     def press(self, name="button"):
         hover = Fact("hovering", "robot", name)
         down = Fact("pressed", name)
-        return self.set(hover).set(down).tick(2).set(off=(down,)).set(off=(hover,))
+        return self.change(hover).change(down).wait(2).change(ended=(down,)).change(ended=(hover,))
 
     def hover(self, name="button"):
-        return self.set(Fact("hovering", "robot", name))
+        return self.change(Fact("hovering", "robot", name))
 
     def do(self, stage, instead=None):
         """A stage of a plan as the oracle does it, with some names taken for others."""
@@ -190,10 +190,10 @@ class Staged:
             case "hold_until":
                 self.until(steps)
             case _:
-                self.tick(steps + 2)
-        return self.tick()
+                self.wait(steps + 2)
+        return self.wait()
 
-    def play(self, stages):
+    def perform(self, stages):
         for stage in stages:
             self.do(stage)
         return self
@@ -205,7 +205,7 @@ class Staged:
             self.episode,
             self.events,
             timed_out=ongoing and timed_out,
-            policy_start_step=self.turn,
+            policy_start_step=self.policy_start,
             elapsed_steps=self.step,
             cause=self.judge.cause or cause,
             attempts=self.attempts,

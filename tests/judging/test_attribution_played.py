@@ -13,8 +13,7 @@ from roboirg.judging import attribute_failure
 from roboirg.language import instruct, mirrored_objects
 from roboirg.policies import play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
-from roboirg.tasks import every_task, get_task, with_goal
-from roboirg.tasks.other_goals import begins_with
+from roboirg.tasks import every_task, get_task
 from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
@@ -44,30 +43,52 @@ class OracleWithAnotherGoal(ScriptedPolicy):
         return self.goal
 
 
+def attribution_of_a_play_for(goal, episode):
+    """Return what it is attributed to if the oracle's hands play an episode for another goal."""
+    env = roboirg.make(episode, cameras=(), max_steps=1000)
+    return attribution_of(env, play(env, OracleWithAnotherGoal(goal)))
+
+
+TASKS_WITH_HIDDEN_GOALS = ("StopCube", "VideoUnmaskSwap")
+OTHER_TASKS = [task for task in every_task() if task not in TASKS_WITH_HIDDEN_GOALS]
+
+
 @pytest.mark.parametrize(
-    "task", slow_but(["PickXtimes", "VideoUnmask", "VideoRepick", "PutInBox"], every_task())
+    "task", slow_but(["PickXtimes", "VideoUnmask", "VideoRepick", "PutInBox"], OTHER_TASKS)
 )
 def test_an_oracle_that_pursues_a_wrong_goal_fails_by_grounding(task):
-    """Grounding: it acts well, on what the words do not mean.
-
-    But nobody sees that a later visit of StopCube's cube was meant, or that a container in the air
-    was meant alone. A goal that includes more than the right one succeeds on the way.
-    """
-    other_kinds = {"StopCube": "undecided", "VideoUnmaskSwap": "execution"}
+    """The oracle's hands act well, but for a goal that the words do not mean, such as another color
+    or number. Of all such goals of a scene the first and the last one are played. StopCube and
+    VideoUnmaskSwap, where acts do not always show the goal, have a test of their own."""
     episode = get_episode(task, "test", 3)
-    others = [goal for goal in get_task(task).goals(episode.scene) if goal != episode.goal]
-    for goal in {others[0], others[-1]}:
-        env = roboirg.make(episode, cameras=(), max_steps=1000)
+    goals = get_task(task).goals(episode.scene)
+    wrong_goals = [goal for goal in goals if goal != episode.goal]
 
-        info = play(env, OracleWithAnotherGoal(goal))
+    for goal in {wrong_goals[0], wrong_goals[-1]}:
+        assert attribution_of_a_play_for(goal, episode).kind == "grounding", goal
 
-        found = attribution_of(env, info)
-        succeeds = begins_with(with_goal(episode, goal).stages, episode.stages)
-        assert info["is_success"] == succeeds, goal
-        assert (found is None) == succeeds, goal
-        if not succeeds:
-            assert info["cause"] is not None, goal
-            assert found.kind in ("grounding", other_kinds.get(task)), goal
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("task", "goal", "kind"),
+    [
+        # The cube is to be stopped at its second visit, at the end of which the verdict falls.
+        # Waiting for a later one looks like having stopped.
+        ("StopCube", Goal.of(visit=3), "undecided"),
+        ("StopCube", Goal.of(visit=5), "undecided"),
+        # The containers over the green and the blue cube are meant. To hold up the green cube's
+        # alone is a right beginning that takes too long.
+        ("VideoUnmaskSwap", Goal.of(colors=("green",)), "execution"),
+        ("VideoUnmaskSwap", Goal.of(colors=("red", "blue")), "grounding"),
+    ],
+)
+def test_a_wrong_goal_that_acts_do_not_show_is_no_grounding_failure(task, goal, kind):
+    """The oracle's hands act well for a goal that the words do not mean. An attribution sees acts,
+    not intentions, so it is only of grounding if an act fits no right plan, such as a lift of the
+    red cube's container."""
+    episode = get_episode(task, "test", 3)
+
+    assert attribution_of_a_play_for(goal, episode).kind == kind
 
 
 GREEN_ON_THE_RIGHT = get_episode("PickXtimes", "train", 39)

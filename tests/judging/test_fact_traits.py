@@ -26,19 +26,36 @@ from roboirg.tasks.splits.splits import get_episode
 SOURCE = Path(roboirg.__file__).parent
 
 
-def test_the_kinds_of_facts_in_the_code_are_those_in_the_table_of_traits():
-    """A fact is what holds in the world, such as *picked*; an attempt is a failed try. Searched are
-    all texts like `Fact("picked"` in the package: the files that detect attempts and facts must
-    make all kinds of the table, and no other file a further one."""
-    kinds = {
-        path.stem: set(re.findall(r"\bFact\(\s*\"(\w+)\"", path.read_text()))
-        for path in SOURCE.rglob("*.py")
-    }
-    attempts = {kind for kind, traits in FACT_TRAITS.items() if traits.role is FactRole.ATTEMPT}
-    assert kinds["attempt_detection"] - {"pressed"} == attempts
+def kinds_written_in(path):
+    """Return the kinds in texts such as `Fact("picked"` of a source file: *picked*."""
+    return set(re.findall(r"\bFact\(\s*\"(\w+)\"", path.read_text()))
 
-    facts = set(FACT_TRAITS) - attempts
-    assert kinds["fact_detection"] == set().union(*kinds.values()) - attempts == facts
+
+ATTEMPTS = {kind for kind, traits in FACT_TRAITS.items() if traits.role is FactRole.ATTEMPT}
+"""The kinds of the table that are failed tries, such as *clutched*."""
+
+
+def test_attempt_detection_makes_every_kind_of_attempt_in_the_table_of_traits():
+    """An attempt is a failed try, such as fingers that close on nothing. The file that detects them
+    names each kind that the table marks as one, and a pressed button, next to which a press is no
+    attempt."""
+    detected = kinds_written_in(SOURCE / "simulation" / "attempt_detection.py")
+
+    assert detected == ATTEMPTS | {"pressed"}
+
+
+def test_fact_detection_makes_every_other_kind_of_fact_in_the_table_of_traits():
+    """A fact is what holds in the world, such as a cube that is *picked*. The file that detects
+    facts names each kind of the table but attempts."""
+    detected = kinds_written_in(SOURCE / "simulation" / "fact_detection.py")
+
+    assert detected == set(FACT_TRAITS) - ATTEMPTS
+
+
+def test_no_source_file_names_a_kind_of_fact_that_is_not_in_the_table_of_traits():
+    """A kind in a text such as `Fact("picekd"`, with a slip, would never hold."""
+    for path in SOURCE.rglob("*.py"):
+        assert kinds_written_in(path) <= set(FACT_TRAITS), path
 
 
 def facts_named_in(episode):
@@ -53,22 +70,24 @@ def facts_named_in(episode):
 
 @pytest.mark.parametrize("task", every_task())
 def test_facts_in_tasks_are_about_objects_that_their_kind_allows(task):
-    """*Picked* is about a cube or a tape, and has no place; *over* has a place."""
+    """The table of traits says of each kind of fact which kinds of objects it can be about, and at
+    which places: *picked* is about a cube or a tape and has no place, *over* has one. So it must be
+    for all facts that stages, motions and the video of four episodes name."""
     for index in range(4):
         episode = get_episode(task, "test", index)
-        kinds = {item.name: item.kind for item in episode.scene.objects} | {"robot": "robot"}
+        kinds = {item.name: item.kind for item in episode.scene.objects}
+        kinds |= {"robot": "robot", None: None}
         for fact in facts_named_in(episode):
             traits = FACT_TRAITS[fact.kind]
             assert kinds[fact.subject] in traits.subjects, fact
-            if traits.places:
-                assert kinds[fact.place] in traits.places, fact
-            else:
-                assert fact.place is None, fact
+            assert kinds[fact.place] in (traits.places or [None]), fact
 
 
 @pytest.mark.parametrize("kind", FACT_TRAITS)
 def test_the_words_of_a_kind_of_fact_name_its_subject_and_place(kind):
-    """The robot is not named, as in "pressed the red button"."""
+    """The words of a kind of fact have gaps, as in *placed {subject} on {place}*. They must have
+    one for the place if the kind has places, and one for the subject unless that is always the
+    robot, which is not named: *pressed the red button* has a button as its subject."""
     traits = FACT_TRAITS[kind]
 
     words = traits.past.format(subject="SUBJECT", place="PLACE")
@@ -139,7 +158,9 @@ def test_a_registered_kind_of_fact_can_be_forbidden_and_is_judged(registered_top
 
 
 def test_a_registered_kind_of_fact_is_described_in_the_words_it_brings(registered_toppled):
-    """*Toppled* brings "knocked {subject} over" for events and "knocked over" for a state."""
+    """The fixture has registered *toppled*, a kind of fact, with the words "knocked {subject} over"
+    for an event and "knocked over" for a state. The names of objects are a dictionary from names to
+    words; without any, the name itself stands there. TOPPLED is that the pillar is toppled."""
     begins = EventRecord(step=3, kind="toppled", subject="pillar", place=None, holds=True)
     ends = EventRecord(step=9, kind="toppled", subject="pillar", place=None, holds=False)
 
@@ -149,10 +170,9 @@ def test_a_registered_kind_of_fact_is_described_in_the_words_it_brings(registere
 
 
 def test_a_failure_by_a_registered_kind_of_fact_is_named_by_its_role(registered_toppled):
-    """*Toppled* has the role of a press, which ends a task: done too early, it is a wrong count.
-
-    A cube carried over a target too early is a wrong order.
-    """
+    """The plan is to pick a cube, to topple a pillar and to carry the cube over a target; the pick
+    is due. The fixture has registered *toppled* with the role of a press, which ends a task: done
+    too early, it is a wrong count. A cube carried over a target too early is a wrong order."""
     carried = Fact("over", "cube", "target_left")
     plan = [stage_that_expects(fact) for fact in (Fact("picked", "cube"), TOPPLED, carried)]
 
@@ -199,6 +219,7 @@ SCENE_WITH_A_PILLAR = Scene((SceneObject("pillar", "pillar", Point(0.0, 0.0, 0.0
 
 @pytest.mark.sim
 def test_an_unknown_kind_of_object_is_refused():
+    """The scene has an object of the kind *pillar*, for which nothing is registered here."""
     from roboirg.simulation.world import World
 
     with pytest.raises(UnknownNameError, match="no kind of object 'pillar'"):
@@ -207,8 +228,8 @@ def test_an_unknown_kind_of_object_is_refused():
 
 @pytest.mark.sim
 def test_registering_a_kind_of_object_under_a_taken_name_is_refused():
-    """*Cube* is a kind of the benchmark, which has its own builder; `build_pillar` is another
-    one."""
+    """*Cube* is a kind of the benchmark, which has its own builder; `build_pillar` is another one,
+    which could not build cubes."""
     from roboirg.simulation import bodies
 
     with pytest.raises(InvalidValueError, match="already a kind of object 'cube'"):
@@ -219,17 +240,24 @@ def test_registering_a_kind_of_object_under_a_taken_name_is_refused():
 def test_a_registered_kind_of_object_is_built_and_its_kind_of_fact_detected(
     registered_toppled, registered_pillar, monkeypatch
 ):
-    """A pillar counts as toppled once its center has been beyond x = 0.05, and for ever."""
+    """The fixtures have registered *pillar*, a kind of object, with its builder, and *toppled*, a
+    kind of fact: it holds of a pillar whose center is beyond x = 0.05 m, and lasts once it has
+    held. The detection of facts gets the table with *toppled*. The pillar stands at x = 0, is put
+    to x = 0.1 m, and back."""
     from roboirg.simulation import fact_detection
     from roboirg.simulation.physics_settings import HOME_ACTION
     from roboirg.simulation.world import World
 
     monkeypatch.setattr(fact_detection, "FACT_TRAITS", fact_traits.FACT_TRAITS)
     world = World(SCENE_WITH_A_PILLAR, visible=False)
-    pillar = world.bodies["pillar"]
 
-    assert TOPPLED not in world.step(HOME_ACTION)
-    pillar.put(Point(0.1, 0.0, 0.05))
-    assert TOPPLED in world.step(HOME_ACTION)
-    pillar.put(Point(0.0, 0.0, 0.05))
-    assert TOPPLED in world.step(HOME_ACTION)
+    facts_at_first = world.step(HOME_ACTION)
+    world.bodies["pillar"].put(Point(0.1, 0.0, 0.05))
+    facts_beyond = world.step(HOME_ACTION)
+    world.bodies["pillar"].put(Point(0.0, 0.0, 0.05))
+    facts_back = world.step(HOME_ACTION)
+
+    toppled = Fact("toppled", "pillar")
+    assert toppled not in facts_at_first
+    assert toppled in facts_beyond
+    assert toppled in facts_back

@@ -29,7 +29,7 @@ def put_down(name):
     return Fact("put_down", name)
 
 
-def begin(task):
+def presses_of(task):
     """Return the facts of the steps with which a task begins: a press, and a step without facts."""
     steps = []
     for press in PRESSES_OF[task]:
@@ -61,11 +61,11 @@ def episode_with_picks(task, count):
 
 @each_task
 def test_one_pick_succeeds_when_the_container_over_the_cube_is_lifted(task):
-    """The task begins with the presses of its buttons, if it has any (`begin`). Then the one
+    """The task begins with the presses of its buttons, if it has any (`presses_of`). Then the one
     container that hides the cube of the goal, `first`, is lifted."""
-    made = episode_with_picks(task, 1)
+    episode = episode_with_picks(task, 1)
 
-    judge = made.judged_after(*begin(task), [], [lifted(made.first)])
+    judge = episode.judged_after(*presses_of(task), [], [lifted(episode.first)])
 
     assert judge.status is Status.SUCCESS
     assert judge.cause is None
@@ -73,25 +73,27 @@ def test_one_pick_succeeds_when_the_container_over_the_cube_is_lifted(task):
 
 @each_task
 def test_two_picks_succeed_in_order_with_the_first_put_down_between(task):
-    """Two containers are to be lifted, `first` and then `second`; each list has the facts of one
-    step. Until the second one is lifted, the episode goes on."""
-    made = episode_with_picks(task, 2)
-    down = [*begin(task), [lifted(made.first)], [], [put_down(made.first)], []]
+    """The task begins with the presses of its buttons, if it has any (`presses_of`). Two containers
+    are to be lifted, `first` and then `second`; each list has the facts of one step. Until the
+    second one is lifted, the episode goes on."""
+    episode = episode_with_picks(task, 2)
+    down = [*presses_of(task), [lifted(episode.first)], [], [put_down(episode.first)], []]
 
-    assert made.judged_after(*down).status is Status.ONGOING
-    assert made.judged_after(*down, [lifted(made.second)]).status is Status.SUCCESS
+    assert episode.judged_after(*down).status is Status.ONGOING
+    assert episode.judged_after(*down, [lifted(episode.second)]).status is Status.SUCCESS
 
 
 @each_task
 def test_lifting_another_container_before_the_first_is_put_down_fails(task):
-    """The first container is up and has to be put down. In the very step in which it is, another
-    one is lifted, be it the second one that is meant or one that never is."""
-    made = episode_with_picks(task, 2)
-    for wrong in (made.second, *made.others):
-        up = [lifted(made.first)]
-        together = [put_down(made.first), lifted(wrong)]
+    """After the presses of the task's buttons, the first container is lifted and has to be put
+    down. In the very step in which it is, another one is lifted, be it the second one that is meant
+    or one that never is (`others`)."""
+    episode = episode_with_picks(task, 2)
+    for wrong in (episode.second, *episode.others):
+        up = [lifted(episode.first)]
+        together = [put_down(episode.first), lifted(wrong)]
 
-        judge = made.judged_after(*begin(task), up, together)
+        judge = episode.judged_after(*presses_of(task), up, together)
 
         assert judge.status is Status.FAILURE, wrong
         assert judge.cause.endswith("; expected: put down the container"), wrong
@@ -99,12 +101,13 @@ def test_lifting_another_container_before_the_first_is_put_down_fails(task):
 
 @each_task
 def test_lifting_a_wrong_container_as_the_second_one_fails(task):
-    """The first container was lifted and put down, so the second one is due. To lift the first one
-    again is as wrong as to lift one that is never meant."""
-    made = episode_with_picks(task, 2)
-    for wrong in (made.first, *made.others):
-        judge = made.judged_after(
-            *begin(task), [lifted(made.first)], [put_down(made.first)], [lifted(wrong)]
+    """After the presses of the task's buttons, the first container was lifted and put down, so the
+    second one is due. To lift the first one again is as wrong as to lift one that is never meant
+    (`others`)."""
+    episode = episode_with_picks(task, 2)
+    for wrong in (episode.first, *episode.others):
+        judge = episode.judged_after(
+            *presses_of(task), [lifted(episode.first)], [put_down(episode.first)], [lifted(wrong)]
         )
 
         assert judge.status is Status.FAILURE, wrong
@@ -112,71 +115,84 @@ def test_lifting_a_wrong_container_as_the_second_one_fails(task):
 
 @each_task
 def test_holding_the_first_container_long_or_lifting_it_again_is_allowed(task):
-    """The first container is up for four steps, down for one, and up again; then it is put down,
-    and the second one lifted, as is meant."""
-    made = episode_with_picks(task, 2)
-    up = [lifted(made.first)]
-    held = [*begin(task), up, up, up, up, [], up, []]
-    down = [put_down(made.first)]
+    """After the presses of the task's buttons, the first container is up for four steps, down for
+    one, and up again; an empty list is a step without facts. Then it is put down, and the second
+    one lifted, as is meant."""
+    episode = episode_with_picks(task, 2)
+    up = [lifted(episode.first)]
+    held = [*presses_of(task), up, up, up, up, [], up, []]
+    down = [put_down(episode.first)]
 
-    assert made.judged_after(*held).status is Status.ONGOING
-    assert made.judged_after(*held, down, [lifted(made.second)]).status is Status.SUCCESS
+    assert episode.judged_after(*held).status is Status.ONGOING
+    assert episode.judged_after(*held, down, [lifted(episode.second)]).status is Status.SUCCESS
 
 
 @each_task
 def test_putting_down_other_containers_does_not_complete_putting_down_the_first(task):
-    """Two are to be lifted, one after the other. The stage before the last one stays due."""
-    made = episode_with_picks(task, 2)
-    down = [put_down(name) for name in (made.second, *made.others)]
+    """Two containers are to be lifted, one after the other. The first one is up; that others lie on
+    the table does not count, so the stage before the last one, to put it down, stays due."""
+    episode = episode_with_picks(task, 2)
+    down = [put_down(name) for name in (episode.second, *episode.others)]
 
-    judge = made.judged_after(*begin(task), [lifted(made.first)], down)
+    judge = episode.judged_after(*presses_of(task), [lifted(episode.first)], down)
 
-    assert (judge.status, judge.index) == (Status.ONGOING, len(made.episode.stages) - 2)
+    assert (judge.status, judge.index) == (Status.ONGOING, len(episode.episode.stages) - 2)
 
 
 @each_button_task
 def test_before_the_button_is_pressed_any_container_may_be_lifted(task):
-    """All containers are lifted before each press, of one button or two. Afterwards the two that
+    """The task is to press its button, or its two buttons, and then to lift two containers in
+    order. All containers are lifted before each press, which is allowed. Afterwards the two that
     are meant are lifted in order, which is a success."""
-    made = episode_with_picks(task, 2)
-    up = [lifted(name) for name in (made.first, made.second, *made.others)]
+    episode = episode_with_picks(task, 2)
+    up = [lifted(name) for name in (episode.first, episode.second, *episode.others)]
     early = []
     for press in PRESSES_OF[task]:
         early += [up, [press]]
-    picks = [[lifted(made.first)], [put_down(made.first)], [lifted(made.second)]]
+    picks = [[lifted(episode.first)], [put_down(episode.first)], [lifted(episode.second)]]
 
-    judge = made.judged_after(*early, *picks)
+    judge = episode.judged_after(*early, *picks)
 
     assert judge.status is Status.SUCCESS
 
 
 @each_button_task
-@pytest.mark.parametrize("is_meant", [True, False], ids=["the meant one", "another one"])
-def test_a_container_that_is_up_during_the_last_press_counts_one_step_later(task, is_meant):
-    """A container is already up in the step of the last press. Then the press completes its stage,
-    so the episode goes on; a step later the container is judged: the meant one is a success,
-    another one a failure."""
-    made = episode_with_picks(task, 1)
-    up = lifted(made.first if is_meant else made.others[0])
-    *before, last = PRESSES_OF[task]
-    pressed = [*([press] for press in before), [last, up]]
+@pytest.mark.parametrize(
+    ("is_meant", "status"),
+    [(True, Status.SUCCESS), (False, Status.FAILURE)],
+    ids=["the meant one", "another one"],
+)
+def test_a_container_that_is_up_during_the_last_press_counts_one_step_later(task, is_meant, status):
+    """The task is to press its button, or its two buttons, and then to lift one container. A
+    container is already up at the step of the last press. At this step it is the press that counts,
+    so the episode goes on; a step later, the container decides."""
+    episode = episode_with_picks(task, 1)
+    up = lifted(episode.first if is_meant else episode.others[0])
+    presses = [[press] for press in PRESSES_OF[task]]  # one press a step
+    presses[-1].append(up)
 
-    judge = made.judged_after(*pressed, [up])
-
-    assert made.judged_after(*pressed).status is Status.ONGOING
-    assert judge.status is (Status.SUCCESS if is_meant else Status.FAILURE)
+    assert episode.judged_after(*presses).status is Status.ONGOING
+    assert episode.judged_after(*presses, [up]).status is status
 
 
 @each_button_task
 def test_pressing_again_later_has_no_effect(task):
-    """All buttons are pressed again at the beginning, while the first container is up, and after it
-    was put down. The second container then still makes it a success."""
-    made = episode_with_picks(task, 2)
+    """`again` presses all buttons of the task once more: at the beginning, while the first
+    container is up, and after it was put down. The second container then still makes it a
+    success."""
+    episode = episode_with_picks(task, 2)
     again = [[press] for press in PRESSES_OF[task]]
-    down = [*begin(task), *again, [lifted(made.first)], *again, [put_down(made.first)], *again]
+    down = [
+        *presses_of(task),
+        *again,
+        [lifted(episode.first)],
+        *again,
+        [put_down(episode.first)],
+        *again,
+    ]
 
-    assert made.judged_after(*down).status is Status.ONGOING
-    assert made.judged_after(*down, [lifted(made.second)]).status is Status.SUCCESS
+    assert episode.judged_after(*down).status is Status.ONGOING
+    assert episode.judged_after(*down, [lifted(episode.second)]).status is Status.SUCCESS
 
 
 def stages_complete_after(*steps):

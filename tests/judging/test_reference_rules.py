@@ -44,8 +44,9 @@ def repick_episode_and_facts(repeats, difficulty="medium"):
 
 @pytest.mark.parametrize("repeats", [1, 2, 3])
 def test_repick_succeeds_after_the_wanted_number_of_picks_and_a_press(repeats):
-    """Each list holds the facts of one step: the cube
-    lies, is picked up, is in the air, lies again."""
+    """A cube is to be picked up and put down `repeats` times, and then the button pressed. Each
+    list holds the facts of one step: the cube lies, is picked up, is in the air, lies again.
+    Without the press the episode goes on."""
     episode, picked, lying = repick_episode_and_facts(repeats)
     picks = [[lying], [picked], [], [lying]] * repeats
 
@@ -76,15 +77,17 @@ def test_a_repick_goes_on_while_other_cubes_lie():
 
 
 def test_a_repick_goes_on_while_the_cube_is_in_the_air():
-    """There it is neither picked nor lying, as when it is held low."""
+    """The cube is to be picked up once more, put down, and the button pressed. Each list holds the
+    facts of one step. In the air, such as when it is held low, the cube is neither picked nor
+    lying."""
     episode, picked, lying = repick_episode_and_facts(1)
 
     assert status_after(episode, [picked], [], [], [picked], [lying], [PRESSED]) is Status.SUCCESS
 
 
 def test_repick_counts_a_cube_that_was_let_go_as_put_down_wherever_it_lies():
-    """The cube is to be picked up twice, then the button pressed. It only has to lie somewhere; the
-    next lift is the second one."""
+    """The cube is to be picked up twice, then the button pressed. Each list holds the facts of one
+    step. The cube only has to lie somewhere; the next pick is the second one."""
     episode, picked, lying = repick_episode_and_facts(2)
     picks = [[picked], [lying], [picked], [lying]]
 
@@ -92,67 +95,71 @@ def test_repick_counts_a_cube_that_was_let_go_as_put_down_wherever_it_lies():
 
 
 @pytest.mark.parametrize(
-    ("elapsed", "fails"), [(0, False), (49, False), (50, True), (500, True), (501, False)]
-)
-@pytest.mark.parametrize(
-    ("facts", "index", "start", "due"),
+    ("facts", "timer_start", "due"),
     [
-        ([""], 0, 0, "pick up the correct cube for the first time"),
-        # The timer of putting down starts at the evaluation after the one that completes the pick.
-        ([*[""] * 40, "picked", ""], 1, 41, "put it down"),
-        # Timers run on over the repetitions; that of putting down started one step later.
-        (["picked", "lying"], 2, 0, "pick up the correct cube for the second time"),
-        (["picked", "lying", "picked"], 3, 1, "put it down"),
+        ([""], 0, "pick up the correct cube for the first time"),
+        ([*[""] * 40, "picked", ""], 41, "put it down"),
+        (["picked", "lying"], 0, "pick up the correct cube for the second time"),
+        (["picked", "lying", "picked"], 1, "put it down"),
     ],
     ids=["first pick", "first put down", "second pick", "second put down"],
 )
 def test_pressing_the_button_during_a_repick_stage_fails_from_50_to_500_steps(
-    facts, index, start, due, elapsed, fails
+    facts, timer_start, due
 ):
-    """After the timer of the current stage has started.
-
-    Args:
-        facts: of each step before; an empty text is a step without any.
-        index: of the current stage.
-        start: step at which its timer has started.
-        due: what the cause names as expected.
-    """
+    """The cube is to be picked up and put down, twice, and then the button pressed. As in RoboMME,
+    a press before that is forgiven until a timer is at 50 steps, and again after 500. One timer, of
+    picking up, runs from step 0; another one, of putting down, from the step after the first pick;
+    neither starts anew in the second round. `facts` has what is seen of the cube at each step
+    before the press, and `due` is what has to be done then."""
     episode, picked, lying = repick_episode_and_facts(2)
-    facts_of = {"": [], "picked": [picked], "lying": [lying]}
-    judge = judged_after(episode, *(facts_of[fact] for fact in facts))
+    fact_sets = {"": [], "picked": [picked], "lying": [lying]}
 
-    judge.update(start + elapsed, frozenset([PRESSED]))
+    def judge_of_a_press(timer):
+        judge = judged_after(episode, *(fact_sets[fact] for fact in facts))
+        judge.update(timer_start + timer, frozenset([PRESSED]))
+        return judge
 
-    assert judge.index == index
-    if fails:
-        cause = f"pressed the button too early; expected: {due}"
-        assert (judge.status, judge.cause) == (Status.FAILURE, cause)
-    else:
-        assert (judge.status, judge.cause) == (Status.ONGOING, None)
+    too_early = f"pressed the button too early; expected: {due}"
+    assert judge_of_a_press(timer=49).status is Status.ONGOING
+    assert judge_of_a_press(timer=50).cause == too_early
+    assert judge_of_a_press(timer=500).cause == too_early
+    assert judge_of_a_press(timer=501).status is Status.ONGOING
+
+
+def judge_after_the_video(episode, picked, lying):
+    """Return a judge at the first step of the policy's turn, and the number of this step.
+
+    The video shows the cube picked up once; then the robot rests at home.
+    """
+    judge = Judge.of(episode)
+    step = 0
+    while judge.index < len(episode.demonstration):
+        judge.update(step, frozenset([lying if step else picked, STILL, HOME]))
+        step += 1
+    judge.update(step, frozenset())
+    return judge, step
 
 
 @pytest.mark.parametrize(
     ("elapsed", "status"), [(1, Status.ONGOING), (49, Status.ONGOING), (50, Status.FAILURE)]
 )
 def test_the_time_in_which_a_press_is_ignored_starts_after_the_video(elapsed, status):
-    """A press is ignored for the first 50 steps of the policy's turn; the video is longer."""
+    """To press the button before the cube is picked up fails, but for the first 50 steps. They
+    count from the policy's turn: the video has taken more than 50 steps already."""
     episode, picked, lying = repick_episode_and_facts(1)
-    judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
-    step = 0
-    while judge.index < len(episode.demonstration):
-        judge.update(step, frozenset([lying if step else picked, STILL, HOME]))
-        step += 1
-    assert step > 100
-    judge.update(step, frozenset())
+    judge, policy_start = judge_after_the_video(episode, picked, lying)
+    assert policy_start > 50
 
-    judge.update(step + elapsed, frozenset([PRESSED]))
+    judge.update(policy_start + elapsed, frozenset([PRESSED]))
 
     assert judge.status is status
 
 
 def test_a_press_before_the_repick_does_not_replace_the_one_after_it():
-    """The task is to pick a cube up once more and to
-    press the button; early presses are ignored."""
+    """The task is to pick a cube up once more and then to press the button. Each list holds the
+    facts of one step. A press at the first step is too early to fail, but it does not count,
+    either."""
     episode, picked, lying = repick_episode_and_facts(1)
 
     assert status_after(episode, [PRESSED], [picked], [lying]) is Status.ONGOING
@@ -203,9 +210,9 @@ def wrong_placements(episode, number):
 def test_a_place_task_needs_the_right_cube_picked_and_then_placed_on_the_right_disc(
     episode, number
 ):
-    """Each list holds the facts of one step; discs are targets on the table. `number` says which
-    placement of the video the goal refers to. The pick or the placement alone leaves the episode
-    undecided."""
+    """The goal is to put the green cube on the disc of placement `number` of the video; discs are
+    targets on the table. Each list holds the facts of one step. Picked and then placed there it is
+    a success; the pick or the placement alone leaves the episode undecided."""
     placed = right_placement(episode, number)
 
     assert status_after(episode, [GREEN_PICKED], [], [placed, GREEN_LYING]) is Status.SUCCESS
@@ -215,8 +222,9 @@ def test_a_place_task_needs_the_right_cube_picked_and_then_placed_on_the_right_d
 
 @every_place_goal
 def test_placing_the_right_cube_on_a_wrong_disc_fails(episode, number):
-    """`number` says which placement of the video the goal refers to; its disc is the right one. On
-    every other disc the green cube fails, also if it is on the right one at the same time."""
+    """The goal is to put the green cube on the disc of placement `number` of the video, its
+    `right_placement`. Every other disc fails, also if the cube is on the right one at the same
+    time."""
     placed = right_placement(episode, number)
     for wrong in wrong_placements(episode, number):
         assert status_after(episode, [GREEN_PICKED], [], [wrong]) is Status.FAILURE, wrong
@@ -225,8 +233,9 @@ def test_placing_the_right_cube_on_a_wrong_disc_fails(episode, number):
 
 @every_place_goal
 def test_before_it_is_picked_up_the_right_cube_may_be_on_any_disc(episode, number):
-    """The green cube first stands on a wrong disc, as the video may have left it; then it is picked
-    up and placed on the right one, which is a success."""
+    """The goal is to put the green cube on the disc of placement `number` of the video. It first
+    stands on another disc, as the video may have left it; then it is picked up and placed on the
+    right one, which is a success."""
     placed = right_placement(episode, number)
     for wrong in wrong_placements(episode, number):
         assert status_after(episode, [wrong], [GREEN_PICKED], [placed]) is Status.SUCCESS, wrong
@@ -235,8 +244,9 @@ def test_before_it_is_picked_up_the_right_cube_may_be_on_any_disc(episode, numbe
 @every_place_goal
 @pytest.mark.parametrize("other", ["cube_red", "cube_blue"])
 def test_picking_another_cube_fails_unless_the_right_one_was_picked_before(episode, number, other):
-    """The green cube is meant. Another one fails before it, and also together with it in the next
-    step; once the green cube was picked, the next stage is to place it, which forbids no picks."""
+    """The goal is to put the green cube on the disc of placement `number` of the video. A pick of
+    another cube fails before that of the green one, and also together with it at the next step;
+    once the green cube was picked, the next stage is to place it, which forbids no picks."""
     placed = right_placement(episode, number)
     wrong = Fact("picked", other)
 
@@ -247,8 +257,8 @@ def test_picking_another_cube_fails_unless_the_right_one_was_picked_before(episo
 
 @every_place_goal
 def test_other_cubes_may_be_placed_anywhere(episode, number):
-    """The green cube is meant. A red one stands on a disc all the time, which matters neither
-    before the pick nor at the placement."""
+    """The goal is to put the green cube on the disc of placement `number` of the video. A red one
+    stands on a disc all the time, which matters neither before the pick nor at the placement."""
     placed = right_placement(episode, number)
     other = Fact("placed", "cube_red", "target_3")
 
@@ -257,11 +267,15 @@ def test_other_cubes_may_be_placed_anywhere(episode, number):
 
 @every_place_goal
 def test_in_a_place_task_presses_drops_and_the_marked_site_are_ignored(episode, number):
-    """The site is a mark on the table that is no target. The button is pressed and the green cube
-    dropped on the site and picked up again; only the right disc then ends the episode."""
-    placed = right_placement(episode, number)
-    site = Fact("placed", "cube_green", "site")
-    steps = [[PRESSED, site], [GREEN_PICKED], [PRESSED], [GREEN_LYING, site], [GREEN_PICKED]]
+    """The green cube is to be put on a disc, the one of placement `number` of the video. Each list
+    has the facts of a step: on the way, the button is pressed, and the cube lies on the site, a
+    mark on the table that is no disc. Neither ends the episode; only the right disc does, also
+    while the button is pressed."""
+    picked = Fact("picked", "cube_green")
+    pressed = Fact("pressed", "button")
+    on_the_site = [Fact("lying", "cube_green"), Fact("placed", "cube_green", "site")]
+    on_the_disc = right_placement(episode, number)
+    way = [[pressed, *on_the_site], [picked], [pressed], on_the_site, [picked]]
 
-    assert status_after(episode, *steps) is Status.ONGOING
-    assert status_after(episode, *steps, [placed, PRESSED]) is Status.SUCCESS
+    assert status_after(episode, *way) is Status.ONGOING
+    assert status_after(episode, *way, [on_the_disc, pressed]) is Status.SUCCESS

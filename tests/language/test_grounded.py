@@ -6,7 +6,8 @@ way under the key "touched".
 """
 
 import functools
-from collections import Counter, defaultdict
+import itertools
+from collections import defaultdict
 
 import pytest
 from language_variants import TASKS, random_episodes, said_where_possible
@@ -31,7 +32,9 @@ def grounded_instructions(task):
 
 
 def test_a_grounded_instruction_describes_the_cube_instead_of_naming_its_color():
-    """The goal is the blue cube. *It* in the command refers back to the described cube."""
+    """The goal is to place the blue cube once. The setting *grounded* says where it stands instead
+    of *blue*, and *it* in the command refers back to it; the metadata "touched" list the slots of
+    the goal that are hidden so."""
     episode = get_episode("PickXtimes", "test", 2)
 
     said = instruct(episode, "grounded")
@@ -45,7 +48,9 @@ def test_a_grounded_instruction_describes_the_cube_instead_of_naming_its_color()
 
 @each_task
 def test_every_grounded_instruction_hides_at_least_one_value(task):
-    """Otherwise it could be followed without looking."""
+    """`grounded_instructions` has what the setting *grounded* says of random episodes. It describes
+    what can be seen instead of naming a value of the goal; the metadata "touched" list the slots
+    that are hidden so. Without any, it could be followed without looking."""
     for _, said in grounded_instructions(task):
         assert said.metadata["touched"], said.text
         assert said.metadata["hidden_slots"] >= 1, said.text
@@ -53,28 +58,29 @@ def test_every_grounded_instruction_hides_at_least_one_value(task):
 
 @each_task
 def test_only_values_that_must_be_seen_are_replaced_by_pointers(task):
-    """A pointer is a word that refers back, such as *it*: a mention with the role "anaphor".
-
-    A pointer may also stand for one of several colors, or for a value that only leads to the goal,
-    the slot "reference".
-    """
+    """`grounded_instructions` has what the setting *grounded* says of random episodes. A pointer is
+    a word that refers back, such as *it*: a mention with the role "anaphor". It may stand for a
+    hidden slot (metadata "touched"), for one of several colors, or for a value that only leads to
+    the goal, the slot "reference"."""
     for _, said in grounded_instructions(task):
         pointed = {mention.slot for mention in said.mentions if mention.role == "anaphor"}
         assert pointed <= {*said.metadata["touched"], "colors", "reference"}, said.text
 
 
 def test_an_exported_grounded_instruction_lists_its_hidden_slots():
-    """In the column `touched`, separated by commas if there are several."""
+    """The goal is the blue cube, of which the setting *grounded* says *the cube nearest to the back
+    left corner*: its color is hidden. The column `touched` has hidden slots, separated by
+    commas."""
     episode = get_episode("PickXtimes", "test", 2)
     assert row(episode, instruct(episode, "grounded"))["touched"] == "color"
 
 
 @each_task
 def test_grounded_instructions_never_name_the_hidden_color(task):
-    """*The red cube on the left* would tell the color to a policy that does not look.
-
-    A goal with two colors is left out, since the words state one of them.
-    """
+    """`grounded_instructions` has what the setting *grounded* says of random episodes; the metadata
+    "touched" list the slots that are hidden. *The red cube on the left* would tell the color to a
+    policy that does not look. A goal with two colors is left out, since the words state one of
+    them."""
     for episode, said in grounded_instructions(task):
         if len(episode.goal.as_mapping().get("colors", ())) > 1:
             continue
@@ -84,13 +90,13 @@ def test_grounded_instructions_never_name_the_hidden_color(task):
 
 
 def values_by_description(task, slot):
-    """Count the values that each description of a hidden slot stands for in random episodes.
+    """Return the values that each description of a hidden slot stands for in random episodes.
 
-    ``{"the cube nearest to": {"red": 7, "blue": 9}}``: colors, left and right are left out of
+    ``{"the cube nearest to": ["red", "blue", "red"]}``: colors, left and right are left out of
     descriptions, and what follows the 24th character, so that more of them are alike.
     """
     exchangeable = {"red", "green", "blue", "left", "right"}
-    found = defaultdict(Counter)
+    found = defaultdict(list)
     for episode, said in grounded_instructions(task):
         if slot in said.metadata["touched"]:
             spans = [
@@ -99,34 +105,41 @@ def values_by_description(task, slot):
                 if mention.utterance == 0 and mention.slot == slot
             ]
             kept = [word for word in " ".join(spans).split() if word not in exchangeable]
-            found[" ".join(kept)[:24]][str(episode.goal[slot])] += 1
+            found[" ".join(kept)[:24]].append(episode.goal[slot])
     return found
+
+
+def share_of_equal_pairs(groups):
+    """Return how many of the pairs of values of the same group are equal, as a share."""
+    equal = []
+    for values in groups:
+        equal += [first == second for first, second in itertools.combinations(values, 2)]
+    return sum(equal) / len(equal)
 
 
 @pytest.mark.parametrize(
     ("task", "slot"),
     [
-        (task, slot)
-        for task in TASKS_WITH_SETTING
-        for slot, _ in get_episode(task, "test", 0).goal.slots
+        ("PickXtimes", "color"),
+        ("SwingXtimes", "color"),
+        ("VideoUnmask", "colors"),
+        ("VideoUnmaskSwap", "colors"),
+        ("ButtonUnmask", "colors"),
+        ("ButtonUnmaskSwap", "colors"),
+        ("VideoRepick", "repeats"),
+        ("VideoPlaceButton", "relation"),
+        ("VideoPlaceOrder", "placement"),
     ],
 )
 def test_the_description_of_a_hidden_value_does_not_give_the_value_away(task, slot):
-    """Who guesses the value that is most frequent for a description is right no more often than
-    who always guesses the value that is most frequent overall.
+    """The slot of the goal is hidden: *the cube nearest to the button* may be of any color. If a
+    description always stood for the same value, all pairs of episodes with the same description
+    would have the same value, a share of 1. It must be about that of all pairs, 0.1 to 0.5; 0.25
+    more are allowed, since *two containers* tells how many colors are meant."""
+    groups = values_by_description(task, slot).values()
+    all_values = list(itertools.chain.from_iterable(groups))
 
-    Descriptions of fewer than 20 episodes are left out. Allowed for chance are four standard
-    deviations; the seeds are fixed.
-    """
-    groups = values_by_description(task, slot)
-    overall = sum(groups.values(), Counter())
-
-    for description, values in groups.items():
-        size = values.total()
-        expected = max(overall.values()) / overall.total()
-        deviation = (expected * (1 - expected) / size) ** 0.5
-        is_too_small = size < 20
-        assert is_too_small or max(values.values()) / size <= expected + 4 * deviation, description
+    assert share_of_equal_pairs(groups) < share_of_equal_pairs([all_values]) + 0.25
 
 
 def test_stopcube_has_no_grounded_setting():
@@ -136,13 +149,16 @@ def test_stopcube_has_no_grounded_setting():
 
 @pytest.mark.parametrize("task", ["PickXtimes", "SwingXtimes"])
 def test_the_color_is_hidden_only_in_scenes_with_several_colors(task):
-    """Easy scenes have one cube, so that its color is no choice."""
+    """`grounded_instructions` has what the setting *grounded* says of random episodes; the metadata
+    "touched" list the slots that are hidden. Easy scenes have one cube, so that its color is no
+    choice, and nothing could be hidden."""
     for episode, said in grounded_instructions(task):
         assert said.metadata["touched"] == ["color"]
         assert episode.difficulty != "easy"
 
 
 def test_grounded_videorepick_hides_the_number_of_repetitions():
-    """*As often as the cubes switched places*: the number is seen in the video."""
+    """*As often as the cubes switched places*: the setting *grounded* describes the number by what
+    is seen in the video; the metadata "touched" list the slots that are hidden."""
     for _, said in grounded_instructions("VideoRepick"):
         assert said.metadata["touched"] == ["repeats"]

@@ -6,8 +6,11 @@ object that is right to pick up, the names of the mirrored ones.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import pytest
 
+from roboirg.core.episode import Scene, SceneObject
 from roboirg.language import instruct, mirrored_objects
 from roboirg.language.landmarks import FRAMES
 from roboirg.language.mirrored_landmarks import exchange_sides
@@ -16,9 +19,8 @@ from roboirg.tasks import every_task, get_task
 from roboirg.tasks.splits.splits import get_episode
 
 each_frame = pytest.mark.parametrize("frame", FRAMES)
-each_task_with_places = pytest.mark.parametrize(
-    "task", [name for name, task in every_task().items() if task.spatial]
-)
+PLACED_TASKS = [name for name, task in every_task().items() if task.spatial]
+each_task_with_places = pytest.mark.parametrize("task", PLACED_TASKS)
 
 
 @pytest.mark.parametrize(
@@ -59,55 +61,77 @@ def test_an_instruction_without_a_place_has_no_mirrored_object():
     assert mirrored_objects(episode, instruct(episode, "direct")) == {}
 
 
-def name_to_handle(item):
-    """Return the name of what is picked up for an object: its container, or itself."""
-    return item.inside or item.name
+class MirroredPlace(NamedTuple):
+    """Words of a place that were said in a scene, such as *second from the left*.
+
+    Attributes:
+        words: these.
+        exchanged: the object of *second from the right*, the words with sides exchanged.
+        mirrored: names of what `mirrored_objects` returns for the object of the words.
+        scene: the scene.
+    """
+
+    words: str
+    exchanged: SceneObject
+    mirrored: frozenset[str]
+    scene: Scene
 
 
 def mirrored_places(task, frame):
-    """Yield what is said of places that have a mirrored object, in 24 test episodes.
-
-    Each comes with its scene, the phrase that is said, the object that the phrase with left and
-    right exchanged means (None if there is none), and the names of the mirrored objects.
-    """
+    """Return the places with a mirrored object that are said in 24 test episodes."""
+    found = []
     for index in range(24):
         episode = get_episode(task, "test", index)
         said = instruct(episode, "spatial", frame=frame)
         mirrored_names = mirrored_objects(episode, said)
         by_phrase = things_at(episode.scene, get_task(task).things.pointed, frame)
-        for place in said.metadata["landmarks"]:
-            mirrored = mirrored_names.get(name_to_handle(by_phrase[place]))
+        for words in said.metadata["landmarks"]:
+            right = by_phrase[words]
+            mirrored = mirrored_names.get(right.inside or right.name)
             if mirrored:
-                yield episode.scene, place, by_phrase.get(exchange_sides(place)), mirrored
+                exchanged = by_phrase[exchange_sides(words)]
+                found.append(MirroredPlace(words, exchanged, mirrored, episode.scene))
+    assert found
+    return found
 
 
 @each_frame
 @each_task_with_places
 def test_the_mirrored_object_is_the_one_selected_by_the_words_with_sides_exchanged(task, frame):
-    """If *second from the left* was said, it is what *second from the right* selects."""
-    found = list(mirrored_places(task, frame))
+    """`mirrored_places` has the places that are said in 24 episodes. If *second from the left* was
+    said, the mirrored object is the one that *second from the right* selects in the scene: what is
+    picked up for a cube in a container is the container."""
+    for place in mirrored_places(task, frame):
+        picked_up = place.exchanged.inside or place.exchanged.name
 
-    assert found
-    for _, place, other, mirrored in found:
-        assert exchange_sides(place) != place
-        assert name_to_handle(other) in mirrored, place
+        assert picked_up in place.mirrored, place.words
 
 
 @each_frame
-@each_task_with_places
-def test_a_place_has_one_mirrored_object_or_in_binfill_all_cubes_of_its_color(task, frame):
-    """BinFill counts cubes, so that the place of one only tells which color to take."""
-    for scene, place, other, mirrored in mirrored_places(task, frame):
-        if task == "BinFill":
-            assert {scene[name].color for name in mirrored} == {other.color}, place
-        else:
-            assert len(mirrored) == 1, place
+@pytest.mark.parametrize("task", [task for task in PLACED_TASKS if task != "BinFill"])
+def test_a_place_has_one_mirrored_object(task, frame):
+    """`mirrored_places` has the places that are said in 24 episodes. There is one object *second
+    from the right*, and who takes left for right picks up this one."""
+    for place in mirrored_places(task, frame):
+        assert len(place.mirrored) == 1, place.words
+
+
+@each_frame
+def test_in_binfill_the_mirrored_objects_are_cubes_of_the_color_on_the_other_side(frame):
+    """BinFill counts cubes of a color, and the place of one cube only tells the color: who takes
+    left for right picks up cubes of the color of the cube on the other side."""
+    for place in mirrored_places("BinFill", frame):
+        colors = {place.scene[name].color for name in place.mirrored}
+
+        assert colors == {place.exchanged.color}, place.words
 
 
 @each_frame
 @each_task_with_places
 def test_a_mirrored_object_is_never_a_right_one(task, frame):
-    """Otherwise picking it up would not show that left was taken for right."""
+    """`mirrored_objects` maps each object that is right to pick up to those that would be right
+    with left and right exchanged. In 24 episodes none may be both: picking it up would not show
+    that left was taken for right."""
     for index in range(24):
         episode = get_episode(task, "test", index)
 
@@ -119,7 +143,9 @@ def test_a_mirrored_object_is_never_a_right_one(task, frame):
 @each_frame
 @each_task_with_places
 def test_the_mirrored_object_is_the_same_in_both_forms_of_an_instruction(task, frame):
-    """The form *resolved* names what *implicit* points at; both say the same places."""
+    """`mirrored_objects` maps each object that is right to pick up to those that would be right
+    with left and right exchanged. The form *resolved* names what *implicit* points at; both say the
+    same places, so the result is the same."""
     for index in range(24):
         episode = get_episode(task, "test", index)
         implicit = instruct(episode, "spatial", "implicit", frame=frame)

@@ -24,7 +24,6 @@ from roboirg.language import (
 )
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction_row import row
-from roboirg.language.scenarios import spoken
 from roboirg.language.scenarios.scenario_file import FOLDER, setting_scenarios
 from roboirg.language.scenarios.wording_file import parse_wordings
 from roboirg.language.scenarios.wording_store import register_wordings
@@ -79,27 +78,29 @@ def printed(*tables):
 
 
 def test_a_registered_setting_is_listed_last(register):
-    """DUMMY has the order 9, and ours have lower ones."""
+    """DUMMY, a setting named "dummy", has the order 9, and ours have lower ones."""
     register(DUMMY)
     assert setting_names()[-1] == "dummy"
 
 
 def test_a_registered_setting_is_one_of_the_tasks_it_applies_to(register):
-    """DUMMY applies to the four tasks of the suite *counting*."""
+    """DUMMY, a setting named "dummy", applies to the four tasks of the suite *counting*."""
     register(DUMMY)
     tasks = [name for name, task in all_tasks().items() if "dummy" in settings_of(task)]
     assert sorted(tasks) == ["BinFill", "PickXtimes", "StopCube", "SwingXtimes"]
 
 
 def test_a_task_that_a_registered_setting_does_not_apply_to_refuses_it(register):
-    """VideoUnmask is not in the suite *counting*, for which DUMMY is."""
+    """DUMMY, a setting named "dummy", is for the suite *counting*, to which VideoUnmask does not
+    belong."""
     register(DUMMY)
     with pytest.raises(InvalidValueError, match="has no dummy setting"):
         instruct(get_episode("VideoUnmask", "test", 0), "dummy")
 
 
 def test_a_scene_that_a_registered_setting_refuses_cannot_be_expressed_in_it(register):
-    """DUMMY refuses easy scenes."""
+    """DUMMY, a setting named "dummy", refuses easy scenes with the words *the scene is too
+    easy*."""
     register(DUMMY)
 
     assert "dummy" in expressible(HARD_EPISODE)
@@ -108,7 +109,8 @@ def test_a_scene_that_a_registered_setting_refuses_cannot_be_expressed_in_it(reg
 
 
 def test_the_reason_why_a_setting_refuses_a_scene_is_in_the_error(register):
-    """DUMMY refuses easy scenes."""
+    """DUMMY, a setting named "dummy", refuses easy scenes with the words *the scene is too
+    easy*."""
     register(DUMMY)
     complaint = "dummy setting cannot express .*the scene is too easy"
     with pytest.raises(InvalidValueError, match=complaint):
@@ -116,7 +118,8 @@ def test_the_reason_why_a_setting_refuses_a_scene_is_in_the_error(register):
 
 
 def test_the_reason_why_a_setting_refuses_a_scene_is_in_the_table_of_instructions(register):
-    """The table is that of `roboirg show --words`."""
+    """DUMMY, a setting named "dummy", refuses easy scenes with the words *the scene is too easy*.
+    The table is that of `roboirg show --words`."""
     register(DUMMY)
     table = instructions_table(EASY_EPISODE, ["dummy"], InstructionOptions())
     assert "the scene is too easy" in printed(table)
@@ -126,20 +129,24 @@ def test_the_reason_why_a_setting_refuses_a_scene_is_in_the_table_of_instruction
 def test_a_plan_leaves_out_the_episodes_that_a_registered_setting_refuses(
     register, index, is_planned
 ):
-    """Episode 0 is easy, episode 3 hard; DUMMY refuses easy ones."""
+    """DUMMY, a setting named "dummy", refuses easy scenes. Episode 0 is easy, so the plan has it in
+    all settings but this one; episode 3 is hard."""
     register(DUMMY)
     plan = make_plan(["listener"], tasks="PickXtimes", settings="all", episodes="0,3")
     assert ("dummy" in plan.settings_of("PickXtimes", index)) == is_planned
 
 
 def test_a_registered_setting_does_not_change_which_episodes_are_published(register):
-    """Episodes were accepted if our own settings can express them; a new one has no say in this."""
+    """DUMMY refuses easy scenes. Seeds became episodes if our own settings can express them; a new
+    setting has no say in this, so nothing is wrong with the seed of an easy episode (None)."""
     register(DUMMY)
     assert check_words(EpisodeSlot("PickXtimes", "test", 0), EASY_EPISODE.seed) is None
 
 
 def test_an_episode_that_one_of_our_settings_refuses_would_not_be_published(register, monkeypatch):
-    """As if DUMMY were one of ours."""
+    """A seed becomes an episode only if each of ACCEPTANCE_SETTINGS can express it. DUMMY, whose
+    name is "dummy", refuses easy scenes; it is made one of them here. So the seed of an easy
+    episode is rejected, with the reason that DUMMY gives."""
     register(DUMMY)
     monkeypatch.setattr(seed_selection, "ACCEPTANCE_SETTINGS", ("direct", "dummy"))
 
@@ -150,14 +157,18 @@ def test_an_episode_that_one_of_our_settings_refuses_would_not_be_published(regi
 
 
 def test_exported_rows_include_a_registered_setting_in_both_forms(register):
-    """It refuses the easy one of the two episodes, so both rows are those of the hard one."""
+    """DUMMY, whose name is "dummy", refuses easy scenes. So of an easy and a hard episode only the
+    hard one has rows of it: one that says *it* (implicit), and one that says what *it* is
+    (resolved)."""
     register(DUMMY)
+
     told = instructions([EASY_EPISODE, HARD_EPISODE], setting_names(), FORMS)
 
-    rows = [row(*job) for job in told]
-
-    forms = [exported["form"] for exported in rows if exported["setting"] == "dummy"]
-    assert forms == ["implicit", "resolved"]
+    rows = [row(episode, said) for episode, said in told]
+    assert [exported["form"] for exported in rows if exported["setting"] == "dummy"] == [
+        "implicit",
+        "resolved",
+    ]
 
 
 EACH_SETTING_WITH_SCENARIOS = pytest.mark.parametrize(
@@ -167,7 +178,8 @@ EACH_SETTING_WITH_SCENARIOS = pytest.mark.parametrize(
 
 @EACH_SETTING_WITH_SCENARIOS
 def test_a_copy_of_a_setting_without_a_file_of_words_is_refused(name, register):
-    """Scenarios, templates of texts, are for one setting; ours are not for the copy."""
+    """A setting's scenarios are written for it by name. A copy of one of ours has another name,
+    *lab-…*, and no file of its own, so our file has no scenario for it."""
     register(dataclasses.replace(all_settings()[name], name=f"lab-{name}"))
     lacking = r"\): color_and_number\.toml has no lab-\S+ scenario for it in the pool test; leave"
     with pytest.raises(InvalidValueError, match=lacking):
@@ -192,7 +204,9 @@ def add_copy(register, tmp_path):
 
 @EACH_SETTING_WITH_SCENARIOS
 def test_a_setting_modeled_on_ours_speaks_the_scenarios_of_its_own_file(name, add_copy):
-    """What it says means the goal, and is of a scenario for tests, since the episode is one."""
+    """`add_copy` registers a copy of one of our settings, *lab-NAME*, with a file of its own, in
+    which our scenarios bear its name. What it says must mean the goal, and be of one of the file's
+    scenarios for tests, since the episode is one."""
     add_copy(name)
     episode = get_episode("PickXtimes", "test", 6)
     scenarios = setting_scenarios(f"lab-{name}")["PickXtimes"].scenarios
@@ -206,8 +220,8 @@ def test_a_setting_modeled_on_ours_speaks_the_scenarios_of_its_own_file(name, ad
 
 @pytest.mark.parametrize("name", ["explicit", "contextual"])
 def test_copies_of_the_settings_explicit_and_contextual_give_the_same_commands(name, register):
-    """They need no scenarios of their own: *explicit* has none, *contextual* uses those of
-    *direct*."""
+    """A copy *my-…* of either setting needs no scenarios of its own: *explicit* has none,
+    *contextual* uses those of *direct*. So it says what the original says."""
     register(dataclasses.replace(all_settings()[name], name=f"my-{name}"))
     assert instruct(HARD_EPISODE, f"my-{name}").turns == instruct(HARD_EPISODE, name).turns
 
@@ -225,16 +239,6 @@ setting = "lab"
 introduction = "The lab says {repeats:times}."
 say.repeats = ["<each repeats: [repeats: once for that lap|once for each of them]>"]
 """
-MY_FILE_HEAD = 'name = "mine"\ntasks = ["PickXtimes"]\n'
-MY_COMMAND = '[commands]\nall = ["Mine: lift {color} {repeats}."]\n'
-MY_VALUE = '[stated.all]\ncolor = "my {color} cube"\n'
-MY_SCENARIO = """
-[[scenario]]
-frame = "mine"
-setting = "lab"
-introduction = "I say {repeats:times}."
-say.repeats = ["<each repeats: [repeats: once for that lap|once for each of them]>"]
-"""
 
 
 @pytest.fixture
@@ -249,8 +253,16 @@ def add_lab(register, tmp_path):
     return add
 
 
+def registered_file_of_a_user(words):
+    """Register a user's word file for PickXtimes with these words; return its identity."""
+    text = f'name = "mine"\ntasks = ["PickXtimes"]\n{words}\n'
+    return register_wordings(parse_wordings(text, "mine.toml"))
+
+
 def test_a_setting_s_own_file_gives_it_introduction_command_and_phrase_for_a_value(add_lab):
-    """All three are in LAB_FILE; our words would be *Grab the blue cube …*"""
+    """LAB_FILE has the words of the setting *lab*: the introduction *The lab says four times*, the
+    command *Lab: lift …* and the phrase *the lab's blue cube*. Our words would be *Grab the blue
+    cube …*"""
     add_lab(LAB_FILE)
 
     said = instruct(HARD_EPISODE, "lab")
@@ -260,20 +272,40 @@ def test_a_setting_s_own_file_gives_it_introduction_command_and_phrase_for_a_val
 
 
 @pytest.mark.parametrize(
-    ("mine", "introduction", "command"),
+    ("words_of_user", "introduction", "command"),
     [
-        (MY_COMMAND, "The lab says four times.", "Mine: lift the lab's blue cube "),
-        (MY_VALUE, "The lab says four times.", "Lab: lift my blue cube "),
-        (MY_SCENARIO, "I say four times.", "Lab: lift the lab's blue cube "),
-        (MY_COMMAND + MY_VALUE + MY_SCENARIO, "I say four times.", "Mine: lift my blue cube "),
+        (
+            '[commands]\nall = ["Mine: lift {color} {repeats}."]',
+            "The lab says four times.",
+            "Mine: lift the lab's blue cube ",
+        ),
+        (
+            '[stated.all]\ncolor = "my {color} cube"',
+            "The lab says four times.",
+            "Lab: lift my blue cube ",
+        ),
+        (
+            """
+[[scenario]]
+frame = "mine"
+setting = "lab"
+introduction = "I say {repeats:times}."
+say.repeats = ["<each repeats: [repeats: once for that lap|once for each of them]>"]
+""",
+            "I say four times.",
+            "Lab: lift the lab's blue cube ",
+        ),
     ],
-    ids=["command", "phrase", "introduction", "all"],
+    ids=["command", "phrase", "introduction"],
 )
-def test_words_of_a_user_file_win_over_those_of_a_setting(add_lab, mine, introduction, command):
-    """A user's file may bring a command, a phrase for a value, or an introduction; what it lacks is
-    taken from the setting's file."""
+def test_words_of_a_user_file_win_over_those_of_a_setting(
+    add_lab, words_of_user, introduction, command
+):
+    """The blue cube is to be lifted four times. LAB_FILE has the words of the setting *lab*: the
+    introduction *The lab says four times*, the command *Lab: lift …* and the phrase *the lab's blue
+    cube* for a value. A user's file brings one of the three; the others stay the setting's."""
     add_lab(LAB_FILE)
-    wordings = register_wordings(parse_wordings(MY_FILE_HEAD + mine, "mine.toml"))
+    wordings = registered_file_of_a_user(words_of_user)
 
     said = instruct(HARD_EPISODE, "lab", wordings=wordings)
 
@@ -282,9 +314,10 @@ def test_words_of_a_user_file_win_over_those_of_a_setting(add_lab, mine, introdu
 
 
 def test_other_settings_do_not_use_a_setting_s_own_file(add_lab):
-    """Neither with our words nor with those of a user's file."""
+    """LAB_FILE has the words of the setting *lab*, as in *Lab: lift the lab's blue cube*. Another
+    setting says none of them, neither with our words nor with those of a user's file."""
     add_lab(LAB_FILE)
-    wordings = register_wordings(parse_wordings(MY_FILE_HEAD + MY_COMMAND, "mine.toml"))
+    wordings = registered_file_of_a_user('[commands]\nall = ["Mine: lift {color} {repeats}."]')
 
     assert "Lab" not in instruct(HARD_EPISODE).text
     assert instruct(HARD_EPISODE, wordings=wordings).text == "Mine: lift the blue cube four times."
@@ -296,20 +329,23 @@ def test_other_settings_do_not_use_a_setting_s_own_file(add_lab):
     ids=["name", "whole sentence"],
 )
 def test_the_word_file_of_a_setting_with_a_name_or_a_whole_sentence_is_refused(add_lab, text):
-    """Both belong into files of users only."""
+    """LAB_FILE is a right file of words of a setting. A name, or a whole sentence ([[literal]]),
+    belongs into files of users only."""
     add_lab(text)
     with pytest.raises(InvalidValueError, match=r"^lab\.toml has a name or a \[\[literal"):
         instruct(HARD_EPISODE, "lab")
 
 
-@pytest.mark.parametrize("first", ["direct", "calm"])
-def test_a_cached_choice_of_one_setting_does_not_answer_for_another(register, first):
-    """ "calm" is a copy of *contextual* with its own refusal; *direct* shares the cache with it."""
+@pytest.mark.parametrize(("first", "index"), [("direct", 900_001), ("calm", 900_002)])
+def test_a_cached_choice_of_one_setting_does_not_answer_for_another(register, first, index):
+    """*Calm* is a copy of *contextual*, which says the scenarios of *direct*, but refuses every
+    episode. The scenario that is chosen for an episode is cached, for both. So whichever of the two
+    is asked first about an episode that no other test uses, each must give its own answer."""
     calm = dataclasses.replace(contextual.SETTING, name="calm", refusal=lambda _: "never calm")
     register(calm)
-    spoken._CHOICES.clear()
+    episode = get_episode("PickXtimes", "random", index)
 
-    find_refusal(HARD_EPISODE, InstructionOptions(first))
+    find_refusal(episode, InstructionOptions(first))
 
-    assert find_refusal(HARD_EPISODE, InstructionOptions("calm")) == "never calm"
-    assert find_refusal(HARD_EPISODE, InstructionOptions("direct")) is None
+    assert find_refusal(episode, InstructionOptions("calm")) == "never calm"
+    assert find_refusal(episode, InstructionOptions("direct")) is None

@@ -15,7 +15,6 @@ from pathlib import Path
 import pytest
 
 from roboirg.language.scenarios.identity import words_of
-from roboirg.tasks import all_tasks
 
 DOCS = Path(__file__).parents[2] / "docs"
 SCENARIO_OF_EACH_SETTING = """
@@ -173,10 +172,9 @@ def package(tmp_path_factory):
 
 
 def test_the_setting_of_the_documentation_page_speaks_the_words_of_its_own_file(package):
-    """The page's file has the scenarios "new coat" for training and "loan" for tests.
-
-    An instruction names the digest of the words.
-    """
+    """`package` is an installed package with the code of docs/add-setting.md; the program runs in a
+    process that imports it. The page's file of words has the scenarios "new coat" for training and
+    "loan" for tests, for two tasks. An instruction names the digest of the words."""
     found = package.run("""
 for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
     said = instruct(get_episode(task, "test", 1), "colored", wordings=pool)
@@ -193,6 +191,9 @@ for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
 
 
 def test_the_setting_of_the_documentation_page_means_the_goal(package):
+    """`package` is an installed package with the code of docs/add-setting.md; the program runs in a
+    process that imports it, and notes whether what the setting *colored* says leaves exactly the
+    goal of the episode, in two tasks and both pools of words."""
     found = package.run("""
 for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
     episode = get_episode(task, "test", 1)
@@ -206,7 +207,9 @@ for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
 def test_the_setting_of_the_documentation_page_ends_with_the_explicit_command_when_resolved(
     package,
 ):
-    """The resolved form has the same introduction."""
+    """`package` is an installed package with the code of docs/add-setting.md; the program runs in a
+    process that imports it. The resolved form of the setting *colored* has the same introduction as
+    the implicit one, and then the command of the setting *explicit*."""
     (turns,) = package.run("""
 episode = get_episode("PickXtimes", "test", 1)
 resolved = instruct(episode, "colored", "resolved").turns
@@ -218,6 +221,9 @@ found.append([resolved, instruct(episode, "colored").turns, instruct(episode).te
 
 
 def test_the_words_of_the_setting_of_the_documentation_page_break_no_rule(package):
+    """`package` is an installed package with the code of docs/add-setting.md; the program runs in a
+    process that imports it. The checker for authors collects the rules that the page's words break
+    in every 20th scene."""
     found = package.run("""
 for task, words in setting_scenarios("colored").items():
     for report in check_scenarios(words, None, scenes_of(task, 0)[::20]):
@@ -227,17 +233,19 @@ for task, words in setting_scenarios("colored").items():
 
 
 def test_the_words_of_an_installed_setting_change_the_digest_of_that_setting_only(package):
-    """`words_of` identifies words by task, pool (train or test) and a digest of what is said."""
+    """`words_of` identifies what can be said of a task in a pool (train or test) by a digest. The
+    fixture has installed a package with the setting *colored*, whose own file of words is for
+    PickXtimes and SwingXtimes. So only their words in this setting may be others than those of the
+    task here, where the package is not installed."""
     found = package.run("""
 for task, pool, setting in itertools.product(all_tasks(), POOLS, all_settings()):
     found.append([task, pool, setting, words_of(task, pool, setting)])
 """)
+
     changed = []
     for task, pool, setting, words in found:
         if words != words_of(task, pool):
             changed.append((task, pool, setting))
-
-    assert {task for task, *_ in found} == set(all_tasks())
     assert changed == [
         ("PickXtimes", "train", "colored"),
         ("PickXtimes", "test", "colored"),
@@ -247,8 +255,9 @@ for task, pool, setting in itertools.product(all_tasks(), POOLS, all_settings())
 
 
 def test_the_language_label_names_an_installed_setting_after_the_words_of_its_task(package):
-    """A label has the version, the words of the task, and those of a setting with a file of
-    its own."""
+    """`package` is an installed package with the setting *colored*. A label has the version of the
+    language, the words of the task, and those of a setting with a file of its own, each as task,
+    pool and digest."""
     (label,) = package.run("""
 found.append(language_label(["PickXtimes"], "test", ["direct", "colored"]))
 """)
@@ -268,12 +277,17 @@ found.append(language_label(["PickXtimes"], "test", ["direct", "colored"]))
 def test_the_task_of_the_documentation_page_speaks_the_words_of_its_own_file(
     package, setting, pattern
 ):
-    """The page's file has no scenario for *reasoning*, and the refusal names that file."""
+    """`package` is an installed package with the task PlaceAndPress of docs/add-task.md. Its file
+    words.toml has a command, and the scenario *… wants a photo …* for *direct*, which *contextual*
+    says, too. It has none for *reasoning*, and the refusal names that file. `said_or_refused`
+    returns the text or the refusal."""
     (text,) = package.run(f'found.append(said_or_refused("PlaceAndPress", "{setting}"))')
     assert re.fullmatch(pattern, text)
 
 
 def test_the_words_of_the_task_of_the_documentation_page_break_no_rule(package):
+    """`package` is an installed package with the task PlaceAndPress of docs/add-task.md. The
+    checker for authors collects the rules that the page's words break in every 20th scene."""
     found = package.run("""
 words = task_scenarios("PlaceAndPress")
 for report in check_scenarios(words, None, scenes_of("PlaceAndPress", 0)[::20]):
@@ -291,7 +305,9 @@ def complete_package(tmp_path_factory):
 
 
 def test_a_task_of_another_package_can_be_commanded_in_every_setting(complete_package):
-    """In the words of training and of tests."""
+    """`complete_package` is an installed package with the task PlaceAndPress and scenarios for
+    every setting. In at least one of twelve episodes, each setting must be possible in the words of
+    training and of tests."""
     found = complete_package.run("""
 for split, setting in itertools.product(("train", "test"), settings_of(get_task("PlaceAndPress"))):
     for index in range(12):
@@ -311,7 +327,9 @@ for split, setting in itertools.product(("train", "test"), settings_of(get_task(
 
 
 def test_the_words_of_a_task_of_another_package_mean_the_goal_in_both_forms(complete_package):
-    """Collects the texts that mean another goal, or several."""
+    """`complete_package` is an installed package with the task PlaceAndPress and scenarios for
+    every setting. The program collects the texts that mean another goal than the episode's, or
+    several."""
     wrong = complete_package.run("""
 for split, index in itertools.product(("train", "test"), range(12)):
     episode = get_episode("PlaceAndPress", split, index)
@@ -327,10 +345,9 @@ for split, index in itertools.product(("train", "test"), range(12)):
 
 
 def test_a_task_of_another_package_has_every_control_run(complete_package):
-    """A control run ("arm") says other words, or those of another goal.
-
-    Only a paraphrase may lack, where a setting has one text for an episode.
-    """
+    """`complete_package` is an installed package with the task PlaceAndPress and scenarios for
+    every setting. A control run ("arm") says other words, or those of another goal. The program
+    collects refusals; only a paraphrase may lack, where a setting has one text for an episode."""
     refusals = complete_package.run("""
 arms = ("paraphrase-1", "other-goal", "silent", "scrambled", "again")
 for split, setting in itertools.product(("train", "test"), settings_of(get_task("PlaceAndPress"))):
@@ -348,49 +365,56 @@ for split, setting in itertools.product(("train", "test"), settings_of(get_task(
         assert "has no paraphrase" in refusal
 
 
-@pytest.mark.parametrize(
-    ("file", "before", "after", "task", "setting", "sentence"),
-    [
-        pytest.param(
-            "colored.py", '"colored.toml"', '"gone.toml"', "PickXtimes", "colored",
-            "The words of colored are '{}/gone.toml', which is no file; name it by its whole path.",
-            id="file of a setting that does not exist",
-        ),
-        pytest.param(
-            "colored.toml", '"PickXtimes", ', "", "PickXtimes", "colored",
-            ": {}/colored.toml has no colored scenario for it in the pool test.",
-            id="task left out of the file of a setting",
-        ),
-        pytest.param(
-            "words.toml", "PlaceAndPress", "PickXtimes", "PlaceAndPress", "explicit",
-            ": PlaceAndPress is not among the tasks of {}/words.toml.",
-            id="file of another task",
-        ),
-        pytest.param(
-            "colored.toml", 'setting = "colored"', 'setting = "colorful"', "PickXtimes", "colored",
-            " 'new coat': There is no setting 'colorful'; known: colored, direct, direct-rival, ",
-            id="misspelled setting",
-        ),
-        pytest.param(
-            "colored.py", "content_plans=content_plans", 'content_plans="drect"', "PickXtimes",
-            "colored",
-            "There is no setting for the content_plans of colored, named 'drect'; known: direct, ",
-            id="misspelled plan of contents",
-        ),
-    ],
-)  # fmt: skip
-def test_a_mistake_in_the_words_of_a_package_is_reported_with_file_and_cure(
-    tmp_path, file, before, after, task, setting, sentence
-):
-    """Replaces `before` by `after` in one file of a package, then asks for a command.
-
-    ``{}`` in the sentence stands for the folder of the package.
-    """
-    outside = InstalledPackage(tmp_path)
+def package_with_a_mistake(folder, file, before, after):
+    """Return the package of the documentation pages with a text replaced in one of its files."""
+    outside = InstalledPackage(folder)
     text = (outside.files / file).read_text()
     assert before in text
     (outside.files / file).write_text(text.replace(before, after))
+    return outside
 
-    (printed,) = outside.run(f"found.append(said_or_refused({task!r}, {setting!r}))")
+
+@pytest.mark.parametrize(
+    ("file", "before", "after", "sentence"),
+    [
+        (
+            "colored.py", '"colored.toml"', '"gone.toml"',
+            "The words of colored are '{}/gone.toml', which is no file; name it by its whole path.",
+        ),
+        (
+            "colored.toml", '"PickXtimes", ', "",
+            ": {}/colored.toml has no colored scenario for it in the pool test.",
+        ),
+        (
+            "colored.toml", 'setting = "colored"', 'setting = "colorful"',
+            " 'new coat': There is no setting 'colorful'; known: colored, direct, direct-rival, ",
+        ),
+        (
+            "colored.py", "content_plans=content_plans", 'content_plans="drect"',
+            "There is no setting for the content_plans of colored, named 'drect'; known: direct, ",
+        ),
+    ],
+    ids=["no such file", "task left out", "misspelled setting", "misspelled plan of contents"],
+)  # fmt: skip
+def test_a_mistake_in_the_words_of_a_package_is_reported_with_file_and_cure(
+    tmp_path, file, before, after, sentence
+):
+    """The package of a documentation page has the setting *colored* in colored.py, and its words
+    for PickXtimes and SwingXtimes in colored.toml. An author makes one mistake: `after` stands
+    where `before` would be right. Who asks for a command in this setting is told by the sentence,
+    in which ``{}`` is the folder of the package."""
+    outside = package_with_a_mistake(tmp_path, file, before, after)
+
+    (printed,) = outside.run('found.append(said_or_refused("PickXtimes", "colored"))')
 
     assert sentence.format(outside.files).rstrip(".") in printed
+
+
+def test_a_word_file_of_a_task_that_names_another_task_only_is_refused(tmp_path):
+    """The package of a documentation page has the task PlaceAndPress, and its words in words.toml.
+    That file names PickXtimes wherever PlaceAndPress would be right."""
+    outside = package_with_a_mistake(tmp_path, "words.toml", "PlaceAndPress", "PickXtimes")
+
+    (printed,) = outside.run('found.append(said_or_refused("PlaceAndPress", "explicit"))')
+
+    assert f": PlaceAndPress is not among the tasks of {outside.files}/words.toml" in printed

@@ -44,7 +44,8 @@ def check_that_a_rule_is_broken(rule, text, task="PickXtimes", every=20):
     ],
 )
 def test_a_grammar_mistake_is_reported_with_the_wrong_words(sentence, rule):
-    """Each sentence takes the place of one in a scenario without a mistake, a birthday story."""
+    """Each sentence takes the place of *{he} keeps talking about <it color: it>.* in a scenario
+    without a mistake, a birthday story. The checker must report the rule with the wrong words."""
     right = "{he} keeps talking about <it color: it>."
     assert right in BIRTHDAY
     check_that_a_rule_is_broken(rule, BIRTHDAY.replace(right, sentence))
@@ -61,7 +62,9 @@ def test_a_grammar_mistake_is_reported_with_the_wrong_words(sentence, rule):
     ],
 )
 def test_a_grammar_mistake_with_a_value_of_the_goal_is_reported(introduction, rule):
-    """``{repeats}`` can be one, ``{list}`` two colors."""
+    """The introduction of BIRTHDAY, a story without a mistake, is replaced. ``{repeats}`` may be
+    one, which takes a singular; ``{repeats:try}`` makes a plural of *try*; ``{repeats:times}`` is
+    *once* or *two times* already; ``{list}`` are two colors, for which the file gets a list."""
     text = re.sub('introduction = ".*"', f'introduction = "{introduction}"', BIRTHDAY)
     if "{list}" in introduction:
         text = text.replace("setting =", 'list = "color"\nneeds.list = [2]\nsetting =')
@@ -81,7 +84,8 @@ def test_a_grammar_mistake_with_a_value_of_the_goal_is_reported(introduction, ru
     ids=["no space", "on the target on", "too long"],
 )
 def test_a_mistake_in_the_command_is_reported(line, rule):
-    """Each line is added to the birthday story, which has no mistake."""
+    """Each line is added to BIRTHDAY, a story without a mistake. `lead` stands before the command;
+    `resolved.color` is what the form *resolved* says of the color."""
     check_that_a_rule_is_broken(rule, f"{BIRTHDAY}{line}\n")
 
 
@@ -99,7 +103,8 @@ def pattern_of(rule):
     ],
 )
 def test_on_the_left_may_follow_on_the_target_but_on_the_next_one_may_not(sentence, is_wrong):
-    """*Put it on the target on the next one* leaves open what stands on what."""
+    """*Put it on the target on the next one* leaves open what stands on what; *on the left* only
+    says which target. `pattern_of` returns the pattern by which the checker finds what is wrong."""
     pattern = pattern_of("what points back must not follow 'on the target'")
     assert bool(re.search(pattern, sentence)) == is_wrong
 
@@ -126,10 +131,9 @@ def test_a_sentence_that_begins_in_lower_case_is_found(text, is_wrong):
     ],
 )
 def test_sentences_that_could_be_false_in_some_scene_are_reported_with_the_reason(words, reason):
-    """Fixed words for a color or a place, or *as I said*, are not true of all episodes.
-
-    Each sentence is added to the introduction of the birthday story.
-    """
+    """Each sentence is added to the introduction of a good scenario, a birthday story. With fixed
+    words for a color or a place, or *as I said*, it is not true of all episodes, and the checker
+    must say why."""
     text = BIRTHDAY.replace("the {color} cube.", f"the {{color}} cube. {words}.")
     broken = list(report_on(text, every=150).broken)
     assert any(
@@ -152,8 +156,8 @@ def test_sentences_that_could_be_false_in_some_scene_are_reported_with_the_reaso
     ],
 )
 def test_a_misused_place_is_reported(before, after, rule):
-    """Each case replaces `before` by `after` in a good scenario: *The table wobbles on the left.
-    Lift the cube there.*"""
+    """Each case replaces `before` by `after` in WOBBLY, a good scenario: *The table wobbles on the
+    left. Lift the cube there.*"""
     assert before in WOBBLY
     check_that_a_rule_is_broken(rule, WOBBLY.replace(before, after), every=3)
 
@@ -168,13 +172,17 @@ def test_a_misused_place_is_reported(before, after, rule):
 def test_a_place_or_color_that_no_longer_tells_which_container_it_is_is_reported(
     introduction, rule
 ):
-    """The containers cover the cubes and then change places."""
+    """MOVING_CONTAINERS is a scenario of VideoUnmaskSwap, whose introduction is replaced here. In
+    this task containers cover the cubes and then change places: where something was, or a color
+    that was seen, does not tell which container is meant."""
     text = MOVING_CONTAINERS.replace("The table wobbles {place:spot}.", introduction)
     check_that_a_rule_is_broken(rule, text, "VideoUnmaskSwap", every=3)
 
 
 def test_a_place_of_containers_that_move_is_right_with_at_the_start():
-    """*At the start, a fly sat on the left. Lift the container there.*"""
+    """MOVING_CONTAINERS is a scenario of VideoUnmaskSwap, where containers change places; its
+    introduction begins *The table wobbles* and a place. *At the start, a fly sat on the left. Lift
+    the container there* is right, as it says when."""
     text = MOVING_CONTAINERS.replace("The table wobbles", "At the start, a fly sat")
     broken = report_on(text, "VideoUnmaskSwap", every=3).broken
     assert not [rule for rule in broken if "says" in rule]
@@ -188,13 +196,16 @@ def test_a_place_of_containers_that_move_is_right_with_at_the_start():
     ],
 )
 def test_a_word_that_chooses_from_a_list_of_another_length_is_reported(sizes, pointer, rule):
-    """*The former* needs two values; `sizes` are the lengths that a scenario allows."""
+    """The birthday story gets a list of colors; `sizes` are the lengths that it allows. *The first
+    one* needs two values or more, and *the former* exactly two."""
     text = BIRTHDAY.replace("{color} cube", "{list} cubes")
     text = text.replace('["<it color: it>"]', f'["{pointer}"]')
     check_that_a_rule_is_broken(rule, f'{text}list = "color"\nneeds.list = {sizes}\n', every=3)
 
 
 def test_a_correct_scenario_about_a_place_breaks_no_rule():
+    """WOBBLY is *The table wobbles on the left. Lift the cube there.* Other tests put a mistake
+    into it."""
     assert not report_on(WOBBLY).broken
 
 
@@ -205,7 +216,8 @@ IN_BOTH_POOLS = BIRTHDAY.replace('"birthday"', '"doubter"').replace(
 
 
 def test_a_name_or_sentence_of_the_other_pool_in_a_user_s_file_is_reported():
-    """What is in both pools, those of training and of tests, would leak into training."""
+    """IN_BOTH_POOLS is a scenario for training with the name "doubter" and a sentence of one of
+    ours that is for tests. What is in both pools would leak from tests into training."""
     assert sorted(report_on(IN_BOTH_POOLS).broken) == [
         "the other pool has 'frame doubter', too",
         "the other pool has 'this happens to me every time.', too",
@@ -213,23 +225,32 @@ def test_a_name_or_sentence_of_the_other_pool_in_a_user_s_file_is_reported():
 
 
 def test_a_name_or_sentence_of_the_same_pool_is_no_leak():
-    """The same scenario, for tests, as StopCube's is."""
+    """IN_BOTH_POOLS has the name "doubter" and a sentence of one of our scenarios, which is for
+    tests. Here it is for tests, too."""
     assert not report_on(IN_BOTH_POOLS.replace('pool = "train"', 'pool = "test"')).broken
 
 
 @pytest.mark.parametrize("pool", POOLS)
 def test_our_general_remarks_break_no_rule_for_distracting_remarks(pool):
-    """They are inserted into a scenario that breaks no rule by itself."""
+    """General remarks are inserted into any story: *Sorry, I was daydreaming.* Here all of a pool
+    are those of a story that breaks no rule by itself, so what is reported is about a remark. JSON
+    writes the list as TOML does."""
     remarks = json.dumps(general().distractors[pool], ensure_ascii=False)
-    text = BIRTHDAY.replace('pool = "train"', f'pool = "{pool}"')
-    text = "\n".join(
-        f"distractors = {remarks}" if line.startswith("distractors") else line
-        for line in text.splitlines()
-    )
+    story = f"""
+tasks = ["PickXtimes"]
+[[scenario]]
+frame = "birthday"
+pool = "{pool}"
+setting = "direct"
+introduction = "{{person}} turns {{repeats}} today and wants to see the {{color}} cube."
+reinforcement = "{{he}} keeps talking about <it color: it>."
+distractors = {remarks}
+competing = ["{{person.2}} has a {{rival color}} one."]
+cue = "Let's surprise {{him}} with the cube."
+say.color = ["<it color: it>"]
+"""
 
-    broken = report_on(text, every=5).broken
-
-    assert not [rule for rule in broken if not rule.startswith("needs ")]
+    assert not report_on(story, every=5).broken
 
 
 def test_no_general_remark_is_used_both_in_training_and_in_tests():
@@ -238,10 +259,21 @@ def test_no_general_remark_is_used_both_in_training_and_in_tests():
     assert set(remarks["train"]).isdisjoint(remarks["test"])
 
 
+def plural_pointers(*operations):
+    """Return the pointers to numbers in plural words, such as *once for each photo*: those that
+    stand for the number itself (the operation "same"), or for what is calculated from it."""
+    found = set()
+    for row in pointer_table():
+        if row.operation in operations and re.search(r"\b(?:many|often|each)\b", row.words):
+            found.add(row.words)
+    return found
+
+
 def test_a_plural_pointer_is_never_used_where_the_number_may_be_one():
-    """Sums and doubles are never one, so *once for each photo* is right there. Elsewhere words
-    agree, *[repeats: once for that photo|once for each photo]*, but for those that stand for one
-    of two numbers, where singular and plural would tell which."""
+    """The number itself, a difference and a half may be one. Words for them agree with the number:
+    *[repeats: once for that photo|once for each photo]* says the first for one and the second for
+    more. Excepted are words that stand for one of two numbers, where singular and plural would tell
+    which; ``*`` stands for any words."""
     of_two_numbers = {
         "once for each *",
         "that many times",
@@ -250,12 +282,8 @@ def test_a_plural_pointer_is_never_used_where_the_number_may_be_one():
         "as many times as it *",
         "as many times as they *",
     }
-    may_be_one = set()
-    for row in pointer_table():
-        is_plural = re.search(r"\b(?:many|often|each)\b", row.words)
-        if is_plural and row.operation in ("same", "minus", "half"):
-            may_be_one.add(row.words)
 
-    agreeing = may_be_one - of_two_numbers
+    may_be_one = plural_pointers("same", "minus", "half")
+
     assert of_two_numbers < may_be_one
-    assert all(words.startswith("[repeats: ") for words in agreeing)
+    assert all(words.startswith("[repeats: ") for words in may_be_one - of_two_numbers)

@@ -7,7 +7,7 @@ from string import Template
 from types import SimpleNamespace
 
 import pytest
-from forty_replies import BLUE_TWICE, FORTY, PICK, RED_ONCE, UNREADABLE, StyledReply
+from forty_replies import FORTY, UNREADABLE, StyledReply
 from planning_fakes import Garbage, fake_vlm, model_options
 
 from roboirg.policies.planners.model_planners import StatelessOptions, StatelessPlanner
@@ -33,9 +33,10 @@ def reply_of(styled):
 
 
 def goal_in(text):
-    """Return the goal of PickXtimes that a reply names, as JSON."""
+    """Return the goal of PickXtimes that a reply names: `{"color": "blue", "repeats": 2}`."""
     schema = goal_schema("PickXtimes")
-    return schema.answers[schema.read(text)]
+    goal = json.loads(schema.answers[schema.read(text)])
+    return json.dumps(goal, sort_keys=True)
 
 
 def letter_in(text):
@@ -51,24 +52,37 @@ def subgoal_in(text):
 READERS = {"goal": goal_in, "letter": letter_in, "subgoal": subgoal_in}
 
 
-def same_json(reading):
-    return json.dumps(json.loads(reading), sort_keys=True)
+def model_that_replies(styled):
+    """Return a model that gives one reply to all questions, and the list of these questions.
+
+    The model asks its service a second time if it cannot read the first reply.
+    """
+    questions = []
+
+    def answer(question):
+        questions.append(question)
+        return reply_of(styled)
+
+    service = SimpleNamespace(answer=answer)
+    return VLMQuery(ModelOptions(model="m"), Template("$why"), lambda _: service), questions
 
 
 @pytest.mark.parametrize("styled", FORTY, ids=lambda styled: styled.style)
-def test_forty_styles_of_replies_are_read_right_or_counted_as_unreadable(styled):
-    """A model that answers so is asked twice; what it means comes out, or the count is one more."""
-    connect = lambda _: SimpleNamespace(answer=lambda _query: reply_of(styled))  # noqa: E731
-    vlm = VLMQuery(ModelOptions(model="m"), Template("$why"), connect)
-    found = vlm.ask(SOME_QUERY, READERS[styled.question])
-    wanted = styled.reading
+def test_a_reply_in_the_style_of_a_model_family_is_read_as_it_is_meant_or_counted(styled):
+    """`styled` is what a server sends, such as *The answer is **B**.* after some reasoning, with
+    what it means (`reading`): the letter B, the goal *blue, twice*, or *pick up the blue cube*.
 
-    if styled.question == "goal" and wanted is not None:
-        found = same_json(found)
-        wanted = same_json(wanted)
+    The reading is None if the reply has no answer, such as *It is A or B.*: then the model is asked
+    a second time, and the question is counted as one without a readable answer.
+    """
+    model, questions = model_that_replies(styled)
 
-    assert found == wanted
-    assert vlm.usage()["unparsed"] == (wanted is None)
+    found = model.ask(SOME_QUERY, READERS[styled.question])
+
+    unreadable = int(styled.reading is None)
+    assert found == styled.reading
+    assert model.usage()["unparsed"] == unreadable
+    assert len(questions) == 1 + unreadable
 
 
 @pytest.mark.parametrize(
@@ -94,37 +108,40 @@ def test_the_stored_text_of_a_reply_includes_the_model_s_thoughts(message, words
     assert letter_in(text) == "B"
 
 
-DRAFT = f"Perhaps {RED_ONCE}? But the remark says"
-CUT = [
-    StyledReply("Qwen, cut off after a draft", "goal", UNREADABLE, DRAFT, ended="length"),
-    StyledReply("Gemini, cut off after a draft", "goal", UNREADABLE, [{"text": DRAFT}],
-                ended="max_tokens"),
-    StyledReply("Llama, cut off in a subgoal", "subgoal", UNREADABLE, PICK, ended="length"),
-    StyledReply("GPT, ended by its limit", "goal", BLUE_TWICE, f"{BLUE_TWICE}\n\n\n",
-                ended="length"),
-]  # fmt: skip
+DRAFT = 'Perhaps {"color": "red", "repeats": 1}? But the remark says'
 
 
-@pytest.mark.parametrize("styled", CUT, ids=lambda styled: styled.style)
-def test_a_reply_that_its_service_cut_off_is_asked_for_again_unless_an_object_ends_it(styled):
-    """A draft in thoughts without a tag, which the limit of tokens breaks off, is no answer."""
-    queries = []
+@pytest.mark.parametrize(
+    "cut",
+    [
+        StyledReply("Qwen", "goal", UNREADABLE, DRAFT, ended="length"),
+        StyledReply("Gemini", "goal", UNREADABLE, [{"text": DRAFT}], ended="max_tokens"),
+        StyledReply("Llama", "subgoal", UNREADABLE, "pick up the blue cube", ended="length"),
+    ],
+    ids=["goal", "Gemini's goal", "subgoal"],
+)
+def test_a_reply_that_its_service_cut_off_is_asked_for_again(cut):
+    """A service that ends a reply at its limit of tokens says so (*length*, *max_tokens*). What
+    stands there may be a draft, not the answer, so both replies are unreadable.
 
-    def answer(query):
-        queries.append(query)
-        return reply_of(styled)
+    The second question ends with the reason.
+    """
+    model, questions = model_that_replies(cut)
 
-    vlm = VLMQuery(
-        ModelOptions(model="m"), Template("$why"), lambda _: SimpleNamespace(answer=answer)
-    )
-    found = vlm.ask(SOME_QUERY, READERS[styled.question])
+    found = model.ask(SOME_QUERY, READERS[cut.question])
 
-    if styled.reading is None:
-        assert found is None
-        assert vlm.usage()["unparsed"] == 1
-        assert "cut off at the limit of tokens" in queries[1].turns[2].parts[0]
-    else:
-        assert same_json(found) == same_json(styled.reading)
+    (reason,) = questions[1].turns[-1].parts
+    assert found is None
+    assert model.usage()["unparsed"] == 1
+    assert "cut off at the limit of tokens" in reason
+
+
+def test_a_reply_that_was_cut_off_behind_its_object_is_read():
+    """Some models add line breaks behind the answer until the limit of tokens (*length*)."""
+    goal = '{"color": "blue", "repeats": 2}'
+    model, _ = model_that_replies(StyledReply("GPT", "goal", goal, f"{goal}\n\n\n", ended="length"))
+
+    assert model.ask(SOME_QUERY, goal_in) == goal
 
 
 def test_a_model_asked_again_sees_its_rejected_reply_without_its_thoughts():
@@ -213,7 +230,9 @@ def test_a_letter_in_an_object_that_breaks_off_is_no_answer():
     ],
 )
 def test_a_reply_with_a_good_and_a_malformed_json_object_is_unreadable(read, later):
-    """The malformed one may be a correction, so the good one must not count."""
+    """The good object alone is read. The malformed one may correct it, so with that behind it,
+    before it or around it (in one more pair of braces) the good one must not count.
+    """
     good = '{"answer": "C", "color": "green", "repeats": 3}'
     read(good)
     for reply in (f"{good}\n{later}", f"{later}\n{good}", f"{{{good}}}"):

@@ -85,46 +85,72 @@ def test_a_key_too_short_to_be_a_secret_masks_nothing():
     assert printable("none of the cubes") == "none of the cubes"
 
 
-METADATA = msgpack.packb({"version": KEY, "seen": {"Authorization": [f"Api-Key {KEY}"]}})
-MESSAGES_WITH_KEY = {
-    "metadata": frame(METADATA),
-    "an error": frame(f"Traceback …\nValueError: {'x' * 280}{KEY}".encode(), 1),
-    "the reason of a close": frame(struct.pack(">H", 1008) + f"no {KEY}".encode(), 8),
-}
+def recorded_of(message):
+    """Return all that a record keeps of a policy server whose first message is that one: cause and
+    details of an error, metadata, and version.
 
-
-@pytest.mark.parametrize("place_of_key", MESSAGES_WITH_KEY)
-def test_a_key_that_a_policy_server_sends_back_is_masked_in_records_and_errors(place_of_key):
-    """A server sends the key that its client handed over back: in its metadata, an error, or a
-    close.
-
-    What records keep of it (cause and details of the error, metadata, version) has stars, and
-    neither the first nor the last six characters of the key, also where a long text is cut.
+    The client has handed its key over as it connected. `message` is a frame of WebSocket.
     """
 
     def answer(peer):
         shake_hands(peer)
-        peer.sendall(MESSAGES_WITH_KEY[place_of_key])
+        peer.sendall(message)
         wait_for_end(peer)
 
+    recorded = ""
     with answering(answer) as place:
         policy = make_policy(f"openpi://{place}?api_key_env={VARIABLE}", 0)
-        kept = ""
         try:
             policy.reset("Do it.", {})
         except PolicyServerError as error:
             described = describe_error("policy", error)
-            kept = f"{described.cause} {described.details}"
-        kept += f"{policy.metadata} {policy.version}"
+            recorded = f"{described.cause} {described.details}"
+        recorded += f"{policy.metadata} {policy.version}"
         policy.close()
+    return recorded
 
-    assert "****" in kept
-    assert KEY[:6] not in kept
-    assert KEY[-6:] not in kept
+
+def test_a_key_in_the_metadata_of_a_policy_server_is_masked_in_records():
+    r"""A server describes itself in its first message, and repeats the client's key there.
+
+    The key is `k7-"X/+secret\of~ours`; neither its beginning nor its end may be recorded.
+    """
+    metadata = {"version": KEY, "seen": {"Authorization": [f"Api-Key {KEY}"]}}
+
+    recorded = recorded_of(frame(msgpack.packb(metadata)))
+
+    assert "****" in recorded
+    assert 'k7-"X/' not in recorded
+    assert "f~ours" not in recorded
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        # A text (opcode 1) in place of metadata is an error of the server.
+        frame(f"Traceback …\nValueError: {'x' * 280}{KEY}".encode(), 1),
+        # A close (opcode 8) has a code, 1008 for a policy that is violated, and a reason.
+        frame(struct.pack(">H", 1008) + f"no {KEY}".encode(), 8),
+    ],
+    ids=["an error", "the reason of a close"],
+)
+def test_a_key_in_an_error_of_a_policy_server_is_masked_in_records(message):
+    r"""A server repeats the client's key, `k7-"X/+secret\of~ours`, in its error.
+
+    What it says is cut to 300 characters, here in the middle of the key: also then neither the
+    key's beginning nor its end may be recorded.
+    """
+    recorded = recorded_of(message)
+
+    assert "****" in recorded
+    assert 'k7-"X/' not in recorded
+    assert "f~ours" not in recorded
 
 
 def test_a_key_in_the_reply_of_a_model_is_masked_when_shown_and_stored(tmp_path):
-    """A model may repeat the key that the client sent in its header."""
+    """A model may repeat the key that the client sent in its header. The reply is shown to the
+    policy and stored in a file; both have a star for each letter of the key.
+    """
     query = ModelQuery("system", (ChatTurn("user", ("words",)),))
     with fake_vlm([f"my key is {KEY}"]) as server:
         vlm = VLMQuery(model_options(server, api_key_env=VARIABLE), Template("$why"))
@@ -138,7 +164,9 @@ def test_a_key_in_the_reply_of_a_model_is_masked_when_shown_and_stored(tmp_path)
 
 
 def test_a_key_that_a_library_prints_is_masked_in_the_log(tmp_path):
-    """While a log is kept, its file holds the key; afterwards as many stars."""
+    """A library may print straight into the file of a log, so that the file holds the key; when
+    the log is closed, a star stands for each letter.
+    """
     handed_keys.remember_key(KEY)
     with EpisodeLog(tmp_path / "log.txt") as log:
         log.path.write_text(f"closed: {KEY}\n")

@@ -1,6 +1,5 @@
 """The adapter for LeRobot, in front of stand-ins for models and their loading."""
 
-import math
 import sys
 from collections import deque
 from dataclasses import dataclass
@@ -24,7 +23,9 @@ WRIST = "observation.images.wrist"
 
 
 def test_a_lerobot_policy_has_the_version_and_the_folder_of_its_url(tmp_path):
-    """Nothing is loaded for it."""
+    """The checkpoint is a folder with a configuration and no weights: nothing is loaded before the
+    first episode.
+    """
     folder = write_checkpoint(tmp_path / "last")
 
     policy = make_policy(f"lerobot://{folder}?version=step-3", 0)
@@ -260,52 +261,83 @@ def actions_of_lerobot_s_loop(model, length):
     return np.stack(rows)
 
 
+def configure(checkpoint, **fields):
+    """Set fields of the configuration of the stand-in checkpoint."""
+    for name, value in fields.items():
+        setattr(checkpoint.config, name, value)
+
+
+def act_in_turns(episodes, steps):
+    """Let episodes take turns; return the actions of each for the moments 0 to steps - 1."""
+    played = [[] for _ in episodes]
+    while min(map(len, played)) < steps:
+        for policy, rows in zip(episodes, played, strict=True):
+            if len(rows) < steps:
+                rows += list(policy.act(moment(len(rows))))
+    return [np.stack(rows)[:steps] for rows in played]
+
+
+KINDS_OF_MODELS = ["act", "diffusion", "vqbet", "somebody_s_plugin"]
+
+
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
-    kind=st.sampled_from(["act", "diffusion", "vqbet", "somebody_s_plugin"]),
-    remembered=st.integers(1, 5),
-    steps=st.integers(1, 6),
-    ensembles=st.booleans(),
+    kind=st.sampled_from(KINDS_OF_MODELS),
+    n_obs_steps=st.integers(1, 5),
+    n_action_steps=st.integers(1, 6),
+    averages=st.booleans(),
 )
 def test_two_interleaved_episodes_get_the_actions_of_lerobot_s_own_loop(
-    checkpoint, kind, remembered, steps, ensembles
+    checkpoint, kind, n_obs_steps, n_action_steps, averages
 ):
-    """The stand-in model sums what it remembers, so that any difference in its inputs shows.
+    """LeRobot's own loop asks for one action after each observation, here for 24. Two episodes of
+    our policy take turns with the same observations, and each gets the same 24 actions: neither
+    sees anything of the other.
 
-    LeRobot's loop plays 24 steps of one episode: it asks the model for each action. Two episodes
-    of our policy take turns, and both get the same 24 actions, with no more calls of the model for
-    each of them. `remembered` is how many observations the model sees, `steps` how many actions of
-    a chunk are played; averaging over chunks (`ensembles`) plays one action at a time.
-
-    A kind of model that we know plays from the present action on: the chunk's first actions belong
-    to the remembered observations, so that steps - remembered + 1 are left.
+    An action of the stand-in model is a sum of the last `n_obs_steps` observations, so that any
+    other input shows. Of each chunk that it plans, `n_action_steps` are played; or one, the mean of
+    what all chunks planned for its step (then `temporal_ensemble_coeff` is a number).
     """
-    config = checkpoint.config
-    config.type = kind
-    config.n_obs_steps = remembered
-    config.n_action_steps = 1 if ensembles else steps
-    config.temporal_ensemble_coeff = 0.01 if ensembles else None
+    configure(checkpoint, type=kind, n_obs_steps=n_obs_steps, n_action_steps=n_action_steps)
+    configure(checkpoint, temporal_ensemble_coeff=None)
+    if averages:
+        configure(checkpoint, temporal_ensemble_coeff=0.01, n_action_steps=1)
     expected = actions_of_lerobot_s_loop(checkpoint.model, 24)
-    checkpoint.model.batches.clear()
 
-    played = act_in_turns([policy_after_reset(), policy_after_reset()], len(expected))
+    first, second = act_in_turns([policy_after_reset(), policy_after_reset()], steps=24)
 
-    for rows in played:
-        assert np.allclose(np.stack(rows)[: len(expected)], expected, atol=1e-6)
-    calls = math.ceil(len(expected) / config.n_action_steps)
-    assert len(checkpoint.model.batches) <= 2 * calls
-    if kind != "somebody_s_plugin" and not ensembles:
-        assert len(policy_after_reset().act(moment(0))) == max(1, steps - remembered + 1)
+    assert np.allclose(first, expected, atol=1e-6)
+    assert np.allclose(second, expected, atol=1e-6)
 
 
-def act_in_turns(episodes, length):
-    """Return the actions of two episodes that take turns: neither may see anything of the other."""
-    played = [[], []]
-    while min(map(len, played)) < length:
-        for policy, rows in zip(episodes, played, strict=True):
-            if len(rows) < length:
-                rows += list(policy.act(moment(len(rows))))
-    return played
+@pytest.mark.parametrize("kind", KINDS_OF_MODELS)
+@pytest.mark.parametrize(("n_action_steps", "calls"), [(1, 24), (2, 12), (5, 5), (6, 4)])
+def test_a_checkpoint_is_called_once_for_the_actions_of_a_chunk(
+    checkpoint, kind, n_action_steps, calls
+):
+    """An episode of 24 steps plays `n_action_steps` of each chunk: 24 / 5 chunks are rounded up."""
+    configure(checkpoint, type=kind, n_action_steps=n_action_steps)
+
+    act_in_turns([policy_after_reset()], steps=24)
+
+    assert len(checkpoint.model.batches) == calls
+
+
+@pytest.mark.parametrize("kind", ["act", "diffusion", "vqbet"])
+@pytest.mark.parametrize(
+    ("n_obs_steps", "n_action_steps", "played"), [(1, 6, 6), (2, 6, 5), (5, 6, 2), (5, 3, 1)]
+)
+def test_of_a_chunk_the_actions_from_the_present_on_are_played(
+    checkpoint, kind, n_obs_steps, n_action_steps, played
+):
+    """The model sees the last `n_obs_steps` observations, and the first of its `n_action_steps`
+    actions belong to the earlier ones of these: with two observations the first action is past.
+
+    At least one action is played.
+    """
+    configure(checkpoint, type=kind, n_obs_steps=n_obs_steps, n_action_steps=n_action_steps)
+
+    assert len(policy_after_reset().act(moment(0))) == played
 
 
 @pytest.mark.parametrize(
@@ -372,17 +404,28 @@ def test_each_call_of_a_batched_episode_has_noise_of_its_own(checkpoint):
     assert not np.array_equal(policy.act(moment(0)), policy.act(moment(0)))
 
 
-@pytest.mark.parametrize("changes", [{"type": "diffusion"}, {"temporal_ensemble_coeff": 0.01}])
-def test_checkpoints_with_memory_are_not_batched(checkpoint, changes):
-    """A model of the kind "diffusion", or one that averages over chunks, remembers past calls.
+@pytest.mark.parametrize("remembers", [{"type": "diffusion"}, {"temporal_ensemble_coeff": 0.01}])
+def test_checkpoints_with_memory_are_not_batched(checkpoint, remembers):
+    """A model of the kind "diffusion", or one that averages over its chunks, remembers past calls.
 
-    So three episodes make three batches of one, despite `batch=4`; and the noise of the third,
-    whose seed is 2, is the one that it draws alone.
+    So three episodes are three calls of the model with one episode each, despite `batch=4`.
     """
-    vars(checkpoint.config).update(changes, is_noisy=True)
+    configure(checkpoint, **remembers)
     episodes = [policy_after_reset(seed, "?batch=4") for seed in range(3)]
 
-    together = episodes[0].act_together(episodes, [moment(1)] * 3)
+    episodes[0].act_together(episodes, [moment(1), moment(1), moment(1)])
 
     assert [len(batch["task"]) for batch in checkpoint.model.batches] == [1, 1, 1]
-    assert np.array_equal(policy_after_reset(2, "?batch=4").act(moment(1)), together[2])
+
+
+def test_an_episode_that_is_not_batched_has_the_noise_that_it_has_alone(checkpoint):
+    """A model of the kind "diffusion" is asked one episode after the other. Here it adds random
+    noise to its actions; that of the second episode depends on its own seed, 1, alone.
+    """
+    configure(checkpoint, type="diffusion", is_noisy=True)
+    episodes = [policy_after_reset(0, "?batch=4"), policy_after_reset(1, "?batch=4")]
+
+    _, together = episodes[0].act_together(episodes, [moment(1), moment(1)])
+
+    alone = policy_after_reset(1, "?batch=4").act(moment(1))
+    assert np.array_equal(together, alone)

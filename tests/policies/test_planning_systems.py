@@ -66,6 +66,9 @@ def test_a_system_with_a_planner_asks_it_for_subgoals_with_points(name, kind):
     ("name", "remembers"), [("TTT-Expert", True), ("FrameS-Modul", True), ("pi0.5", False)]
 )
 def test_a_system_without_a_planner_sends_its_history_if_it_has_a_memory(name, remembers):
+    """All three are policies behind a server, which is asked after each 16 steps (`execute`);
+    pi0.5 has no memory.
+    """
     policy = load_system(name)
 
     assert not isinstance(policy, HierarchicalPolicy)
@@ -75,6 +78,9 @@ def test_a_system_without_a_planner_sends_its_history_if_it_has_a_memory(name, r
 
 
 def test_options_in_a_system_s_name_override_its_configuration():
+    """Options of the planner and of its model stand alone (`vlm` is the address of the model's
+    server), those of the policy behind it have the prefix `policy.`.
+    """
     policy = make_policy(
         "system:GroundSG-QwenVL?server=gpu:9001&vlm=http://other:8000/v1&model=mine"
         "&video_frames=2&timeout_s=7.5&policy.execute=8",
@@ -100,6 +106,7 @@ def test_an_option_of_a_system_changes_the_address_of_its_policy_and_leaves_its_
 
 @pytest.mark.parametrize("spec", [*(f"system:{name}" for name in SYSTEMS_OF_THE_PAPER), LISTENER])
 def test_needs_and_version_of_a_system_are_known_without_making_it(spec):
+    """`read_policy` reads the name alone. A policy that is privileged has a method attach(env)."""
     known = read_policy(spec)
     policy = make_policy(spec, 5)
 
@@ -135,6 +142,7 @@ def test_needs_and_version_of_a_system_are_known_without_making_it(spec):
     ],
 )  # fmt: skip
 def test_a_wrong_system_or_planner_name_is_refused_with_what_would_be_right(spec, error, words):
+    """Each name is wrong in one respect: a word, an option, its value, or one that is missing."""
     with pytest.raises(error, match=words):
         find_policy(spec)
 
@@ -166,6 +174,7 @@ def test_a_user_s_system_is_a_toml_file(tmp_path):
     ids=["a policy that follows no subgoals", "a server for a policy without one", "no TOML"],
 )
 def test_a_user_s_system_that_cannot_be_made_is_refused(tmp_path, text, options, reason):
+    """The file of the system has this text; `options` follow its path in the name of the policy."""
     with pytest.raises(InvalidValueError, match=reason):
         make_policy(system_file(tmp_path, text) + options, 0)
 
@@ -212,38 +221,75 @@ class ServerWithoutMemory(MmeVlaServer):
         return super().infer(message)
 
 
-GEMINI_REPLY = '{"description": "x", "subgoal_sequence": [], "subgoal": "put it down"}'
-MEMER_REPLY = '{"current_subtask": "put it down", "keyframe_positions": [1]}'
+def play_two_seconds(name, server, model):
+    """Play 40 control steps with a system of the paper; its policy asks at steps 0, 16 and 32.
+
+    Args:
+        name: of the system.
+        server: of its policy, which writes down its messages.
+        model: the server of its planner's model; None for a system without one.
+    """
+    addresses = {"server": server.place, "policy.timeout": "300"}
+    if model is not None:
+        addresses["vlm"] = model.url
+    policy = load_system(name, addresses)
+    needs = PolicyNeeds.of(policy).env_options
+    env = roboirg.make("PickXtimes", setting="direct", max_steps=40, **needs)
+    info = play(env, policy)
+    policy.close()
+    assert info["status"] == "timeout"
+
+
+def subgoals_sent_to(server):
+    """Return the subgoal in each request for actions that a policy server got; None for none."""
+    messages = map(unpack, server.messages)
+    return [message.get("grounded_subgoal") for message in messages if "prompt" in message]
+
+
+@pytest.mark.sim
+def test_a_system_without_a_planner_sends_no_subgoals():
+    """TTT-Expert is a policy with a memory, which asks its server for actions at steps 0, 16 and 32
+    of 40.
+    """
+    with MmeVlaServer() as server:
+        play_two_seconds("TTT-Expert", server, model=None)
+
+    assert subgoals_sent_to(server) == [None, None, None]
+
+
+@pytest.mark.sim
+def test_the_oracle_system_sends_subgoals_with_points_of_the_picture():
+    """Its planner reads the simulator and asks no model: *pick up the red cube at <120, 80>* ..."""
+    with ServerWithoutMemory() as server:
+        play_two_seconds("GroundSG-oracle", server, model=None)
+
+    subgoals = subgoals_sent_to(server)
+    assert len(subgoals) == 3
+    for subgoal in subgoals:
+        assert re.fullmatch(r"pick up the \w+ cube at <\d+, \d+> .*", subgoal)
 
 
 @pytest.mark.sim
 @pytest.mark.parametrize(
-    ("name", "reply", "questions", "subgoal"),
+    ("name", "reply", "questions"),
     [
-        ("TTT-Expert", "", 0, "None"),
-        ("GroundSG-Gemini", GEMINI_REPLY, 1, "put it down"),
-        ("GroundSG-oracle", "", 0, r"pick up the \w+ cube at <\d+, \d+> .*"),
-        ("MemER", MEMER_REPLY, 3, "put it down"),
+        (
+            "GroundSG-Gemini",
+            '{"description": "x", "subgoal_sequence": [], "subgoal": "put it down"}',
+            1,
+        ),
+        ("MemER", '{"current_subtask": "put it down", "keyframe_positions": [1]}', 3),
     ],
 )
-def test_every_system_plays_a_whole_episode(name, reply, questions, subgoal):
-    """40 steps in three chunks, against a policy server and a model's server on real sockets."""
-    server = MmeVlaServer() if name == "TTT-Expert" else ServerWithoutMemory()
-    with server, fake_vlm([reply]) as vlm:
-        addresses = {"server": server.place, "policy.timeout": "300"}
-        if reply:
-            addresses["vlm"] = vlm.url
-        policy = load_system(name, addresses)
-        env = roboirg.make(
-            "PickXtimes", setting="direct", max_steps=40, **PolicyNeeds.of(policy).env_options
-        )
-        info = play(env, policy)
-        policy.close()
+def test_a_system_with_a_model_sends_the_subgoal_that_the_model_names(name, reply, questions):
+    """The model always replies *put it down*, in the JSON that each planner asks for.
 
-    assert info["status"] == "timeout"
-    messages = map(unpack, server.messages)
-    named = [message.get("grounded_subgoal") for message in messages if "prompt" in message]
-    assert len(named) == 3
-    for words in named:
-        assert re.fullmatch(subgoal, str(words))
-    assert len(vlm.requests) == questions
+    In 40 steps the policy asks its server for actions three times, each time with that subgoal. The
+    planner of MemER asks its model before each of them; that of GroundSG-Gemini once, as it does
+    not ask again before step 75.
+    """
+    with ServerWithoutMemory() as server, fake_vlm([reply]) as model:
+        play_two_seconds(name, server, model)
+
+    assert subgoals_sent_to(server) == ["put it down", "put it down", "put it down"]
+    assert len(model.requests) == questions

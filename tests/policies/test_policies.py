@@ -66,32 +66,51 @@ def test_random_actions_depend_on_seed_and_instruction_alone():
     assert not np.array_equal(random_walk(1, "Stop."), actions)
 
 
-@pytest.mark.parametrize(
-    ("completed", "executed"),
-    [
-        # What handles the thing that was not picked begins with the pick; what fails before, alone.
-        ([1, 1, 2, 2, 2, 3], "hover pick_cube pick_cube drop_into pick_cube drop_into"),
-        ([0, 0, 0, 0], "hover hover hover hover"),
-    ],
-)
-def test_the_expert_repeats_a_failed_motion_at_most_three_times(monkeypatch, completed, executed):
-    """The expert has three stages, hover, pick and drop, and executes the first that is not
-    complete.
+def motions_executed(monkeypatch, stages, *, complete_after_each):
+    """Return the kinds of motions that the scripted expert executes, in their order.
 
-    `completed` is how many stages are complete each time that it looks, in place of the
-    simulator's judgment. 1, 1: the pick failed, and is done again; 2, 2, 2: the drop failed, so
-    the cube is picked up again first. In the second row the hover fails four times: one try and
-    three repetitions.
+    Args:
+        monkeypatch: pytest's.
+        stages: kinds of motions of the goal, in the order in which they are to be done.
+        complete_after_each: how many of the stages the simulator finds complete after each motion.
     """
-    kinds = ("hover", "pick_cube", "drop_into")
-    stages = tuple(SimpleNamespace(primitive=Primitive(kind, "cube")) for kind in kinds)
+    planned = [SimpleNamespace(primitive=Primitive(kind, "cube")) for kind in stages]
     primitives = SimpleNamespace(execute=lambda primitive: [primitive.kind])
-    counts = iter(completed)
+    counts = iter(complete_after_each)
     monkeypatch.setattr(scripted, "completed_stages", lambda *_: next(counts))
+    return [motion for _, motion in scripted._execute(MagicMock(), planned, primitives)]
 
-    chunks = scripted._execute(MagicMock(), stages, primitives)
 
-    assert " ".join(chunk for _, chunk in chunks) == executed
+def test_the_expert_picks_up_again_what_it_failed_to_put_down(monkeypatch):
+    """The expert does hover, pick and drop, and the simulator says after each motion how many of
+    the three are complete.
+
+    A failed pick is repeated alone. A failed drop cannot be: the cube is no longer in the gripper,
+    so it is picked up again first.
+    """
+    motions = motions_executed(
+        monkeypatch,
+        stages=["hover", "pick_cube", "drop_into"],
+        complete_after_each=[1, 1, 2, 2, 2, 3],
+    )
+
+    assert motions == [
+        "hover",  # 1 complete
+        "pick_cube",  # still 1: it failed
+        "pick_cube",  # 2 complete
+        "drop_into",  # still 2: it failed
+        "pick_cube",  # 2 complete, again
+        "drop_into",  # all 3
+    ]
+
+
+def test_the_expert_gives_up_after_three_repetitions_of_a_failed_motion(monkeypatch):
+    """No stage is ever complete: the first is tried once and repeated three times."""
+    motions = motions_executed(
+        monkeypatch, stages=["hover", "pick_cube"], complete_after_each=[0, 0, 0, 0]
+    )
+
+    assert motions == ["hover", "hover", "hover", "hover"]
 
 
 @pytest.mark.parametrize(
@@ -150,6 +169,9 @@ class PolicyWithoutArguments(PolicyWithoutSeed):
     ids=["misspelled", "no module", "no class", "other signature", "no act", "no class at all"],
 )  # fmt: skip
 def test_a_wrong_policy_name_is_refused_with_what_would_be_right(spec, error, words):
+    """The classes PolicyWithout… are those of this file: one without a method act(), and one whose
+    reset() takes no arguments.
+    """
     with pytest.raises(error, match=words):
         find_policy(spec)
 

@@ -32,15 +32,13 @@ class Demanding:
     def follow(self, subgoal): ...
 
 
-class Guide:
-    """A planner that sees the front camera and every fourth frame."""
-
-    cameras = ("front",)
-    demonstration_frames = 4
-    trained_tasks = ("BinFill",)
+class Declares(SimpleNamespace):
+    """A planner or a policy that declares what it is given, as attributes."""
 
     def reset(self, instruction, demonstration): ...
     def plan(self, observation, step): ...
+    def act(self, observation): ...
+    def follow(self, subgoal): ...
 
 
 def test_all_needs_of_a_policy_are_read():
@@ -78,6 +76,7 @@ def test_needs_can_be_declared_on_a_policy():
     ],
 )
 def test_needs_with_a_wrong_value_are_refused(needs, error, words):
+    """Each has one value that its need cannot have; `touch` is no need at all."""
     with pytest.raises(error, match=words):
         PolicyNeeds(**needs)
 
@@ -102,28 +101,52 @@ def test_a_planner_that_declares_nothing_needs_neither_cameras_nor_video():
     assert PolicyNeeds.of_planner(object()) == PolicyNeeds(cameras=(), demonstration_frames="none")
 
 
-def test_needs_of_a_planner_and_of_its_policy_are_merged():
-    """Cameras are united and tasks intersected; every 4th and every 6th frame are in every 2nd."""
-    both = PolicyNeeds.of(HierarchicalPolicy(Guide(), Demanding()))
+@pytest.mark.parametrize(
+    ("need", "of_planner", "of_policy", "merged"),
+    [
+        ("cameras", ("front",), ("wrist",), ("front", "wrist")),
+        ("demonstration_frames", 4, 6, 2),  # each 4th and each 6th frame are among each 2nd
+        ("observe_every", None, 4, 4),
+        ("trained_tasks", ("BinFill",), ("PickXtimes", "BinFill"), ("BinFill",)),
+        ("actions", "teleport", "ee_pose", "ee_pose"),
+        ("prompt_tokens", 7, 64, 64),
+        ("tokenizer", "planner.model", "policy.model", "policy.model"),
+    ],
+)
+def test_needs_of_a_planner_and_of_the_policy_behind_it_are_merged(
+    need, of_planner, of_policy, merged
+):
+    """Both get the cameras, frames and observations that either needs, and are trained on the tasks
+    that both know. Only the policy acts and reads prompts, so for these its needs count alone.
+    """
+    planner = Declares(**{need: of_planner})
+    policy = Declares(**{need: of_policy})
 
-    assert both == PolicyNeeds.of(Demanding()).merge(PolicyNeeds.of_planner(Guide()))
-    assert both.cameras == ("front", "wrist")
+    both = PolicyNeeds.of(HierarchicalPolicy(planner, policy))
+
+    assert getattr(both, need) == merged
+
+
+def test_the_history_of_a_planner_s_cameras_is_added_to_that_of_its_policy():
+    """A planner reads the past pictures of all its cameras; a policy names those that it reads."""
+    planner = Declares(cameras=("front",))
+    policy = Declares(cameras=("front", "wrist"), history_cameras=("wrist",))
+
+    both = PolicyNeeds.of(HierarchicalPolicy(planner, policy))
+
     assert both.history_cameras == ("front", "wrist")
-    assert both.demonstration_frames == 2
-    assert both.observe_every == 4
-    assert both.trained_tasks == ("BinFill",)
 
 
-def test_actions_and_limits_of_prompts_are_those_of_the_policy_behind_a_planner():
-    guide = Guide()
-    guide.actions = "teleport"
-    guide.prompt_tokens = 7
+def test_a_planner_with_its_policy_declares_all_needs_merged():
+    """The needs of the policy `Demanding` all differ from the defaults, so that none can be
+    forgotten unnoticed.
+    """
+    planner = Declares(cameras=("front",), demonstration_frames=4, trained_tasks=("BinFill",))
+    policy = Demanding()
 
-    both = PolicyNeeds.of(HierarchicalPolicy(guide, Demanding()))
+    both = PolicyNeeds.of(HierarchicalPolicy(planner, policy))
 
-    assert both.actions == "ee_pose"
-    assert both.prompt_tokens == 64
-    assert both.tokenizer == "words.model"
+    assert both == PolicyNeeds.of(policy).merge(PolicyNeeds.of_planner(planner))
 
 
 def test_a_policy_that_names_no_trained_tasks_does_not_limit_those_of_the_other():

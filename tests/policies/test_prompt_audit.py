@@ -141,6 +141,9 @@ def sentencepiece_file():
     "text", ["Put the red cube into the bin.", "cubes,", "third third", "Remember: green one"]
 )
 def test_a_sentencepiece_model_lies_between_the_bounds(sentencepiece_file, text):
+    """The tokenizer of a real model (the fixture) makes no fewer tokens of a text than
+    `fewest_tokens` says and no more than `most_tokens`; the last one ends with the text.
+    """
     tokens = read_tokenizer(sentencepiece_file)(text)
 
     assert fewest_tokens(text).total <= tokens.total <= most_tokens(text).total
@@ -148,18 +151,29 @@ def test_a_sentencepiece_model_lies_between_the_bounds(sentencepiece_file, text)
 
 
 def test_a_json_tokenizer_is_read(tmp_path):
+    """A tokenizer of the library `tokenizers` makes a token of each word, and puts *[B]*, the
+    beginning, before them.
+
+    Read back from its file it gives 1 token before the words, tokens that end after 3, 7, 12 and 13
+    characters (*put|the|cube|.*), and behind them 1 token for the line break that prompts get. The
+    file's own truncation and padding do not count.
+    """
     tokenizers = pytest.importorskip("tokenizers")
-    words = {word: number for number, word in enumerate(["[B]", "put", "the", "cube", ".", "[U]"])}
-    model = tokenizers.Tokenizer(tokenizers.models.WordLevel(words, unk_token="[U]"))  # noqa: S106
-    model.pre_tokenizer = tokenizers.pre_tokenizers.Whitespace()
-    model.post_processor = tokenizers.processors.TemplateProcessing("[B] $A", None, [("[B]", 0)])
-    model.enable_truncation(3)
-    model.enable_padding(length=20)
-    path = tmp_path / "tokenizer.json"
+    numbers = {"[B]": 0, "put": 1, "the": 2, "cube": 3, ".": 4, "[unknown]": 5}
+    model = tokenizers.models.WordLevel(numbers, unk_token="[unknown]")  # noqa: S106
+    tokenizer = tokenizers.Tokenizer(model)
+    tokenizer.pre_tokenizer = tokenizers.pre_tokenizers.Whitespace()
+    tokenizer.post_processor = tokenizers.processors.TemplateProcessing(
+        "[B] $A", None, [("[B]", 0)]
+    )
+    tokenizer.enable_truncation(3)
+    tokenizer.enable_padding(length=20)
+    path = str(tmp_path / "tokenizer.json")
+    tokenizer.save(path)
 
-    model.save(str(path))
+    tokens = read_tokenizer(path)("put the cube.")
 
-    assert read_tokenizer(str(path))("put the cube.") == Tokens(1, (3, 7, 12, 13), 1)
+    assert tokens == Tokens(before=1, ends=(3, 7, 12, 13), after=1)
 
 
 @pytest.mark.parametrize(
@@ -173,7 +187,9 @@ def test_a_json_tokenizer_is_read(tmp_path):
 def test_a_tokenizer_file_that_cannot_be_read_is_refused_with_the_reason(
     tmp_path, name, size, reason
 ):
-    """A file of 2**40 zeros takes no space on the disk."""
+    """The file has so many bytes, all of them zero (2**40 take no space on the disk), or is
+    missing (None).
+    """
     path = tmp_path / name
     if size is not None:
         with path.open("wb") as file:
@@ -189,6 +205,9 @@ def test_a_tokenizer_file_that_cannot_be_read_is_refused_with_the_reason(
 def test_a_tokenizer_file_without_its_library_is_refused_with_what_to_install(
     tmp_path, monkeypatch, name, library
 ):
+    """A file that ends in .json is of the library tokenizers, any other of sentencepiece. None in
+    `sys.modules` makes the import of a library fail.
+    """
     (tmp_path / name).write_text("{}")
     monkeypatch.setitem(sys.modules, library, None)
 

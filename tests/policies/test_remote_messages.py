@@ -17,12 +17,11 @@ from roboirg.policies.contract.base import SubgoalFollower
 
 CAPTURES = Path(__file__).with_name("captures")
 PAGE = (Path(__file__).parents[2] / "docs" / "servers.md").read_text()
-NOW = moment(3, history=())
-TWO_STEPS_LATER = moment(5, history=(moment(4), moment(5)))
 
 
-def stored_messages(protocol):
-    found = sorted(CAPTURES.glob(f"{protocol}-[0-9]*.msgpack"))
+def stored_messages(name):
+    """Return the messages of an episode in captures, which openpi's own codec has written."""
+    found = sorted(CAPTURES.glob(f"{name}-[0-9]*.msgpack"))
     assert found
     return [path.read_bytes() for path in found]
 
@@ -52,6 +51,9 @@ def type_and_shape_of(value):
 
 
 def test_openpi_messages_are_byte_for_byte_the_stored_ones():
+    """The one question of an episode: openpi has no message for the video. The stored message was
+    made by captures/make.py, from the same moment and without code of ours.
+    """
     with WireServer() as server, client_of(server, "openpi") as policy:
         policy.reset(INSTRUCTION, video(3))
         policy.act(moment(3))
@@ -67,11 +69,17 @@ def test_the_version_of_a_policy_behind_openpi_is_that_of_its_url():
 
 
 def test_mme_vla_messages_are_byte_for_byte_the_stored_ones():
+    """All messages of an episode: a video of the moments 0 to 2, moment 3 at the first question,
+    and a subgoal and the moments 4 and 5 at the second. At most two frames are sent at once.
+
+    The stored messages were made by captures/make.py, from the same moments and without code of
+    ours.
+    """
     with MmeVlaServer() as server, client_of(server, "mme-vla", "?part=2&execute=2") as policy:
         policy.reset(INSTRUCTION, video(3))
-        policy.act(NOW)
+        policy.act(moment(3, history=()))
         policy.follow("Pick up the red cube at <12, 34>")
-        policy.act(TWO_STEPS_LATER)
+        policy.act(moment(5, history=(moment(4), moment(5))))
 
     assert server.messages == stored_messages("mme-vla")
 
@@ -84,23 +92,38 @@ def test_mme_vla_messages_are_byte_for_byte_the_stored_ones():
     ],
 )
 def test_challenge_messages_are_byte_for_byte_the_stored_ones(name, options, has_sensors):
-    """Moments 3, then 4 and 5, are shown after a video of three moments (0 to 2).
+    """All messages of an episode: a video of the moments 0 to 2, moment 3 at the first question,
+    and the moments 4 and 5 at the second; with depth and the cameras' matrices if the URL says so.
 
-    The server answers with the number of moments that it was shown: 3 + 1 = 4, then 6.
+    The stored messages were made by captures/make.py, from the same moments and without code of
+    ours.
     """
     now, later, latest = (moment(number, sensors=has_sensors) for number in (3, 4, 5))
     with ChallengeServer() as server, client_of(server, "challenge", options) as policy:
         policy.reset(INSTRUCTION, video(3, sensors=has_sensors))
-        first = policy.act({**now, "history": ()})
-        second = policy.act({**latest, "history": (later, latest)})
+        policy.act({**now, "history": ()})
+        policy.act({**latest, "history": (later, latest)})
 
     assert server.messages == stored_messages(name)
-    assert (first == 4).all()
-    assert (second == 6).all()
-    assert policy.depth == policy.calibration == has_sensors
+    assert policy.depth == has_sensors
+    assert policy.calibration == has_sensors
+
+
+def test_a_challenge_server_is_shown_each_moment_once():
+    """The server (a stand-in) answers with the number of moments that it was shown so far: a video
+    of three and moment 3 make four, and the moments 4 and 5 make six.
+    """
+    with ChallengeServer() as server, client_of(server, "challenge") as policy:
+        policy.reset(INSTRUCTION, video(3))
+
+        assert (policy.act(moment(3, history=())) == 4).all()
+        assert (policy.act(moment(5, history=(moment(4), moment(5)))) == 6).all()
 
 
 def test_the_metadata_of_a_challenge_server_are_kept_with_its_address():
+    """The server (a stand-in) says that it is *submission*, version *phase-1*. The client adds its
+    address, and that it executes all actions of a chunk.
+    """
     with ChallengeServer() as server, client_of(server, "challenge") as policy:
         policy.reset(INSTRUCTION, video(3))
 
@@ -121,6 +144,9 @@ class ServerThatIgnoresFrames(MmeVlaServer):
 
 
 def test_with_history_no_mme_vla_gets_the_current_frame_only():
+    """Of an episode with one question the server gets two messages, whose keys are shown: the
+    reset and the question, and no frames for its memory. 16 of its 20 actions are executed.
+    """
     with (
         ServerThatIgnoresFrames() as server,
         client_of(server, "mme-vla", "?history=no") as policy,
@@ -182,17 +208,21 @@ def test_a_video_is_sent_in_parts_of_16_frames_with_the_current_frame_last(lengt
 
 
 def test_a_history_longer_than_a_part_is_sent_in_parts():
-    """Nine frames in parts of four, after the first frame alone."""
+    """At most four frames are sent at once (`part=4`). The first question shows the frame 0 alone;
+    the second one, 9 steps later, the frames 1 to 9, in parts of 4, 4 and 1.
+    """
     with MmeVlaServer() as server, client_of(server, "mme-vla", "?part=4&execute=9") as policy:
         policy.reset(INSTRUCTION, video(0))
         policy.act(moment(0, history=()))
+        policy.act(moment(9, history=map(moment, range(1, 10))))
 
-        policy.act(moment(9, history=[moment(number) for number in range(1, 10)]))
-
-        assert server.parts == [1, 4, 4, 1]
+    assert server.parts == [1, 4, 4, 1]
 
 
 def test_url_options_rename_the_message_keys_of_an_openpi_checkpoint():
+    """`wrist=` names no key, so the picture of the wrist is neither needed nor sent. Of the
+    server's 20 actions three are executed.
+    """
     with (
         WireServer() as server,
         client_of(server, "openpi", "?front=base&wrist=&state=q&prompt=say&execute=3") as policy,
@@ -212,6 +242,9 @@ def test_two_entries_of_a_request_with_one_key_are_refused(query):
 
 
 def test_a_policy_server_may_have_a_path_in_its_url():
+    """Behind host and port the client asks for the path, and records it with them, without the
+    slash at its end.
+    """
     with WireServer() as server:
         place = f"{server.place}/v1/realtime/robot/openpi"
         policy = make_policy(f"openpi://{place}/", 0)
@@ -222,6 +255,9 @@ def test_a_policy_server_may_have_a_path_in_its_url():
 
 
 def test_a_server_cannot_give_another_address_for_its_own():
+    """The server's metadata are kept, such as its version, but for its address and how many
+    actions are executed, which the client knows better.
+    """
     with WireServer() as server, client_of(server, "openpi") as policy:
         server.metadata = {"server": "another:1", "execute": 3, "version": "2"}
         policy.reset(INSTRUCTION, {})

@@ -42,9 +42,15 @@ from roboirg.policies.vlm.vlm_query import VLMQuery
 from roboirg.util.media import Clip, Picture
 
 PRICES = {"input_price": 100_000.0, "output_price": 0.0}
+"""With them each reply of 100 input tokens costs ten US dollars."""
 BUSY = ModelBusyError("busy")
 LOST = PolicyConnectionError("lost")
-"""With them each reply of 100 input tokens costs ten US dollars."""
+
+
+@pytest.fixture
+def settings(tmp_path):
+    """Settings of a run that stores the replies of its model, without a budget."""
+    return ReplySettings(tmp_path)
 
 
 def query_of(words, shade=None):
@@ -53,7 +59,7 @@ def query_of(words, shade=None):
     return ModelQuery("system", (ChatTurn("user", (words, *picture)),))
 
 
-def ask_in_episode(server, settings, episode, *words, shade=None, **options):
+def ask_in_episode(server, settings, *words, episode="a", shade=None, **options):
     """Ask the questions of an episode, as a policy does; returns replies and what they cost."""
     vlm = VLMQuery(model_options(server, **options), Template("$why"))
     with use_replies(settings, episode):
@@ -61,13 +67,14 @@ def ask_in_episode(server, settings, episode, *words, shade=None, **options):
     return replies, Counter(vlm.usage())
 
 
-def test_replies_stored_for_an_episode_are_used_when_it_is_played_again(tmp_path):
-    """So that an interrupted run pays no call of a model twice."""
-    settings = ReplySettings(tmp_path)
+def test_replies_stored_for_an_episode_are_used_when_it_is_played_again(settings):
+    """Two questions are asked, and both again as after an interruption. No call is paid twice: the
+    model, which would say *never* by then, gets two requests.
+    """
     with fake_vlm(["one", "two", "never"]) as server:
-        first, _ = ask_in_episode(server, settings, "a", "first", "second")
+        first, _ = ask_in_episode(server, settings, "first", "second")
 
-        again, counts = ask_in_episode(server, settings, "a", "first", "second")
+        again, counts = ask_in_episode(server, settings, "first", "second")
 
     assert first == again == ["one", "two"]
     assert counts["stored"] == 2
@@ -79,40 +86,50 @@ def test_replies_stored_for_an_episode_are_used_when_it_is_played_again(tmp_path
     [("b", ["first"]), ("a", ["first", "first"])],
     ids=["another episode", "the same words once more"],
 )
-def test_what_was_not_asked_before_in_an_episode_is_asked(tmp_path, episode, words):
+def test_what_was_not_asked_before_in_an_episode_is_asked(settings, episode, words):
     """Stored is the reply to *first* in episode a. Another episode, or the same words a second
     time, are questions of their own, so the service is asked and says *two*.
     """
-    settings = ReplySettings(tmp_path)
     with fake_vlm(["one", "two"]) as server:
-        ask_in_episode(server, settings, "a", "first")
+        ask_in_episode(server, settings, "first")
 
-        replies, _ = ask_in_episode(server, settings, episode, *words)
+        replies, _ = ask_in_episode(server, settings, *words, episode=episode)
 
     assert replies[-1] == "two"
     assert len(server.requests) == 2
 
 
-@pytest.mark.parametrize("is_kept", [True, False], ids=["anew", "nothing is stored"])
-def test_a_run_that_measures_the_spread_or_stores_nothing_asks_everything_again(tmp_path, is_kept):
-    """Stored is the reply *one*; a run with `anew`, or without a store, gets the next, *two*."""
+def test_a_run_that_measures_the_spread_of_a_model_asks_everything_again(tmp_path, settings):
+    """Stored is the reply *one* to the question *first*. With the option `anew` that is not used:
+    the model is asked again, and says *two*. No count speaks of the store.
+    """
     with fake_vlm(["one", "two"]) as server:
-        ask_in_episode(server, ReplySettings(tmp_path), "a", "first")
-        passing = ReplySettings(tmp_path, anew=True) if is_kept else None
+        ask_in_episode(server, settings, "first")
 
-        replies, counts = ask_in_episode(server, passing, "a", "first")
+        replies, counts = ask_in_episode(server, ReplySettings(tmp_path, anew=True), "first")
 
     assert replies == ["two"]
     assert (counts["stored"], counts["anew"]) == (0, 0)
 
 
-def test_a_stored_reply_is_not_used_for_another_picture(tmp_path):
-    """Pictures may differ in a bit on another machine; this is counted."""
-    settings = ReplySettings(tmp_path)
+def test_without_a_store_the_same_question_is_asked_again():
+    """No reply is stored if there are no settings of a store (None)."""
     with fake_vlm(["one", "two"]) as server:
-        ask_in_episode(server, settings, "a", "words", shade=1)
+        ask_in_episode(server, None, "first")
 
-        replies, counts = ask_in_episode(server, settings, "a", "words", shade=2)
+        replies, _ = ask_in_episode(server, None, "first")
+
+    assert replies == ["two"]
+
+
+def test_a_stored_reply_is_not_used_for_another_picture(settings):
+    """The same words with a picture of another shade are another question, so the model is asked
+    and says *two*. As pictures may differ in a bit on another machine, this is counted.
+    """
+    with fake_vlm(["one", "two"]) as server:
+        ask_in_episode(server, settings, "words", shade=1)
+
+        replies, counts = ask_in_episode(server, settings, "words", shade=2)
 
     assert replies == ["two"]
     assert counts["anew"] == 1
@@ -124,13 +141,15 @@ def test_a_stored_reply_is_not_used_for_another_picture(tmp_path):
     ids=["temperature", "patience and prices"],
 )
 def test_a_stored_reply_is_used_unless_an_option_changes_that_would_change_it(
-    tmp_path, changes, reply
+    settings, changes, reply
 ):
-    settings = ReplySettings(tmp_path)
+    """Stored is the reply *one*; who asks the model anew gets *two*. Another temperature may
+    change a reply; how long to wait and what it costs does not.
+    """
     with fake_vlm(["one", "two"]) as server:
-        ask_in_episode(server, settings, "a", "words")
+        ask_in_episode(server, settings, "words")
 
-        replies, _ = ask_in_episode(server, settings, "a", "words", **changes)
+        replies, _ = ask_in_episode(server, settings, "words", **changes)
 
     assert replies == [reply]
 
@@ -165,47 +184,55 @@ def test_a_run_stops_at_its_budget_and_goes_on_with_a_larger_one(tmp_path):
     """
     with fake_vlm(["zero", "one", "two", "three"]) as server:
         with pytest.raises(BudgetError, match=r"have cost 20\.00 of at most 20\.00 US dollars"):
-            ask_in_episode(server, ReplySettings(tmp_path, 20.0), "a", *"0123", **PRICES)
+            ask_in_episode(server, ReplySettings(tmp_path, 20.0), *"0123", **PRICES)
         assert len(server.requests) == 2
 
-        replies, counts = ask_in_episode(
-            server, ReplySettings(tmp_path, 90.0), "a", *"0123", **PRICES
-        )
+        replies, counts = ask_in_episode(server, ReplySettings(tmp_path, 90.0), *"0123", **PRICES)
 
     assert replies == ["zero", "one", "two", "three"]
     assert counts["stored"] == 2
     assert len(server.requests) == 4
 
 
-def without_tokens(words):
-    return Garbage(json.dumps({"choices": [{"message": {"content": words}}]}).encode())
+def reply_in_json(choices, **usage):
+    """Return what a service replies: choices, one of which says *one*, and numbers of tokens."""
+    return Garbage(json.dumps({"choices": choices, "usage": usage}).encode())
 
 
-def with_tokens(count):
-    message = {"choices": [{"message": {"content": "one"}}], "usage": {"prompt_tokens": count}}
-    return Garbage(json.dumps(message).encode())
-
-
-NO_CHOICES = Garbage(json.dumps({"choices": [], "usage": {"prompt_tokens": 7}}).encode())
-
-
-@pytest.mark.parametrize(
+SAYS_ONE = [{"message": {"content": "one"}}]
+OF_UNKNOWN_COST = pytest.mark.parametrize(
     "reply",
-    [without_tokens("one"), with_tokens(10**9), with_tokens(-(10**5))],
+    [
+        reply_in_json(SAYS_ONE),
+        reply_in_json(SAYS_ONE, prompt_tokens=10**9),
+        reply_in_json(SAYS_ONE, prompt_tokens=-(10**5)),
+    ],
     ids=["no tokens", "too many tokens", "less than none"],
 )
-def test_a_reply_of_unknown_cost_stops_a_run_with_a_budget_but_is_stored(tmp_path, reply):
-    """A service may report no tokens, or a number that makes no sense: the cost is unknown (NaN).
+"""A service may report no tokens, or a number that makes no sense: then the cost is unknown."""
 
-    With a budget of 90 dollars the second question is refused. Without one, the first question
-    gets its stored reply, *one*, and no one knows what it cost.
+
+@OF_UNKNOWN_COST
+def test_a_reply_of_unknown_cost_stops_a_run_with_a_budget(tmp_path, reply):
+    """The budget is 90 dollars. No one knows what is left of it after the first reply, *one*, so
+    the second question of the episode is not asked.
     """
-    with fake_vlm([reply, "two"]) as server:
-        with pytest.raises(BudgetError, match=r"what 1 reply cost is unknown, .* of model 'fake'"):
-            ask_in_episode(server, ReplySettings(tmp_path, 90.0), "a", "0", "1", **PRICES)
-        assert len(server.requests) == 1
+    with (
+        fake_vlm([reply, "two"]) as server,
+        pytest.raises(BudgetError, match=r"what 1 reply cost is unknown, .* of model 'fake'"),
+    ):
+        ask_in_episode(server, ReplySettings(tmp_path, 90.0), "0", "1", **PRICES)
 
-        replies, counts = ask_in_episode(server, ReplySettings(tmp_path), "a", "0", **PRICES)
+    assert len(server.requests) == 1
+
+
+@OF_UNKNOWN_COST
+def test_a_reply_of_unknown_cost_is_stored(settings, reply):
+    """Asked the same question again, a run takes the stored reply, *one*; what it cost is NaN."""
+    with fake_vlm([reply, "two"]) as server:
+        ask_in_episode(server, settings, "0", **PRICES)
+
+        replies, counts = ask_in_episode(server, settings, "0", **PRICES)
 
     assert replies == ["one"]
     assert counts["stored"] == 1
@@ -218,23 +245,24 @@ def test_an_unreadable_reply_makes_the_cost_of_a_run_unknown(tmp_path):
     So the next episode's question is refused, and the service gets one request only.
     """
     limited = ReplySettings(tmp_path, 1e-6)
-    with fake_vlm([NO_CHOICES]) as server:
+    with fake_vlm([reply_in_json([], prompt_tokens=7)]) as server:
         with pytest.raises(PolicyReplyError):
-            ask_in_episode(server, limited, "a", "words", **PRICES)
+            ask_in_episode(server, limited, "words", **PRICES)
 
         with pytest.raises(BudgetError, match="what 1 reply cost is unknown"):
-            ask_in_episode(server, limited, "b", "words", **PRICES)
+            ask_in_episode(server, limited, "words", episode="b", **PRICES)
 
     assert len(server.requests) == 1
 
 
-def test_a_reply_with_an_invalid_character_is_stored_and_paid_once(tmp_path):
-    """Half a surrogate pair cannot be written as UTF-8."""
-    settings = ReplySettings(tmp_path)
+def test_a_reply_with_an_invalid_character_is_stored_and_paid_once(settings):
+    """Half a surrogate pair cannot be written as UTF-8, so it is stored as an escape. PRICES make
+    a reply cost 10 dollars: asked twice, the question has cost that once.
+    """
     with fake_vlm(["\ud800 fine"]) as server:
-        ask_in_episode(server, settings, "a", "words", **PRICES)
+        ask_in_episode(server, settings, "words", **PRICES)
 
-        replies, counts = ask_in_episode(server, settings, "a", "words", **PRICES)
+        replies, counts = ask_in_episode(server, settings, "words", **PRICES)
 
     assert replies == [r"\ud800 fine"]
     assert counts["stored"] == 1
@@ -253,40 +281,42 @@ def changed_store(folder):
         database.commit()
 
 
-VIEW_WITHOUT_END = """
-DROP TABLE replies;
-CREATE VIEW replies AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)
-SELECT 'a' AS episode, 0 AS call, 'x' AS sent, 'x' AS text, i AS cost_usd FROM n;
-"""
-
-
-@pytest.mark.parametrize(
-    ("statements", "words"),
-    [
-        (VIEW_WITHOUT_END, "holds views or triggers"),
-        ("DROP TABLE replies; CREATE TABLE replies (a)", "no such column"),
-        ("", "not a database"),
-    ],
-)
-def test_a_file_of_replies_that_cannot_be_read_ends_the_run_and_is_named(
-    tmp_path, statements, words
-):
-    """The file of stored replies holds a view without an end, another table, or no database at all
-    ("" stands for a file of other bytes).
-
-    Otherwise it would be an error of the policy in every episode, or be read for ever. Nothing is
-    asked of the model.
+def check_file_is_refused(folder, words):
+    """Check that a run that would use the stored replies of a folder ends with an error of these
+    words, which names the file, and asks nothing of the model.
     """
-    with changed_store(tmp_path) as database:
-        database.executescript(statements)
-    if not statements:
-        (tmp_path / REPLIES_FILE).write_bytes(b"none" * 1000)
-
     with fake_vlm(["one"]) as server, pytest.raises(ReplyFileError, match=words) as caught:
-        ask_in_episode(server, ReplySettings(tmp_path, 9.0), "a", "words", **PRICES)
+        ask_in_episode(server, ReplySettings(folder), "words")
 
-    assert str(tmp_path / REPLIES_FILE) in str(caught.value)
+    assert str(folder / REPLIES_FILE) in str(caught.value)
     assert not server.requests
+
+
+def test_a_file_of_replies_with_a_view_ends_the_run(tmp_path):
+    """Here it takes the place of the table of replies, has no end, and would be read for ever."""
+    with changed_store(tmp_path) as database:
+        database.executescript(
+            "DROP TABLE replies;"
+            "CREATE VIEW replies AS"
+            " WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
+            " SELECT 'a' AS episode, 0 AS call, 'x' AS sent, 'x' AS text, i AS cost_usd FROM n;"
+        )
+
+    check_file_is_refused(tmp_path, "holds views or triggers")
+
+
+def test_a_file_of_replies_with_another_table_ends_the_run(tmp_path):
+    """Otherwise this would be an error of the policy in every episode."""
+    with changed_store(tmp_path) as database:
+        database.executescript("DROP TABLE replies; CREATE TABLE replies (a)")
+
+    check_file_is_refused(tmp_path, "no such column")
+
+
+def test_a_file_of_replies_that_is_no_database_ends_the_run(tmp_path):
+    (tmp_path / REPLIES_FILE).write_bytes(b"none" * 1000)
+
+    check_file_is_refused(tmp_path, "not a database")
 
 
 def test_a_stored_cost_that_is_no_number_is_unknown(tmp_path):
@@ -301,18 +331,20 @@ def test_a_stored_cost_that_is_no_number_is_unknown(tmp_path):
     store.close()
 
 
-def test_a_stored_reply_that_is_no_text_is_left_out(tmp_path):
-    """A stranger wrote the byte FF, which is no text, as a reply into the file."""
+def test_a_stored_reply_that_is_no_text_is_left_out(tmp_path, settings):
+    """A stranger wrote a row into the file of replies whose text is the byte FF, which is no
+    UTF-8.
+    """
     with changed_store(tmp_path) as database:
         database.execute("INSERT INTO replies VALUES ('a', 0, 'x', x'ff', 1, 1, 1)")
-    store = reply_store.ReplyStore(ReplySettings(tmp_path), "a")
+    store = reply_store.ReplyStore(settings, "a")
 
     assert not store.replies()
 
     store.close()
 
 
-def test_a_turn_years_away_as_by_a_wrong_clock_is_not_waited_for(tmp_path, monkeypatch):
+def test_a_turn_years_away_as_by_a_wrong_clock_is_not_waited_for(tmp_path, settings, monkeypatch):
     """The file says that the service's next turn is at 1e308 s; the clock of the test says 5 s.
 
     Its `sleep` fails the test: so the turn comes at once.
@@ -321,7 +353,7 @@ def test_a_turn_years_away_as_by_a_wrong_clock_is_not_waited_for(tmp_path, monke
         database.execute("UPDATE services SET next_at = 1e308")
     monkeypatch.setattr(reply_store, "time", SimpleNamespace(time=lambda: 5.0, sleep=pytest.fail))
 
-    store = reply_store.ReplyStore(ReplySettings(tmp_path), "a")
+    store = reply_store.ReplyStore(settings, "a")
     store.wait_for_turn("service", None)
     store.close()
 
@@ -332,13 +364,15 @@ def test_a_budget_without_prices_is_refused_before_anything_is_asked(tmp_path):
         fake_vlm(["one"]) as server,
         pytest.raises(BudgetError, match="needs the prices of model 'fake'"),
     ):
-        ask_in_episode(server, ReplySettings(tmp_path, 1.0), "a", "words")
+        ask_in_episode(server, ReplySettings(tmp_path, 1.0), "words")
     assert not server.requests
 
 
 @pytest.mark.parametrize("provider", ["openai", "google"])
 @pytest.mark.parametrize("code", [429, 503, 502])
-def test_a_busy_model_service_is_asked_again_after_the_pause_it_names(tmp_path, provider, code):
+def test_a_busy_model_service_is_asked_again_after_the_pause_it_names(
+    tmp_path, settings, provider, code
+):
     """A service says three times that it is busy, and to come again in 0.05 s; then it replies.
 
     So there are four requests and waits of 0.15 s or more. The time of the next request is stored,
@@ -348,7 +382,7 @@ def test_a_busy_model_service_is_asked_again_after_the_pause_it_names(tmp_path, 
     started = time.time()
     with fake_vlm([busy, busy, busy, "at last"]) as server:
         replies, counts = ask_in_episode(
-            server, ReplySettings(tmp_path), "a", "words", provider=provider, patience_s=60
+            server, settings, "words", provider=provider, patience_s=60
         )
 
     assert replies == ["at last"]
@@ -359,38 +393,53 @@ def test_a_busy_model_service_is_asked_again_after_the_pause_it_names(tmp_path, 
     assert next_at >= started + 3 * 0.05
 
 
-@pytest.mark.parametrize(
-    ("said", "waits"),
-    [
-        ([BUSY, ModelBusyError("busy", 7.0), LOST, BUSY, LOST, LOST], [1.0, 7.0, 4.0, 8.0, 16.0]),
-        ([BUSY, ModelBusyError("busy", 99.5)], [1.0]),  # patience would end
-    ],
-)
-def test_pauses_for_a_busy_service_double_until_retries_or_patience_end(monkeypatch, said, waits):
-    """`said` are the errors of the service in order, `waits` the pauses in seconds before it is
-    asked again.
-
-    Pauses double from 1 s on, unless the service names a longer one (7 s). An answer that is lost
-    uses up one of two retries: the third one ends the asking. In the second row the service asks
-    for 99.5 s, which with the pause of 1 s is more than the patience of 100 s. The clock of the
-    test does not wait.
+def pauses_of(monkeypatch, errors):
+    """Return the pauses, in seconds, of a client whose service has these errors in turn, the last
+    of which ends its asking. It has two retries, and a patience of 100 s; its clock does not wait.
     """
     waited: list[float] = []
     clock = SimpleNamespace(monotonic=lambda: sum(waited), sleep=waited.append)
     monkeypatch.setattr(vlm_query, "time", clock)
     options = ModelOptions(model="m", retries=2, patience_s=100.0)
-    model = SimpleNamespace(answer=Mock(side_effect=said))
+    model = SimpleNamespace(answer=Mock(side_effect=errors))
 
-    with pytest.raises(PolicyConnectionError, match=str(said[-1])):
+    with pytest.raises(PolicyConnectionError, match=str(errors[-1])):
         VLMQuery(options, Template(""), lambda _: model).ask(query_of("words"), str)
-    assert waited == waits
+    return waited
 
 
-def test_a_reply_of_another_format_is_an_error_and_is_not_stored(tmp_path):
+def test_pauses_for_a_busy_service_double_until_the_patience_ends(monkeypatch):
+    """After 63 s of pauses the next one, of 64 s, is beyond the patience of 100 s."""
+    pauses = pauses_of(monkeypatch, errors=[BUSY] * 7)
+
+    assert pauses == [1, 2, 4, 8, 16, 32]
+
+
+def test_a_longer_pause_that_a_busy_service_asks_for_replaces_one(monkeypatch):
+    """The second pause would be 2 s; the service asks for 7 s. The next is of 4 s, as if nothing
+    had been asked for. At last it asks for 90 s, which ends the patience of 100 s.
+    """
+    asks_for_7_s = ModelBusyError("busy", 7.0)
+    asks_for_90_s = ModelBusyError("busy", 90.0)
+
+    pauses = pauses_of(monkeypatch, errors=[BUSY, asks_for_7_s, BUSY, asks_for_90_s])
+
+    assert pauses == [1, 7, 4]
+
+
+def test_answers_that_were_lost_use_up_the_retries_and_a_busy_service_does_not(monkeypatch):
+    """There are two retries: the third lost answer ends the asking."""
+    pauses = pauses_of(monkeypatch, errors=[LOST, BUSY, LOST, BUSY, LOST])
+
+    assert pauses == [1, 2, 4, 8]
+
+
+def test_a_reply_of_another_format_is_an_error_and_is_not_stored(settings):
+    """The first reply is an empty object, without choices. Asked again, the model says *one*."""
     with fake_vlm([Garbage(b"{}"), "one"]) as server:
         with pytest.raises(PolicyReplyError):
-            ask_in_episode(server, ReplySettings(tmp_path), "a", "words")
-        replies, counts = ask_in_episode(server, ReplySettings(tmp_path), "a", "words")
+            ask_in_episode(server, settings, "words")
+        replies, counts = ask_in_episode(server, settings, "words")
         assert (replies, counts["stored"]) == (["one"], 0)
 
 
@@ -405,6 +454,7 @@ def test_a_reply_of_another_format_is_an_error_and_is_not_stored(tmp_path):
     ],
 )
 def test_the_waiting_time_of_a_service_is_read_in_seconds(headers, seconds):
+    """A date, and what is no positive number, is left out (None)."""
     assert retry_after_s(headers) == seconds
 
 
@@ -463,55 +513,63 @@ class EpisodeProcess:
             text=True,
         )
 
-    def write(self, line):
-        """Write the name of an episode to begin; then `kill`, or `wait` for its end."""
-        self.main.stdin.write(f"{line}\n")
-        self.main.stdin.flush()
+    def finish(self, episode):
+        """Play an episode to its end; return all replies."""
+        self._write(episode)
+        self._write("wait")
+        return list(self._replies())
 
-    def replies(self):
-        """Yield the replies that the episode's process gets until it ends."""
-        for line in iter(self.main.stdout.readline, ""):
-            if line == "ended\n":
-                return
-            yield line.strip()
+    def kill_after(self, episode, count):
+        """Play an episode, yield its first replies, and kill its process after so many."""
+        self._write(episode)
+        replies = self._replies()
+        yield from itertools.islice(replies, count)
+        self._write("kill")
+        list(replies)  # what it said before it died
 
     def end(self):
         self.main.communicate()
         return self.main.returncode
 
+    def _write(self, line):
+        self.main.stdin.write(f"{line}\n")
+        self.main.stdin.flush()
+
+    def _replies(self):
+        for line in iter(self.main.stdout.readline, ""):
+            if line == "ended\n":
+                return
+            yield line.strip()
+
 
 @pytest.mark.parametrize("kills", [4, pytest.param(24, marks=pytest.mark.slow)])
 def test_no_answered_call_is_made_again_after_a_kill(tmp_path, kills):
-    """A process plays episodes; each is killed twice after a random number of replies, then
-    finished.
+    """An episode makes eight calls of a model, whose replies are stored. Each is killed twice,
+    after a random number of replies, and then played to its end.
 
-    Replies are stored, so an answered call is never made again: how often it was requested when
-    its answer was first seen equals how often it was in the end. What was under way at a kill may
-    be asked once more.
+    Whatever was answered is never requested again: it was requested as often in the end as when its
+    answer was first seen. A call that was under way at a kill may be made once more.
     """
     rng = random.Random(0)
-    answered: dict[str, int] = {}
-    """How often a call had been made when its answer was seen first."""
+    episodes = [f"e{number}" for number in range(kills // 2)]
+    requests_when_answered: dict[str, int] = {}
     with fake_vlm(name_of) as server:
-        child = EpisodeProcess(server, tmp_path)
-        for episode in [f"e{number}" for number in range(kills // 2)]:
+        process = EpisodeProcess(server, tmp_path)
+        for episode in episodes:
             for _ in range(2):
-                child.write(episode)
-                replies = child.replies()
-                for name in itertools.islice(replies, rng.randrange(1, CALLS)):
+                for call in process.kill_after(episode, rng.randrange(1, CALLS)):
                     requests = Counter(map(name_of, server.requests))
-                    answered.setdefault(name, requests[name])
-                child.write("kill")
-                list(replies)  # what it said before it died
-            child.write(episode)
-            child.write("wait")
-            assert list(child.replies()) == [f"{episode} {number}" for number in range(CALLS)]
-        assert child.end() == 0
+                    requests_when_answered.setdefault(call, requests[call])
 
-        requests = Counter(map(name_of, server.requests))
-        assert {name: requests[name] for name in answered} == answered
-        # What was under way when a process was killed may have been asked again, once for a kill.
-        assert requests.total() <= CALLS * (kills // 2) + kills
+            replies = process.finish(episode)
+
+            assert replies == [f"{episode} {number}" for number in range(CALLS)]
+        assert process.end() == 0
+
+    requests = Counter(map(name_of, server.requests))
+    for call, count in requests_when_answered.items():
+        assert requests[call] == count, call
+    assert requests.total() <= CALLS * len(episodes) + kills
 
 
 @pytest.fixture
@@ -523,18 +581,20 @@ def waits(monkeypatch):
     return found
 
 
-def test_processes_that_ask_at_the_same_moment_take_turns(tmp_path, waits):
+def test_processes_that_ask_at_the_same_moment_take_turns(settings, waits):
     """At 20 requests a minute they start three seconds apart; a store is that of a process."""
-    for store in [reply_store.ReplyStore(ReplySettings(tmp_path), "a") for _ in range(3)]:
+    for store in [reply_store.ReplyStore(settings, "a") for _ in range(3)]:
         store.wait_for_turn("service", 20.0)
         store.close()
 
     assert waits == [3.0, 6.0]
 
 
-def test_the_longest_pause_that_a_service_asked_for_counts(tmp_path, waits):
-    """Also if nothing limits the rate of requests."""
-    store = reply_store.ReplyStore(ReplySettings(tmp_path), "a")
+def test_the_longest_pause_that_a_service_asked_for_counts(settings, waits):
+    """A service asks for a pause of 9 s and then of 4 s. The next request waits for 9 s, also if
+    nothing limits the rate (None). The clock of the fixture stands still and notes the waits.
+    """
+    store = reply_store.ReplyStore(settings, "a")
     store.pause("service", 9.0)
     store.pause("service", 4.0)
 

@@ -1,20 +1,18 @@
 """Resolve, then act: a policy hears the explicit command of the goal that was meant."""
 
-import itertools
-
 import pytest
 from planning_fakes import fake_vlm, model_options, stand_in
 
+from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.language import expressible, instruct
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.policy_server import open_server
 from roboirg.policies.resolving.goal_namers import MeaningNamer, RuleNamer
 from roboirg.policies.resolving.resolving_policy import ResolvingPolicy
-from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMNamer
 from roboirg.tasks import all_tasks
-from roboirg.tasks.splits.splits import get_episode, split_episodes
+from roboirg.tasks.splits.splits import get_episode
 
 # The instruction of episode 0 of the test split of PickXtimes, whose goal is {green, 3}.
 INTRODUCTION = "I want to see how you handle the green cube."
@@ -66,16 +64,28 @@ def resolving(namer, setting="direct", wordings=None, **more):
     return policy
 
 
+@pytest.mark.parametrize("number", range(5))
 @pytest.mark.parametrize("task", all_tasks())
-def test_a_namer_that_is_always_right_turns_every_setting_into_the_explicit_one(task):
-    """Of five episodes of each task, whatever setting can express their goal."""
-    for episode in itertools.islice(split_episodes([task], ["val"]), 5):
-        for setting in expressible(episode):
-            policy = ResolvingPolicy(MeaningNamer(), Hearer())
-            policy.attach(stand_in(episode, setting))
-            policy.reset(instruct(episode, setting).text, {})
+def test_with_a_namer_that_is_always_right_a_policy_hears_the_explicit_command(task, number):
+    """A namer says which goal an instruction means, and the policy behind it hears the explicit
+    command of that goal. `MeaningNamer` is always right, as it reads the meaning of the words
+    from the generator.
 
-            assert policy.policy.heard == [instruct(episode).text], (episode, setting)
+    So whatever the setting, which is how the instruction implies its goal, the policy (which keeps
+    what it hears) hears the explicit instruction. Tried are all settings that can express the goal
+    of each of five episodes of the split "val"; `stand_in` has what the namer reads of an
+    environment.
+    """
+    episode = get_episode(task, "val", number)
+    settings = expressible(episode)
+
+    assert "explicit" in settings
+    for setting in settings:
+        policy = ResolvingPolicy(MeaningNamer(), Hearer())
+        policy.attach(stand_in(episode, setting))
+        policy.reset(instruct(episode, setting).text, {})
+
+        assert policy.policy.heard == [instruct(episode, "explicit").text], setting
 
 
 def test_the_command_is_said_in_the_words_that_the_policy_knows():
@@ -111,19 +121,25 @@ def test_of_an_instruction_in_turns_only_the_last_utterance_is_replaced():
 
 
 def test_observations_show_the_instruction_as_the_policy_has_heard_it():
-    """The introduction names the green cube; the command, at step 20, says *grab it*.
+    """The instruction comes in two sentences, the second at step 20; the namer, which is always
+    right, then replaces *it* by *the green cube*.
 
-    The policy repeats the instruction that its observation shows: first the introduction as it was
-    said, then the explicit command, *grab the green cube*, though the observation has the one
-    said.
+    An observation has the last sentence that was said, but the policy (which returns what its
+    observation has) is shown what it has heard instead.
     """
     policy = resolving(MeaningNamer(), unheard=1)
+    said = "I want to see how you handle the green cube."
+    said_later = "Grab it and place it on the target three times, then press the button."
 
-    policy.reset(INTRODUCTION, {})
-    assert policy.act({"instruction": INTRODUCTION}) == INTRODUCTION
+    policy.reset(said, {})
+    shown = policy.act({"instruction": said})
+    policy.hear(said_later, 20)
+    shown_later = policy.act({"instruction": said_later})
 
-    policy.hear(COMMAND, 20)
-    assert policy.act({"instruction": COMMAND}) == EXPLICIT
+    assert shown == "I want to see how you handle the green cube."
+    assert shown_later == (
+        "Grab the green cube and place it on the target three times, then press the button."
+    )
 
 
 def test_before_the_last_utterance_nothing_is_understood():
@@ -135,19 +151,24 @@ def test_before_the_last_utterance_nothing_is_understood():
     assert "understood" not in policy.metadata
 
 
-def test_a_goal_that_the_scene_does_not_have_is_said_as_well():
-    """To pass such a text on, the rewriter would have to know that the scene has no red cube."""
-    red_once = goal_schema("PickXtimes").goals['{"color": "red", "repeats": 1}']
-    policy = resolving(Names(red_once))
+def test_a_goal_that_the_scene_does_not_have_is_put_into_words_as_well():
+    """The scene has a green cube only, and the namer of this test names the red one, once.
 
-    policy.reset(DIRECT, {})
+    To keep that from the policy, one would have to look at the scene, which no robot can do so.
+    """
+    namer = Names(Goal.of(color="red", repeats=1))
+    policy = resolving(namer)
+
+    policy.reset("I want to see how you handle the green cube. Grab it and place it there.", {})
 
     (heard,) = policy.policy.heard
     assert "red cube" in heard
 
 
 def test_without_a_goal_the_policy_hears_what_was_said_and_that_is_counted():
-    """The namer of this test finds no goal in any text."""
+    """The namer of this test finds no goal in any text. DIRECT is what was said, *I want to see
+    how you handle the green cube. Grab it …*; it is passed on.
+    """
     policy = resolving(NamesNothing())
 
     policy.reset(DIRECT, {})
@@ -270,6 +291,9 @@ def test_the_version_names_that_of_the_namer_and_of_the_policy():
     ],
 )
 def test_a_spec_that_makes_no_sense_is_refused_in_one_sentence(spec, why):
+    """Right would be *resolve:NAMER?policy=POLICY*, with a namer that finds the goal in the words
+    and a policy that listens to words.
+    """
     with pytest.raises((InvalidValueError, UnknownNameError), match=why):
         read_policy(spec)
 

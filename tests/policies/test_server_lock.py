@@ -40,6 +40,14 @@ def process_with_first_server(tmp_path):
 
 
 @pytest.fixture
+def lock(tmp_path):
+    """Return what locks the first free one of servers, and waits for none unless it is told to."""
+    return lambda *servers, wait=0, **options: lock_server(
+        servers, wait=wait, folder=tmp_path, **options
+    )
+
+
+@pytest.fixture
 def reported(monkeypatch):
     """The list of waits that were reported, each with what is waited for."""
     found = []
@@ -48,7 +56,7 @@ def reported(monkeypatch):
 
 
 @pytest.mark.usefixtures("process_with_first_server")
-def test_a_free_server_is_not_waited_for(tmp_path, reported):
+def test_a_free_server_is_not_waited_for(lock, reported):
     """Another process (the fixture) has the first server; the second one is free.
 
     So its lock is got without a report that someone waits (`reported` is empty) and without a
@@ -56,101 +64,117 @@ def test_a_free_server_is_not_waited_for(tmp_path, reported):
     """
     before = queued_seconds()
 
-    lock_server([SECOND_SERVER], wait=5, folder=tmp_path).file.close()
+    lock(SECOND_SERVER, wait=5).file.close()
 
     assert reported == []
     assert queued_seconds() == before
 
 
 @pytest.mark.usefixtures("process_with_first_server")
-def test_waiting_for_a_busy_server_is_reported_counted_and_ends_in_an_error(tmp_path, reported):
-    """Another process (the fixture) has the first server, so a wait of 0.2 s ends in an error.
+def test_waiting_for_a_busy_server_ends_in_an_error(lock):
+    """Another process (the fixture) has locked h:8001, the first server, for an hour."""
+    with pytest.raises(PolicyTimeoutError, match=r"Other episodes used h:8001 for 0\.2 s"):
+        lock(FIRST_SERVER, wait=0.2)
 
-    `reported` has what was waited for, in order: the test itself, then a free server, then the
-    test again once that ended, then nothing. The 0.2 s count as time in a queue.
-    """
+
+@pytest.mark.usefixtures("process_with_first_server")
+def test_the_wait_for_a_busy_server_counts_as_time_in_a_queue(lock):
+    """Another process (the fixture) has locked the first server; this one waits 0.2 s for it."""
     before = queued_seconds()
 
-    with (
-        waiting.waiting("its turn in a test"),
-        pytest.raises(PolicyTimeoutError, match=r"Other episodes used h:8001 for 0\.2 s"),
-    ):
-        lock_server([FIRST_SERVER], wait=0.2, folder=tmp_path)
+    with pytest.raises(PolicyTimeoutError):
+        lock(FIRST_SERVER, wait=0.2)
 
-    outer, for_server, again, end = reported
-    assert for_server.what == "a free server: h:8001"
-    assert for_server.is_queue
-    assert (again, end) == (outer, None)
     assert queued_seconds() - before >= 0.2
 
 
 @pytest.mark.usefixtures("process_with_first_server")
-def test_of_two_servers_the_free_one_is_taken(tmp_path):
-    """Another process (the fixture) has the first server; both are asked for, without a wait."""
-    lock = lock_server([FIRST_SERVER, SECOND_SERVER], wait=0, folder=tmp_path)
+def test_the_wait_for_a_busy_server_is_reported_within_what_was_waited_for(lock, reported):
+    """Another process (the fixture) has locked h:8001, the first server.
 
-    assert lock.endpoint == SECOND_SERVER
-    lock.file.close()
+    `reported` has what this process waits for, whenever that changes: its turn, then the server,
+    then its turn again, then nothing.
+    """
+    with waiting.waiting("its turn"), pytest.raises(PolicyTimeoutError):
+        lock(FIRST_SERVER, wait=0.2)
+
+    turn, server, turn_again, nothing = reported
+    assert [wait.what for wait in (turn, server, turn_again)] == [
+        "its turn",
+        "a free server: h:8001",
+        "its turn",
+    ]
+    assert server.is_queue
+    assert nothing is None
 
 
 @pytest.mark.usefixtures("process_with_first_server")
-def test_if_all_servers_are_busy_the_error_names_them(tmp_path):
+def test_of_two_servers_the_free_one_is_taken(lock):
+    """Another process (the fixture) has the first server; both are asked for, without a wait."""
+    held = lock(FIRST_SERVER, SECOND_SERVER)
+
+    assert held.endpoint == SECOND_SERVER
+    held.file.close()
+
+
+@pytest.mark.usefixtures("process_with_first_server")
+def test_if_all_servers_are_busy_the_error_names_them(lock):
     """Another process (the fixture) has the first server, and this test locks the second, `/two`.
 
     So both are asked for in vain, also by who would share a server.
     """
-    lock = lock_server([SECOND_SERVER], wait=0, folder=tmp_path)
+    held = lock(SECOND_SERVER)
 
     with pytest.raises(PolicyTimeoutError, match=r"Other episodes used .*h:8001/two"):
-        lock_server([SECOND_SERVER, FIRST_SERVER], wait=0, folder=tmp_path, shared=True)
+        lock(SECOND_SERVER, FIRST_SERVER, shared=True)
 
-    lock.file.close()
+    held.file.close()
 
 
-def test_the_server_of_a_process_that_was_killed_becomes_free(process_with_first_server, tmp_path):
+def test_the_server_of_a_process_that_was_killed_becomes_free(process_with_first_server, lock):
     """The process of the fixture has the first server, and dies without giving it back.
 
     The kernel then ends its lock, so that the server is got well before the 300 s are over.
     """
     os.kill(process_with_first_server.pid, signal.SIGKILL)
 
-    lock = lock_server([FIRST_SERVER], wait=300, folder=tmp_path)
+    held = lock(FIRST_SERVER, wait=300)
 
-    assert lock.endpoint == FIRST_SERVER
-    lock.file.close()
+    assert held.endpoint == FIRST_SERVER
+    held.file.close()
 
 
-def test_a_shared_lock_of_a_server_allows_more_shared_ones_and_no_other(tmp_path):
+def test_a_shared_lock_of_a_server_allows_more_shared_ones_and_no_other(lock):
     """Three share the server, and then no one can have it alone; once all gave it back, one can."""
-    locks = [lock_server([FIRST_SERVER], wait=0, folder=tmp_path, shared=True) for _ in range(3)]
+    held = [lock(FIRST_SERVER, shared=True) for _ in range(3)]
     with pytest.raises(PolicyConnectionError):
-        lock_server([FIRST_SERVER], wait=0, folder=tmp_path)
+        lock(FIRST_SERVER)
 
-    for lock in locks:
-        lock.file.close()
-    lock_server([FIRST_SERVER], wait=0, folder=tmp_path).file.close()
+    for each in held:
+        each.file.close()
+    lock(FIRST_SERVER).file.close()
 
 
-def test_localhost_and_127_0_0_1_are_locked_as_the_same_server(tmp_path):
+def test_localhost_and_127_0_0_1_are_locked_as_the_same_server(lock):
     """Both names stand for this machine: who has port 1 of the one has it of the other."""
-    lock = lock_server([Endpoint("localhost", 1)], wait=0, folder=tmp_path)
+    held = lock(Endpoint("localhost", 1))
 
     with pytest.raises(PolicyConnectionError):
-        lock_server([Endpoint("127.0.0.1", 1)], wait=0, folder=tmp_path)
+        lock(Endpoint("127.0.0.1", 1))
 
-    lock.file.close()
+    held.file.close()
 
 
-def test_two_paths_of_one_address_are_two_servers(tmp_path):
+def test_two_paths_of_one_address_are_two_servers(lock):
     """Both servers have the address h:8001, but the second one has the path `/two`.
 
     While the first is locked, the second can be locked without a wait.
     """
-    lock = lock_server([FIRST_SERVER], wait=0, folder=tmp_path)
+    held = lock(FIRST_SERVER)
 
-    lock_server([SECOND_SERVER], wait=0, folder=tmp_path).file.close()
+    lock(SECOND_SERVER).file.close()
 
-    lock.file.close()
+    held.file.close()
 
 
 def test_a_second_policy_of_the_same_thread_is_refused_instead_of_waiting_for_ever():

@@ -72,8 +72,12 @@ class Posing(Recorder):
 
 
 @pytest.fixture(autouse=True)
-def _forget():
+def recorders():
+    """The policies (of the class Recorder) that a server has made, in their order: one when it is
+    opened, and then one for each episode.
+    """
     Recorder.episodes.clear()
+    return Recorder.episodes
 
 
 def check_same(given, kept, fields):
@@ -81,147 +85,204 @@ def check_same(given, kept, fields):
         assert np.array_equal(given[field], kept[field]), field
 
 
-FIELDS_SENT = {
-    "openpi": ("front_rgb", "wrist_rgb", "joint_positions"),
-    "mme-vla": ("front_rgb", "wrist_rgb", "joint_positions"),
-    "challenge": ("front_rgb", "wrist_rgb", "joint_positions", "gripper", "end_effector"),
-}
-
-
 def play(url, length, *moments, **more):
-    """Play an episode at a server; return the chunks and the client's metadata."""
+    """Play an episode at a server, with a video of that length; return the chunks of actions that
+    the client got, one for each moment.
+    """
     client = make_policy(url, 0)
     client.reset(moments[0]["instruction"], video(length, **more))
     chunks = [client.act(seen).tolist() for seen in moments]
     client.close()
-    return chunks, client.metadata
+    return chunks
 
 
-FIRST_MOMENT = moment(3, history=())
-LATER_MOMENT = moment(5, history=(moment(4), moment(5)))
+def recorder_behind(protocol, *moments, spec=HERE, options="", **more):
+    """Return the policy behind a server, which has written down an episode of a client: a video of
+    the moments 0 to 2, and then a question at each of these moments.
+    """
+    with served(spec, protocol) as url:
+        play(f"{url}{options}", 3, *moments, **more)
+    return Recorder.episodes[-1]
 
 
-def served_episodes(protocol):
-    """Play two episodes through a server, of videos of three and two moments."""
+FIRST = moment(3, history=())
+"""What a client shows at the first question, after a video of the moments 0 to 2."""
+SECOND = moment(5, history=(moment(4), moment(5)))
+"""What it shows at the second question, with all moments since the first in the history."""
+
+
+@pytest.mark.parametrize("protocol", SERVED)
+def test_a_server_makes_a_policy_for_each_episode_and_closes_it(recorders, protocol):
+    """The policy of a server with seed 7 counts its calls in its actions, which are all 1 in the
+    first chunk. In the second episode the count begins anew, with another policy.
+    """
+    with served(HERE, protocol, seed=7) as url:
+        first_chunks = play(url, 3, FIRST)
+        second_chunks = play(url, 3, FIRST)
+
+    _opened, first, second = recorders
+    assert (first.seed, first.closed) == (7, True)
+    assert (second.seed, second.closed) == (7, True)
+    assert first_chunks == second_chunks == [[[1] * 8] * 4]
+
+
+@pytest.mark.parametrize("protocol", SERVED)
+def test_the_client_of_a_served_policy_has_its_metadata(protocol):
+    """The policy Recorder declares that it has no network; the server adds the rest."""
+    with served(HERE, protocol) as url:
+        client = make_policy(url, 0)
+        client.reset(INSTRUCTION, video(0))
+        client.close()
+
     expected = {
         "policy": HERE, "network": "none", "protocol": protocol,
         "python": platform.python_version(),
     }  # fmt: skip
-    with served(HERE, protocol, seed=7) as url:
-        for length in (3, 2):
-            chunks, metadata = play(url, length, FIRST_MOMENT, LATER_MOMENT)
-            assert chunks == [[[1] * 8] * 4, [[2] * 8] * 4]
-            assert expected.items() <= metadata.items()
-    _opened, *episodes = Recorder.episodes
-    return episodes
+    assert expected.items() <= client.metadata.items()
 
 
-@pytest.mark.parametrize("protocol", SERVED)
-def test_a_served_policy_sees_what_its_client_was_shown(protocol):
-    """A client plays two episodes at a server: in each, two moments are shown to the policy behind
-    it.
+@pytest.mark.parametrize(
+    ("protocol", "instruction"),
+    [
+        ("openpi", "Put the Red cube on the target."),
+        ("challenge", "Put the Red cube on the target."),
+        ("mme-vla", "put the red cube on the target."),
+    ],
+)
+def test_a_served_policy_gets_the_instruction_lowered_by_mme_vla(protocol, instruction):
+    """The client says *Put the Red cube on the target.*"""
+    assert recorder_behind(protocol, FIRST).instruction == instruction
 
-    The policy writes down what it gets: seed 7 of the server, the instruction (MME-VLA lowers it),
-    and the fields that the protocol carries, equal to what the client was given. A message has one
-    number for the gripper; the policy sees it as two fingers, of which the first is compared.
+
+@pytest.mark.parametrize(
+    ("protocol", "fields"),
+    [
+        ("openpi", ["front_rgb", "wrist_rgb", "joint_positions"]),
+        ("mme-vla", ["front_rgb", "wrist_rgb", "joint_positions"]),
+        ("challenge", ["front_rgb", "wrist_rgb", "joint_positions", "gripper", "end_effector"]),
+    ],
+)
+def test_a_served_policy_sees_what_its_client_was_shown(protocol, fields):
+    """A client is shown FIRST and SECOND, and the policy behind the server keeps what it sees
+    (`calls`): the `fields` that the protocol carries as they are. Of the gripper, most protocols
+    carry one number, the position of its first finger; the policy sees two fingers all the same.
     """
-    first, second = served_episodes(protocol)
+    first, second = recorder_behind(protocol, FIRST, SECOND).calls
 
-    for policy in (first, second):
-        assert (policy.seed, policy.closed) == (7, True)
-        assert policy.instruction == (INSTRUCTION.lower() if protocol == "mme-vla" else INSTRUCTION)
-        for given, observation in zip((FIRST_MOMENT, LATER_MOMENT), policy.calls, strict=True):
-            check_same(given, observation, FIELDS_SENT[protocol])
-            assert observation["gripper"].shape == (2,)
-            assert observation["gripper"][0] == given["gripper"][0]
+    check_same(FIRST, first, fields)
+    check_same(SECOND, second, fields)
+    assert first["gripper"].shape == (2,)
+    assert first["gripper"][0] == FIRST["gripper"][0]
 
 
-@pytest.mark.parametrize("protocol", [name for name in SERVED if name != "openpi"])
-def test_a_served_policy_sees_the_video_and_the_moments_between_two_questions(protocol):
-    """A client plays two episodes, with videos of three and of two moments.
+VIDEO_FIELDS = pytest.mark.parametrize(
+    ("protocol", "fields"),
+    [
+        ("mme-vla", ["front_rgb", "joint_positions"]),
+        ("challenge", ["front_rgb", "wrist_rgb", "joint_positions", "gripper", "end_effector"]),
+    ],
+)
+"""What protocols carry of each moment of a video or a history."""
 
-    The policy behind the server sees the videos, and at the second question the moments 4 and 5
-    since the first, as its history. MME-VLA sends no pictures of the wrist in these, and openpi
-    neither videos nor moments.
+
+@VIDEO_FIELDS
+def test_a_served_policy_sees_the_video(recorders, protocol, fields):
+    """Two episodes have videos of three and of two moments; nothing of the first is in the second.
+
+    `fields` are those that the protocol carries of a video.
     """
-    first, second = served_episodes(protocol)
-    shown = set(FIELDS_SENT[protocol])
-    if protocol == "mme-vla":
-        shown.remove("wrist_rgb")
+    with served(HERE, protocol) as url:
+        play(url, 3, FIRST)
+        play(url, 2, FIRST)
 
-    check_same(video(3), first.demonstration, shown)
-    assert len(second.demonstration["joint_positions"]) == 2
-    assert first.calls[0]["history"][:-1] == ()
-    for given, kept in zip(LATER_MOMENT["history"], first.calls[1]["history"], strict=True):
-        check_same(given, kept, shown)
+    _opened, first, second = recorders
+    check_same(video(3), first.demonstration, fields)
+    check_same(video(2), second.demonstration, fields)
+
+
+@VIDEO_FIELDS
+def test_a_served_policy_sees_the_moments_between_two_questions(protocol, fields):
+    """The first question shows moment 3, and nothing before it. The second one shows moment 5, with
+    the moments 4 and 5 since the first as its history.
+
+    `fields` are those that the protocol carries of a history.
+    """
+    first, second = recorder_behind(protocol, FIRST, SECOND).calls
+
+    earlier, newest = second["history"]
+    assert len(first["history"]) <= 1  # at most moment 3 itself
+    check_same(moment(4), earlier, fields)
+    check_same(moment(5), newest, fields)
 
 
 def test_a_policy_that_is_served_by_openpi_gets_no_video():
     """The client has a video of three moments, which openpi has no message for."""
-    first, _ = served_episodes("openpi")
-    assert len(first.demonstration["joint_positions"]) == 0
+    policy = recorder_behind("openpi", FIRST)
+
+    assert len(policy.demonstration["joint_positions"]) == 0
 
 
-GROWING_PROMPT = [
-    {**moment(0, history=()), "instruction": "this one is red."},
-    {**moment(2, history=(moment(1), moment(2))), "instruction": "please note."},
-    {**moment(3, history=(moment(3),)), "instruction": "please note."},
-    {**moment(5, history=(moment(4), moment(5))), "instruction": "take it."},
-]
-"""What a client sends at four questions: its instruction changes twice, at steps 2 and 5."""
+def saying(text, number, *since):
+    """Return what a client shows at a moment: the text said last, and the moments since."""
+    return {**moment(number, history=map(moment, since)), "instruction": text}
 
 
-@pytest.mark.parametrize("protocol", [name for name in SERVED if name != "openpi"])
-def test_a_served_policy_hears_each_new_sentence_of_a_growing_prompt(protocol):
-    """In both episodes the client's prompt changes: *this one is red*, *please note*, *take it*.
+@pytest.mark.parametrize("protocol", ["mme-vla", "challenge"])
+def test_a_served_policy_hears_each_new_sentence_of_a_growing_prompt(recorders, protocol):
+    """At steps 0, 2, 3 and 5 a client asks for actions; its prompt changes at steps 2 and 5.
 
-    The first is the instruction; the policy hears the others with the steps at which they came, 2
-    and 5. Steps of the second episode, which is checked here, are counted from its own beginning.
+    The first text is the instruction; the policy hears the others, with their steps. So it does in
+    a second episode, whose steps are counted from its own beginning.
     """
-    with served(HERE, protocol) as url:
-        play(url, 3, *GROWING_PROMPT)
-        play(url, 2, *GROWING_PROMPT)
+    asked = [
+        saying("this one is red.", 0),
+        saying("please note.", 2, 1, 2),
+        saying("please note.", 3, 3),
+        saying("take it.", 5, 4, 5),
+    ]
 
-    *_, policy = Recorder.episodes
-    assert policy.instruction == "this one is red."
-    assert policy.heard == [("please note.", 2), ("take it.", 5)]
+    with served(HERE, protocol) as url:
+        play(url, 3, *asked)
+        play(url, 2, *asked)
+
+    _opened, *episodes = recorders
+    for policy in episodes:
+        assert policy.instruction == "this one is red."
+        assert policy.heard == [("please note.", 2), ("take it.", 5)]
 
 
 def test_openpi_has_no_reset_so_that_a_new_prompt_is_a_new_episode():
-    """The client's prompt ends with *take it*: the last policy has it as its instruction.
+    """A client asks twice in one episode, and its prompt changes in between.
 
-    It heard nothing during its episode, as each of the changes before began another one.
+    With openpi the server cannot tell this from a new episode. So the policy begins one, with the
+    second text as its instruction, and hears nothing in it.
     """
-    with served(HERE, "openpi") as url:
-        play(url, 3, *GROWING_PROMPT)
+    asked = [saying("this one is red.", 0), saying("take it.", 2, 1, 2)]
 
-    *_, policy = Recorder.episodes
+    policy = recorder_behind("openpi", *asked)
+
     assert policy.instruction == "take it."
     assert policy.heard == []
 
 
 def test_a_served_policy_sees_depth_and_calibration_if_the_client_sends_them():
-    """Moment 3 is shown at the first question, and moments 4 and 5 at the second.
+    """The policy `Seeing` wants depth and the moment of each step. The client shows moments that
+    have depth and the cameras' matrices, too: first moment 3, and then the moments 4 and 5.
 
-    The policy wants depth and declares that it observes each step. What it gets equals what the
-    client was given, field by field: in the video, at the first question, and in the history of
-    the second.
+    All fields of what it sees are equal to what the client was shown; depth is in whole numbers.
     """
     before, between, now = (moment(number, sensors=True) for number in (3, 4, 5))
     fields = [field for field in now if field != "instruction"]
+    asked = [{**before, "history": ()}, {**now, "history": (between, now)}]
+    with_sensors = {"options": "?depth=yes&calibration=yes", "sensors": True}
 
-    with served(f"{__name__}:Seeing", "challenge") as url:
-        play(
-            f"{url}?depth=yes&calibration=yes", 3, {**before, "history": ()},
-            {**now, "history": (between, now)}, sensors=True,
-        )  # fmt: skip
+    policy = recorder_behind("challenge", *asked, spec=f"{__name__}:Seeing", **with_sensors)
 
-    _opened, policy = Recorder.episodes
     first, second = policy.calls
     check_same(video(3, sensors=True), policy.demonstration, fields)
     check_same(before, first, fields)
-    check_same(between, second["history"][0], fields)
-    check_same(now, second["history"][1], fields)
+    for given, seen in zip((between, now), second["history"], strict=True):
+        check_same(given, seen, fields)
     assert second["front_depth"].dtype == np.int16
 
 
@@ -252,47 +313,45 @@ def reply_to(raw, message):
     return unpack(raw.recv())
 
 
-FRAMES = np.stack([moment(number)["front_rgb"][None] for number in range(3)])
-VIDEO_OF_TWO_FRAMES_AND_THE_FIRST_MOMENT = {
-    "add_buffer": True,
-    "images": FRAMES,
-    "state": np.zeros((3, 8), np.float32),
-    "exec_start_idx": 2,
-}
-
-
 @pytest.mark.parametrize("kind", ["grounded", "simple"])
-def test_connections_to_an_mme_vla_server_share_one_policy(kind):
-    """The video comes over one connection, and the question with its subgoal over another.
+def test_connections_to_an_mme_vla_server_share_one_policy(recorders, kind):
+    """A server of MME-VLA has one memory for all connections.
 
-    The buffer holds two frames of the video and the current one: the policy sees the video of two,
-    and follows the subgoal. (The first recorded policy is the one with which the server was
-    opened.)
+    Over the first one come three frames, of which the first two (`exec_start_idx`) are the video,
+    and over the second one the question, with a subgoal. One policy has seen the video and follows
+    the subgoal.
     """
-    request = {
-        "observation/image": FRAMES[2, 0],
-        "observation/wrist_image": FRAMES[2, 0],
+    frames = np.stack([moment(number)["front_rgb"][None] for number in range(3)])
+    shown = {"images": frames, "state": np.zeros((3, 8), np.float32), "exec_start_idx": 2}
+    question = {
+        "observation/image": frames[2, 0],
+        "observation/wrist_image": frames[2, 0],
         "observation/state": np.zeros(8),
         "prompt": "go",
         f"{kind}_subgoal": "pick up the cube at <1, 2>",
     }
-    with served(HERE, "mme-vla") as url, opened(url) as first, opened(url) as second:
-        reset = reply_to(first, {"reset": True})
-        shown = reply_to(first, VIDEO_OF_TWO_FRAMES_AND_THE_FIRST_MOMENT)
-        asked = reply_to(second, request)
 
-    assert reset.keys() == {"reset_finished", "reset_time_ms"}
-    assert shown.keys() == {"add_buffer_finished", "add_buffer_time_ms"}
-    assert asked.keys() == {"actions", "infer_time_ms"}
-    _opened, policy = Recorder.episodes
-    assert np.array_equal(policy.demonstration["front_rgb"], FRAMES[:2, 0])
+    with served(HERE, "mme-vla") as url, opened(url) as first, opened(url) as second:
+        answers = [
+            reply_to(first, {"reset": True}),
+            reply_to(first, {"add_buffer": True, **shown}),
+            reply_to(second, question),
+        ]
+
+    assert [set(answer) for answer in answers] == [
+        {"reset_finished", "reset_time_ms"},
+        {"add_buffer_finished", "add_buffer_time_ms"},
+        {"actions", "infer_time_ms"},
+    ]
+    _opened, policy = recorders
+    assert np.array_equal(policy.demonstration["front_rgb"], frames[:2, 0])
     assert policy.subgoals == ["pick up the cube at <1, 2>"]
 
 
-def test_idle_connections_make_no_policy():
+def test_idle_connections_make_no_policy(recorders):
     """The only one is that with which the server was opened."""
     with served(HERE, "mme-vla") as url, opened(url), opened(url):
-        assert len(Recorder.episodes) == 1
+        assert len(recorders) == 1
 
 
 @pytest.mark.parametrize(
@@ -329,14 +388,16 @@ def test_after_a_malformed_request_the_next_episode_works():
             raw.send(b"\xc1")
             raw.recv()
 
-        chunks, _ = play(url, 0, moment(0, history=()))
+        chunks = play(url, 0, moment(0, history=()))
 
     assert np.shape(chunks) == (1, 4, 8)
 
 
 @pytest.mark.parametrize("protocol", SERVED)
 def test_an_exception_in_a_served_policy_reaches_the_client_with_its_message(protocol):
-    """The policy here fails at the instruction *fail*; the next episode works."""
+    """The policy Recorder raises *the weights melted* if the instruction begins with *fail*. The
+    next episode works.
+    """
     now = moment(1, history=())
     with served(HERE, protocol) as url:
         with pytest.raises(PolicyReplyError, match="RuntimeError: the weights melted"):
@@ -347,7 +408,7 @@ def test_an_exception_in_a_served_policy_reaches_the_client_with_its_message(pro
 
 @pytest.mark.parametrize("protocol", SERVED)
 def test_a_server_reports_its_health_to_anyone(protocol):
-    """Also without the key *sesame*, at the path /healthz."""
+    """The server's key is *sesame*. A request for the path /healthz without it is answered *OK*."""
     with served(HERE, protocol, key="sesame") as url:
         health = HTTPConnection(url.split("://")[1], timeout=300)
         health.request("GET", "/healthz")
@@ -373,7 +434,7 @@ def test_a_server_with_a_key_serves_a_client_with_the_same_key(protocol, monkeyp
     """Both have *sesame*: one chunk of 4 actions of 8 numbers is the answer of the policy."""
     monkeypatch.setenv("KEY", "sesame")
     with served(HERE, protocol, key="sesame") as url:
-        chunks, _ = play(f"{url}?api_key_env=KEY", 0, moment(0, history=()))
+        chunks = play(f"{url}?api_key_env=KEY", 0, moment(0, history=()))
 
     assert np.shape(chunks) == (1, 4, 8)
 
@@ -425,11 +486,13 @@ def test_a_policy_that_a_protocol_cannot_serve_is_refused_with_the_reason(option
 
 
 def test_the_command_serve_runs_until_a_signal_ends_it():
-    """143 is 128 + 15, the number of SIGTERM."""
+    """The command serves the random policy, of whose chunk 16 actions of 8 numbers are executed.
+    SIGTERM ends it with exit code 143, which is 128 + 15, the number of that signal.
+    """
     with serving("mme-vla") as server:
         assert server.url.startswith("mme-vla://127.0.0.1:")
 
-        chunks, _ = play(server.url, 2, moment(2, history=()))
+        chunks = play(server.url, 2, moment(2, history=()))
         assert np.shape(chunks) == (1, 16, 8)
 
         server.process.send_signal(signal.SIGTERM)

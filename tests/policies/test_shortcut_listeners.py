@@ -8,7 +8,7 @@ import roboirg
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin import BUILTIN, listeners
 from roboirg.policies.by_name.finding import find_policy, read_policy
-from roboirg.shortcuts import SURFACE_RULES
+from roboirg.shortcuts.surface_rules import SURFACE_RULES
 from roboirg.tasks.splits.splits import get_episode
 
 SPATIAL = "Have a look at the cube at the far left. Take it and place it on the target once."

@@ -50,8 +50,9 @@ class WireServer:
     """A server whose policy is the method `answer`.
 
     `faults` are consumed one for each message: None for none; "die" drops the connection, "close"
-    closes it with a reason, a number of seconds delays the reply, bytes or text are sent as they
-    are, and a dictionary is sent instead of the reply. Messages may have `most_bytes` bytes.
+    closes it with a reason, "twice" sends the reply twice, a number of seconds delays it, bytes or
+    text are sent as they are, and a dictionary is sent instead of the reply. Messages may have
+    `most_bytes` bytes.
     """
 
     def __init__(self, port=0, faults=(), most_bytes=None):
@@ -137,6 +138,9 @@ class WireServer:
                 return
             if isinstance(fault, dict):
                 fault = pack(fault)
+            if fault == "twice":
+                await websocket.send(pack(reply))
+                fault = None
             await websocket.send(pack(reply) if fault is None else fault)
 
 

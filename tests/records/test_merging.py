@@ -20,13 +20,19 @@ def played_records(count=4):
     return [FakePlay()(job) for job in small_plan(count).jobs()]
 
 
-def test_merging_two_parts_of_a_run_gives_the_whole_without_duplicates(tmp_path):
-    """Of 8 records the parts have the first 5 and the last 5, so 2 twice."""
-    records = tuple(played_records())
-    first = fill(tmp_path / "a", *records[:5])
-    last = fill(tmp_path / "b", *records[3:])
+def merge_records(folder, *runs):
+    """Merge runs with these records, each run a list, into the folder `out` of a folder."""
+    sources = [fill(folder / str(number), *records) for number, records in enumerate(runs)]
+    return merge_runs(sources, folder / "out")
 
-    merged = merge_runs([first, last], tmp_path / "out")
+
+def test_merging_two_parts_of_a_run_gives_the_whole_without_duplicates(tmp_path):
+    """Of 8 records the parts have the first 5 and the last 5. So 8 are added, and 2 come a second
+    time.
+    """
+    records = tuple(played_records())
+
+    merged = merge_records(tmp_path, records[:5], records[3:])
 
     assert (merged.added, merged.duplicates, merged.conflicts) == (8, 2, [])
     assert read_records(tmp_path / "out") == records
@@ -43,7 +49,7 @@ def test_merging_again_into_the_same_folder_adds_nothing(tmp_path):
 
 
 def test_the_plan_of_a_merged_run_is_kept(tmp_path):
-    """Or nobody could count what is missing."""
+    """The plan lists the episodes of a run; without it nobody could count what is missing."""
     part = tmp_path / "part"
     fake_run(part)
 
@@ -54,36 +60,38 @@ def test_the_plan_of_a_merged_run_is_kept(tmp_path):
 
 
 def test_merging_keeps_a_verdict_rather_than_an_error(tmp_path):
-    """Whichever comes first."""
+    """Three runs have a record of the same episode: an error, a success, and the error again.
+    Whichever comes first, the success is kept.
+    """
     won = played_records()[0]
     error = replace(won, outcome="error", error="connection", server_version=None)
-    sources = [
-        fill(tmp_path / "a", error), fill(tmp_path / "b", won), fill(tmp_path / "c", error)
-    ]  # fmt: skip
 
-    merged = merge_runs(sources, tmp_path / "out")
+    merged = merge_records(tmp_path, [error], [won], [error])
 
     assert read_records(tmp_path / "out") == (won,)
     assert (merged.added, merged.duplicates, merged.conflicts) == (1, 2, [])
 
 
 def test_merging_keeps_the_first_of_two_errors(tmp_path):
-    first = replace(
-        played_records()[0], outcome="error", error="connection", cause="connection: refused"
-    )
+    """Both runs have an error of the same episode, with different causes."""
+    usual = played_records()[0]
+    first = replace(usual, outcome="error", error="connection", cause="connection: refused")
     second = replace(first, cause="connection: lost")
 
-    merge_runs([fill(tmp_path / "a", first), fill(tmp_path / "b", second)], tmp_path / "out")
+    merge_records(tmp_path, [first], [second])
 
     assert read_records(tmp_path / "out") == (first,)
 
 
 def test_merging_keeps_the_first_of_two_verdicts_and_reports_the_other_as_a_conflict(tmp_path):
+    """Both runs have a verdict on the same episode: it failed in the first one and was won in the
+    second.
+    """
     record = played_records()[1]
     fell = replace(record, outcome="failure", cause="it fell")
     won = replace(record, outcome="success", cause=None)
 
-    merged = merge_runs([fill(tmp_path / "a", fell), fill(tmp_path / "b", won)], tmp_path / "out")
+    merged = merge_records(tmp_path, [fell], [won])
 
     assert read_records(tmp_path / "out") == (fell,)
     (conflict,) = merged.conflicts
@@ -91,12 +99,13 @@ def test_merging_keeps_the_first_of_two_verdicts_and_reports_the_other_as_a_conf
 
 
 def test_merging_warns_of_verdicts_by_other_code(tmp_path):
+    """`verdict_code` is a digest of the code that judged an episode; one of the two runs has
+    another.
+    """
     first, second, *_ = played_records()
     by_other_code = replace(second, verdict_code="old")
 
-    merged = merge_runs(
-        [fill(tmp_path / "a", first), fill(tmp_path / "b", by_other_code)], tmp_path / "out"
-    )
+    merged = merge_records(tmp_path, [first], [by_other_code])
 
     (warning,) = merged.warnings()
     assert warning.startswith(
@@ -105,22 +114,25 @@ def test_merging_warns_of_verdicts_by_other_code(tmp_path):
 
 
 def test_merging_does_not_warn_of_other_code_in_episodes_without_instruction(tmp_path):
-    """In them nothing is understood. The silent one is of another policy and split, too."""
-    first, second, *_ = played_records()
-    silent = replace(
-        second, policy="other", arm="silent", verdict_code="older", split="val", episode=0, seed=5
-    )
+    """The verdict of a told episode and that of a silent one come of different states of the code.
 
-    merged = merge_runs(
-        [fill(tmp_path / "a", first), fill(tmp_path / "b", silent)], tmp_path / "out"
-    )
+    A warning is for results that are compared. A silent episode (the arm *silent*) is a control,
+    in which nothing is said that could be understood.
+    """
+    told, silent, *_ = played_records()
+    silent = replace(silent, arm="silent", verdict_code="older")
 
-    assert read_records(tmp_path / "out") == (first, silent)
+    merged = merge_records(tmp_path, [told], [silent])
+
+    assert merged.added == 2
     assert not merged.warnings()
 
 
 def test_videos_actions_and_logs_are_copied_with_the_records_that_are_kept(tmp_path):
-    """The verdict of the second run is kept in place of the error of the first."""
+    """Run a has an error of an episode, run b a verdict on it, which replaces the error. Both have
+    a video, its picture, actions and a log, in files that say whose they are; those of b are
+    copied.
+    """
     record = replace(played_records()[0], video="videos/x.mp4", action_log="ab" * 32)
     error = replace(record, outcome="error", error="connection")
     files = (
@@ -140,9 +152,7 @@ def test_videos_actions_and_logs_are_copied_with_the_records_that_are_kept(tmp_p
 
 
 def test_a_merged_record_whose_video_is_gone_has_none(tmp_path):
-    source = fill(tmp_path / "a", replace(played_records()[0], video="videos/gone.mp4"))
-
-    merge_runs([source], tmp_path / "out")
+    merge_records(tmp_path, [replace(played_records()[0], video="videos/gone.mp4")])
 
     (record,) = read_records(tmp_path / "out")
     assert record.video is None
@@ -161,19 +171,19 @@ def test_a_merged_record_whose_video_is_gone_has_none(tmp_path):
         ("seed", 5, "PickXtimes test 0 whose seed is 5"),
     ],
 )
-@pytest.mark.parametrize("into", ["a new folder", "one of them"])
-def test_runs_of_other_words_servers_or_scenes_are_not_merged(tmp_path, field, value, words, into):
+def test_runs_of_other_words_servers_or_scenes_are_not_merged(tmp_path, field, value, words):
+    """Two runs have a record of the same episode, in one of them with another `value` of a field on
+    which its result depends. They are merged neither into a new folder nor the odd one into the
+    usual one.
+    """
     record = replace(played_records()[0], words="PickXtimes/test@1b")
     usual = fill(tmp_path / "usual", record)
     odd = fill(tmp_path / "odd", replace(record, **{field: value}))
-    sources = [odd]
-    out = usual
-    if into == "a new folder":
-        sources = [usual, odd]
-        out = tmp_path / "out"
 
     with pytest.raises(StoreError, match=f"{words}.* cannot be merged"):
-        merge_runs(sources, out)
+        merge_runs([usual, odd], tmp_path / "out")
+    with pytest.raises(StoreError, match=f"{words}.* cannot be merged"):
+        merge_runs([odd], usual)
 
     assert not (tmp_path / "out").exists()
 
@@ -185,7 +195,9 @@ def test_a_run_is_not_merged_into_itself(tmp_path):
 
 
 def test_runs_with_two_wording_files_can_be_merged(tmp_path):
-    """Their words differ, as they should."""
+    """Each run has its sentences from a file of its own, with another digest. They are other
+    episodes, so their words may differ.
+    """
     usual = played_records()[0]
     folders = []
     for digest in ("0a", "1b"):

@@ -18,7 +18,6 @@ from run_fakes import FakePlay, fake_record, fake_run, small_plan
 
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import RoboIRGError
-from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.core.versions import Versions
 from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.server_lock import lock_server
@@ -43,7 +42,9 @@ from roboirg.util.atomic_write import locked, write_atomically
 
 @pytest.mark.parametrize("field", Versions._fields[1:])
 def test_a_run_is_refused_if_any_of_its_versions_differs(field):
-    """As those of the language, the environment and the server."""
+    """Versions are those of the language, the environment, the server and so on. One of them was
+    *a* when the run began, and is *b* now.
+    """
     differences = Versions(**{field: "a"}).differences(Versions(**{field: "b"}))
 
     sentence = f"^x whose {field.replace('_', ' ')} is a, but now it is b; choose another --out.$"
@@ -65,61 +66,84 @@ def eight_records():
 @given(data=st.data())
 @settings(max_examples=40, deadline=None)
 def test_a_file_of_records_cut_anywhere_loses_only_the_line_that_was_cut(data):
-    """As by a crash. What is left of that line is kept in a file of its own.
+    """A crash leaves the first lines of a file of records, and a part of the next line.
 
-    A record is complete as soon as its last brace is there; its newline may be missing.
+    All whole records are read; one is whole as soon as its last brace is there, as only the newline
+    is missing. Once the file is opened to be written, it has their lines again; what is left of the
+    line that was cut is moved to a file of its own.
     """
+    lines = [encode(record) for record in eight_records()]
+    whole_lines = lines[: data.draw(st.integers(0, 7), label="whole lines")]
+    next_line = lines[len(whole_lines)]
+    bytes_left = st.integers(0, len(next_line)) | st.just(len(next_line))
+    torn = next_line[: data.draw(bytes_left, label="bytes left of the next line")]
+    kept = [*whole_lines, torn]
+
     with tempfile.TemporaryDirectory() as name:
-        path = fill(Path(name), *eight_records()) / RECORDS_FILE
-        whole = path.read_bytes()
-        line_ends = [place for place, byte in enumerate(whole) if byte == ord("\n")]
-        cut = data.draw(st.integers(0, len(whole)) | st.sampled_from(line_ends))
-        complete = eight_records()[: sum(end <= cut for end in line_ends)]
-        kept = b"".join(encode(record) + b"\n" for record in complete)
-
-        path.write_bytes(whole[:cut])
-        found = tuple(iterate_records(path.parent))
+        path = Path(name, RECORDS_FILE)
+        path.write_bytes(b"\n".join(kept))
+        if torn == next_line:
+            torn = b""
+        else:
+            kept.pop()
+        found = list(map(encode, iterate_records(path.parent)))
         with RecordStore(path.parent) as store:
-            torn = store.torn
-            store.append(eight_records()[-1])
+            assert store.torn == torn
 
-        assert found == complete
-        assert torn == whole[len(kept) : cut]
-        assert path.read_bytes() == kept + encode(eight_records()[-1]) + b"\n"
+        assert found == kept
+        assert path.read_bytes() == b"".join(line + b"\n" for line in kept)
         if torn:
             assert path.with_name(TORN_FILE).read_bytes() == torn + b"\n"
 
 
-POLICY_ERROR = {"outcome": "error", "error": "policy"}
+def test_a_record_that_is_added_behind_a_cut_line_has_a_line_of_its_own(tmp_path):
+    """A crash has cut off the last 10 bytes of the second of two records; the first is kept."""
+    first, second, *_ = eight_records()
+    path = fill(tmp_path, first, second) / RECORDS_FILE
+    path.write_bytes(path.read_bytes()[:-10])
+
+    fill(tmp_path, second)
+
+    assert read_records(tmp_path) == (first, second)
 
 
 def test_an_error_before_a_policy_declares_its_version_gets_that_of_its_verdicts(tmp_path):
-    """The first episode was won with version 7; the second ended before its version was known.
+    """Of a policy that declares its version late one episode was won, with version 7; another one
+    ended in an error before that, so that its version is unknown.
 
-    Else its row has no mark of the error, and a row of unknown version stands next to it.
+    Both are results of the same policy, so the error is read as one of version 7 and counts there.
     """
-    won = with_version(eight_records()[0], "7")
-    raised = replace(with_version(eight_records()[1], UNKNOWN_VERSION), **POLICY_ERROR)
-    fill(tmp_path, won, raised)
+    first, second, *_ = eight_records()
+    won = with_version(first, "7")
+    failed = replace(with_version(second, "unknown"), outcome="error", error="policy")
+    fill(tmp_path, won, failed)
 
-    versions = [result.policy_version for result in read_results(tmp_path)]
+    results = read_results(tmp_path)
 
-    assert versions == ["7", "7"]
+    assert [result.policy_version for result in results] == ["7", "7"]
 
 
 def test_an_error_of_another_policy_of_the_same_name_stays_of_unknown_version(tmp_path):
-    """The two policies have another `makeup`, so version 7 of one says nothing of the other."""
-    won = with_version(eight_records()[0], "7")
-    another = replace_field(won.ref, version=UNKNOWN_VERSION, makeup=(("policy", "another"),))
-    fill(tmp_path, won, replace(eight_records()[1], ref=another, **POLICY_ERROR))
+    """One policy won an episode with version 7. Another one of the same name, which is made of
+    other parts (`makeup`), ended in an error before it declared its version.
 
-    versions = [result.policy_version for result in read_results(tmp_path)]
+    The version 7 of the one says nothing of the other.
+    """
+    first, second, *_ = eight_records()
+    won = with_version(first, "7")
+    another = replace_field(won.ref, version="unknown", makeup=(("policy", "another"),))
+    failed = replace(second, ref=another, outcome="error", error="policy")
+    fill(tmp_path, won, failed)
 
-    assert versions == ["7", UNKNOWN_VERSION]
+    results = read_results(tmp_path)
+
+    assert [result.policy_version for result in results] == ["7", "unknown"]
 
 
 def test_unfinished_lines_of_several_crashes_are_all_kept_in_a_file_of_their_own(tmp_path):
-    """Twice a record is cut off by a crash, and the store is opened again."""
+    """Twice a crash cuts off a record in its line, and the file of records is opened again to be
+    written. Both unfinished lines are moved to TORN_FILE, and no record is left.
+    """
     for torn in (b'{"policy": "a', b'{"policy": "b'):
         with (tmp_path / RECORDS_FILE).open("ab") as file:
             file.write(torn)
@@ -129,7 +153,7 @@ def test_unfinished_lines_of_several_crashes_are_all_kept_in_a_file_of_their_own
 
 
 def test_a_second_run_in_the_same_folder_is_refused_with_the_process_of_the_first(tmp_path):
-    """Once the first store is closed, another may open the folder."""
+    """A store locks its folder. Once the first store is closed, another may open the folder."""
     first = RecordStore(tmp_path)
 
     with pytest.raises(StoreError, match=rf"being written by .*process {os.getpid()}\)"):
@@ -201,7 +225,9 @@ def test_a_line_that_is_no_record_is_reported_with_its_number(tmp_path, read, li
     ids=["steps", "duration", "cost", "step limit"],
 )  # fmt: skip
 def test_a_record_with_a_number_that_could_not_be_read_back_is_not_written(tmp_path, fields):
-    """Beyond 64 bits, no number, or infinite."""
+    """Numbers beyond 64 bits, NaN and infinity have no place in JSON, or are not read back as they
+    were. The file stays empty.
+    """
     record = replace(eight_records()[0], **fields)
 
     with RecordStore(tmp_path) as store, pytest.raises(StoreError, match=r"is not a record"):
@@ -232,6 +258,15 @@ def test_atomic_writing_replaces_a_file_and_leaves_no_temporary_one(tmp_path):
 
     assert [path.name for path in tmp_path.iterdir()] == ["x.txt"]
     assert (tmp_path / "x.txt").read_text() == "new"
+
+
+@pytest.fixture
+def victim(tmp_path):
+    """A file of somebody else, next to the folder `run`."""
+    path = tmp_path / "victim"
+    path.write_text("mine")
+    (tmp_path / "run").mkdir()
+    return path
 
 
 @pytest.fixture
@@ -268,12 +303,10 @@ def test_a_full_disk_ends_the_run_in_one_sentence_and_loses_no_earlier_record(
     ids=["stored", "checked"],
 )
 @pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "videos/a.jpg"])
-def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path, name, begin):
+def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path, victim, name, begin):
     """Each name is one that a run writes to; here it links to a file of somebody else."""
-    victim = tmp_path / "victim"
-    victim.write_text("mine")
     link = tmp_path / "run" / name
-    link.parent.mkdir(parents=True)
+    link.parent.mkdir(exist_ok=True)
     link.symlink_to(victim)
 
     with pytest.raises(RoboIRGError, match=f"{link} is a symbolic link, and a run writes"):
@@ -283,11 +316,10 @@ def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path, name, begin
 
 
 @pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "models.sqlite"])
-def test_a_run_changes_no_file_that_has_another_name_elsewhere(tmp_path, name):
-    """A hard link."""
-    victim = tmp_path / "victim"
-    victim.write_text("mine")
-    (tmp_path / "run").mkdir()
+def test_a_run_changes_no_file_that_has_another_name_elsewhere(tmp_path, victim, name):
+    """A file of the run is a hard link to a file of somebody else: to write into the one would
+    change the other.
+    """
     (tmp_path / "run" / name).hardlink_to(victim)
 
     with pytest.raises(RoboIRGError, match=f"{name} has another name elsewhere"):
@@ -298,7 +330,9 @@ def test_a_run_changes_no_file_that_has_another_name_elsewhere(tmp_path, name):
 
 @pytest.mark.parametrize("name", ["records.torn", "logs/a.txt"])
 def test_a_run_does_not_start_where_a_pipe_would_block_it(tmp_path, name):
-    """The unfinished line would be written into it."""
+    """A file to write to is a named pipe, where a writer waits until somebody reads. The
+    unfinished record in the folder would be moved to records.torn.
+    """
     path = tmp_path / "run" / name
     path.parent.mkdir(parents=True)
     (tmp_path / "run" / RECORDS_FILE).write_text('{"a')
@@ -308,20 +342,18 @@ def test_a_run_does_not_start_where_a_pipe_would_block_it(tmp_path, name):
         RecordStore(tmp_path / "run")
 
 
-def test_a_plan_may_be_a_hard_link_as_it_is_replaced(tmp_path):
+def test_a_plan_may_be_a_hard_link_as_it_is_replaced(tmp_path, victim):
     """Writing the plan makes a new file of that name; the other name keeps the old content."""
-    victim = tmp_path / "victim"
-    victim.write_text("{}")
-    (tmp_path / "run").mkdir()
     (tmp_path / "run" / PLAN_FILE).hardlink_to(victim)
 
     with RecordStore(tmp_path / "run"):
         write_plan(small_plan(), tmp_path / "run")
 
-    assert victim.read_text() == "{}"
+    assert victim.read_text() == "mine"
 
 
 def test_a_folder_of_videos_on_another_disk_is_refused_at_the_start(tmp_path):
+    """The folder `videos` of the run is a link to a folder elsewhere. Nothing is recorded."""
     (tmp_path / "disk").mkdir()
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "videos").symlink_to(tmp_path / "disk")
@@ -340,9 +372,8 @@ def test_a_folder_of_a_run_may_be_a_link(tmp_path):
     assert read_records(tmp_path / "disk") == eight_records()
 
 
-def test_a_lock_that_is_a_link_is_refused(tmp_path):
-    (tmp_path / "victim").write_text("mine")
-    (tmp_path / "lock").symlink_to(tmp_path / "victim")
+def test_a_lock_that_is_a_link_is_refused(tmp_path, victim):
+    (tmp_path / "lock").symlink_to(victim)
     refused = pytest.raises(RoboIRGError, match=f"Cannot write {tmp_path / 'lock'}")
 
     with refused, locked(tmp_path / "lock", "taken"):

@@ -168,20 +168,21 @@ class Forger(Hostile):
     message: Any = None
 
     def act(self, observation):
-        send(line_of(host_of(sys._getframe())), self.message)
+        send(line_to_world(), self.message)
         time.sleep(3600)
 
 
-def host_of(frame):
-    """Return the object that carries out the calls of this process."""
+def host_process():
+    """Return the object that carries out the calls of this process, from within a call."""
+    frame = sys._getframe()
     while not hasattr(frame.f_locals.get("self"), "_under_way"):
         frame = frame.f_back
     return frame.f_locals["self"]
 
 
-def line_of(host):
+def line_to_world():
     """Return the line to the world of the episode whose call is under way."""
-    return host._under_way[0].line
+    return host_process()._under_way[0].line
 
 
 class ForgesReply(Forger):
@@ -210,7 +211,7 @@ class AnswersTwice(Forger):
     """Sends a second outcome, which would be taken for that of the next call."""
 
     def act(self, observation):
-        send(line_of(host_of(sys._getframe())), {"type": "outcome"})
+        send(line_to_world(), {"type": "outcome"})
         return -np.ones((12, 8))
 
 
@@ -220,7 +221,7 @@ class Announcer(Hostile):
     data: ClassVar = (2**62).to_bytes(8, "big")
 
     def act(self, observation):
-        line_of(host_of(sys._getframe())).sendall(self.data)
+        line_to_world().sendall(self.data)
         time.sleep(3600)
 
 
@@ -255,7 +256,7 @@ class Asker(Hostile):
         self.ask()
 
     def ask(self):
-        line = line_of(host_of(sys._getframe()))
+        line = line_to_world()
         send(line, {"type": "question"})
         receive_call(line)
 

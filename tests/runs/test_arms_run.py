@@ -1,6 +1,6 @@
 """Control arms in plans, records, resumed and merged runs, and verification."""
 
-import json
+import shutil
 
 import pytest
 from page_text import call
@@ -14,46 +14,57 @@ from roboirg.runs.plan.stored_plans import write_plan
 from roboirg.runs.run.executor import InProcess
 from roboirg.runs.run.runner import run_plan
 
-ALL_ARMS = "told,other-goal,silent,silent-empty,scrambled,paraphrase:3,again"
 
+def plan_with_arms(arms, *, tasks="PickXtimes,VideoRepick", settings="direct"):
+    """Return a plan of the test episodes 0, 1 and 2 of tasks, in control arms.
 
-def plan_with_arms(arms=ALL_ARMS, **changes):
-    """Return a plan of three episodes of two tasks, each told in several ways, its arms."""
-    fields = {"tasks": "PickXtimes,VideoRepick", "settings": "direct", "episodes": "3", **changes}
-    return make_plan(["oracle"], arms=arms, **fields)
+    An arm is a way to tell an episode: *told* as it is, with another goal (*other-goal*), in
+    silence, ...
+    """
+    return make_plan(["oracle"], arms=arms, tasks=tasks, settings=settings, episodes="3")
 
 
 def test_each_arm_of_an_episode_is_a_job_of_its_own():
-    """An arm is a way to tell an episode: as it is, with another goal, in silence, ..."""
-    jobs = plan_with_arms().jobs()
+    """No two jobs share the key of a record, or the name (`slug`) of the episode's files."""
+    jobs = plan_with_arms("told,other-goal,silent,silent-empty,scrambled,paraphrase:3,again").jobs()
 
     assert len({identity_key(job) for job in jobs}) == len(jobs)
     assert len({job.slug for job in jobs}) == len(jobs)
 
 
-def test_a_scene_without_a_second_goal_lacks_the_arm_other_goal_and_is_counted_as_left_out():
-    """VideoRepick has no other goal in three episodes, nor has PickXtimes in two with one cube."""
-    plan = plan_with_arms()
+def test_scenes_of_video_repick_have_no_second_goal_and_so_no_arm_other_goal():
+    """The arm would state another goal of the scene: one with other things to pick up."""
+    plan = plan_with_arms("told,other-goal", tasks="VideoRepick")
+
     jobs = plan.jobs()
 
-    repick = {job.arm for job in jobs if job.task == "VideoRepick" and job.episode == 0}
-
-    assert repick == set(plan.arms) - {"other-goal"}
-    assert plan.left_out(jobs) == {"other-goal": 5}
+    assert [job.arm for job in jobs] == ["told", "told", "told"]
+    assert plan.left_out(jobs) == {"other-goal": 3}
 
 
-@pytest.mark.parametrize(
-    ("arms", "settings", "left_out"),
-    [
-        ("told", "direct", {}),
-        # Explicit instructions have one paraphrase only: all six episodes lack the second.
-        ("told,paraphrase:2", "explicit", {"paraphrase-2": 6}),
-    ],
-)
-def test_arms_that_an_episode_lacks_are_counted(arms, settings, left_out):
-    plan = plan_with_arms(arms, settings=settings)
+def test_a_scene_without_a_second_goal_lacks_the_arm_other_goal_and_is_counted_as_left_out():
+    """The test episodes 0 and 1 of PickXtimes have one cube, so that no other can be picked up;
+    episode 2 has cubes of three colors.
+    """
+    plan = plan_with_arms("told,other-goal", tasks="PickXtimes")
 
-    assert plan.left_out(plan.jobs()) == left_out
+    jobs = plan.jobs()
+
+    assert [job.episode for job in jobs if job.arm == "other-goal"] == [2]
+    assert plan.left_out(jobs) == {"other-goal": 2}
+
+
+def test_no_episode_lacks_the_arm_told():
+    plan = plan_with_arms("told", settings="direct")
+
+    assert plan.left_out(plan.jobs()) == {}
+
+
+def test_explicit_episodes_lack_a_second_paraphrase():
+    """Explicit instructions have one paraphrase only, so all six episodes lack the second."""
+    plan = plan_with_arms("told,paraphrase:2", settings="explicit")
+
+    assert plan.left_out(plan.jobs()) == {"paraphrase-2": 6}
 
 
 def test_arms_are_read_from_plan_files_and_from_the_command_line(tmp_path):
@@ -87,38 +98,81 @@ def test_a_dry_run_prints_how_many_episodes_lack_an_arm(tmp_path):
     assert "other-goal: 2 episodes left out." in printed
 
 
-@pytest.mark.sim
-def test_verifying_a_run_plays_other_goals_again_and_finds_a_forged_record(tmp_path):
-    """The listener does what it hears; `habit` does the original goal, whatever it hears.
-
-    In a record of `habit` *original: success* is replaced by *failure*.
+@pytest.fixture(scope="module")
+def run_with_other_goals(tmp_path_factory):
+    """A run of the listener, which does what it hears, and of `habit`, which does the original goal
+    whatever it hears: test episode 1 of StopCube, told as it is, with another goal, or in silence.
     """
-    from roboirg.apps.leaderboard.run_verification import verify_run
     from roboirg.runs.play.rollout import EpisodeRunner
 
+    folder = tmp_path_factory.mktemp("run")
     plan = make_plan(
         ["listener", "habit"], tasks="StopCube", settings="direct", episodes="1,",
         arms="told,other-goal,silent",
     )  # fmt: skip
-    write_plan(plan, tmp_path)
-    run_plan(plan, tmp_path, EpisodeRunner(tmp_path, plan=plan.fingerprint), InProcess())
+    write_plan(plan, folder)
+    run_plan(plan, folder, EpisodeRunner(folder, plan=plan.fingerprint), InProcess())
+    return folder
 
-    records = {(record.policy, record.arm): record for record in read_records(tmp_path)}
-    for (policy, arm), record in records.items():
-        goals = record.goals
-        assert (record.outcome == "success") == (goals.stated in goals.reached), (policy, arm)
-    assert records["habit", "told"].goals.original is None
-    assert records["habit", "other-goal"].goals.original == "success"
-    assert records["habit", "other-goal"].attribution.failure == "other_goal"
+
+@pytest.fixture
+def records(run_with_other_goals):
+    """The records of that run, by policy and arm."""
+    return {(record.policy, record.arm): record for record in read_records(run_with_other_goals)}
+
+
+@pytest.mark.sim
+def test_an_episode_is_a_success_exactly_if_the_goal_that_was_stated_is_reached(records):
+    """The run has two policies, of which one does what it hears, and three arms: six records. A
+    record has the goal that was stated and those that were reached.
+    """
+    assert len(records) == 6
+    for key, record in records.items():
+        is_reached = record.goals.stated in record.goals.reached
+        assert (record.outcome == "success") == is_reached, key
+
+
+@pytest.mark.sim
+def test_a_policy_that_does_what_it_hears_succeeds_at_another_goal(records):
+    """The listener was told another goal than the episode's, and did that."""
     assert records["listener", "other-goal"].outcome == "success"
+
+
+@pytest.mark.sim
+def test_a_policy_that_does_the_original_goal_although_told_another_one_fails(records):
+    """`habit` does so; that it would have succeeded at the original goal is recorded as well. Told
+    the original goal itself, it has no second verdict.
+    """
+    record = records["habit", "other-goal"]
+
+    assert record.outcome == "failure"
+    assert record.goals.original == "success"
+    assert record.attribution.failure == "other_goal"
+    assert records["habit", "told"].goals.original is None
+
+
+@pytest.mark.sim
+def test_a_silent_episode_is_told_nothing_about_its_goal(records):
     assert records["listener", "silent"].instruction[0].text == "Please do your task."
 
-    lines = []
-    for line in (tmp_path / RECORDS_FILE).read_text().splitlines():
-        row = json.loads(line)
-        if row["arm"] == "other-goal" and row["policy"] == "habit":
-            row["goals"]["original"] = "failure"
-        lines.append(json.dumps(row) + "\n")
-    (tmp_path / RECORDS_FILE).write_text("".join(lines))
-    (check,) = verify_run(tmp_path).checks  # the others hold
+
+@pytest.mark.sim
+def test_verifying_a_run_plays_other_goals_again_and_finds_a_forged_record(
+    run_with_other_goals, tmp_path
+):
+    """In a copy of the run one record is forged: `habit`, told another goal, did the original one,
+    and its record now says that it failed at this.
+
+    Its actions, played again, show otherwise. All other records hold.
+    """
+    from roboirg.apps.leaderboard.run_verification import verify_run
+
+    run = shutil.copytree(run_with_other_goals, tmp_path / "run")
+    records = (run / RECORDS_FILE).read_text()
+    assert records.count('"original":"success"') == 1
+    forged = records.replace('"original":"success"', '"original":"failure"')
+    (run / RECORDS_FILE).write_text(forged)
+
+    (check,) = verify_run(run).checks
+
     assert "goals: the record says" in check.findings[0]

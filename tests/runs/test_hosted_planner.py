@@ -27,33 +27,75 @@ def record_of_episode(spec):
         return EpisodeRunner(Path(), hosts=line).play_once(job_of(spec))[0]
 
 
+@pytest.fixture(scope="module")
+def planner_that_stays_then_picks_up():
+    """The record of an episode of the planner in own_planners.py of this folder."""
+    return record_of_episode("planner:own_planners:StaysThenPicksUp")
+
+
 @pytest.mark.sim
-def test_a_users_planner_runs_in_a_process_without_the_world_and_gets_pictures_and_words():
-    """A planner names subgoals, which scripted hands carry out; these do know the world.
+def test_scripted_hands_carry_out_the_subgoals_that_a_users_planner_names(
+    planner_that_stays_then_picks_up,
+):
+    """A planner names subgoals, and scripted hands carry them out.
 
-    This one names *remain static* and then *pick up the container*, which hands refuse five times.
+    This one names *remain static for 5 steps*, and from then on *pick up the container*. The hands
+    refuse that, as it says not which container, and after five refusals the episode ends.
     """
-    spec = "planner:own_planners:StaysThenPicksUp"
-    assert read_policy(spec).is_hosted
+    record = planner_that_stays_then_picks_up
 
-    result = record_of_episode(spec)
-    assert result.outcome == "failure", result.cause
-    assert [(subgoal.text, subgoal.ended) for subgoal in result.subgoals] == [
+    assert record.outcome == "failure", record.cause
+    assert [(subgoal.text, subgoal.ended) for subgoal in record.subgoals] == [
         ("remain static for 5 steps", "done"),
         ("pick up the container", "refused"),
     ]
+    assert record.usage["refused"] == 5
 
-    spent = result.usage
-    assert spent["process"] != os.getpid()
-    # It learns how each subgoal ended, but for the last: one that was done, four refused.
-    assert (spent["refused"], spent["named"], spent["ends"]) == (5, 0, 1 + 4)
-    assert spent["pictures"] == 1 + 5  # one where it named the first, five before refusals
-    assert result.policy_metadata["planner"] == {"world": False}
 
-    # The whole is marked as it acts by the simulator's state, and described alike beforehand.
-    known = open_policy(read_policy(spec))
-    assert known.version == result.policy_version == "mine-1 + scripted hands"
-    assert (known.is_privileged, result.privileged) == (True, True)
+@pytest.mark.sim
+def test_a_users_planner_runs_in_a_process_without_the_world(planner_that_stays_then_picks_up):
+    """The planner reports the number of its process, and whether it finds an object of the
+    simulator in the memory of this process ("world").
+    """
+    record = planner_that_stays_then_picks_up
+
+    assert read_policy(record.policy).is_hosted
+    assert record.usage["process"] != os.getpid()
+    assert record.policy_metadata["planner"] == {"world": False}
+
+
+@pytest.mark.sim
+def test_a_users_planner_gets_a_picture_for_each_subgoal_and_learns_how_each_ended(
+    planner_that_stays_then_picks_up,
+):
+    """The planner names *remain static*, which is done, and then another subgoal five times, which
+    is refused each time.
+
+    So it was asked six times, each time with a picture, and learned five ends: one done, and four
+    refused (after the fifth refusal the episode is over). No end names a thing that was handled.
+    """
+    counted = planner_that_stays_then_picks_up.usage
+
+    assert counted["pictures"] == 6
+    assert counted["ends"] == 5
+    assert counted["named"] == 0
+
+
+@pytest.mark.sim
+def test_a_users_planner_with_scripted_hands_is_privileged_and_has_the_version_of_both(
+    planner_that_stays_then_picks_up,
+):
+    """Privileged means that it reads the simulator's state, as the hands do. The planner's own
+    version is mine-1.
+
+    A policy that is only looked up is described as in the record of an episode that it played.
+    """
+    record = planner_that_stays_then_picks_up
+
+    looked_up = open_policy(read_policy("planner:own_planners:StaysThenPicksUp"))
+
+    assert record.policy_version == looked_up.version == "mine-1 + scripted hands"
+    assert record.privileged is looked_up.is_privileged is True
 
 
 @pytest.mark.sim
@@ -63,18 +105,38 @@ def test_a_planner_that_ends_its_process_loses_its_own_episode_as_an_error_of_th
 
 
 @pytest.mark.sim
-def test_a_planner_that_needs_the_world_runs_next_to_it_only_if_declared_privileged():
-    """It has a method attach(env). Would find one that reads the goal without being marked."""
-    spec = "privileged:planner:own_planners:AsksForTheWorld"
-    assert not read_policy(spec).is_hosted
-    assert record_of_episode(spec).usage["process"] == os.getpid()
+def test_a_planner_that_is_declared_privileged_runs_in_the_process_of_the_world():
+    """AsksForTheWorld has a method attach(env), so it may read the simulator.
 
-    # In a run whose policies share the worker's process, every planner runs there.
-    shared = EpisodeRunner(Path()).play_once(job_of("planner:own_planners:StaysThenPicksUp"))[0]
-    assert (shared.usage["process"], len(shared.subgoals)) == (os.getpid(), 2)
-    assert shared.policy_version == "mine-1 + scripted hands"
+    The prefix `privileged:` allows it. It reports the number of its process, which is that of the
+    simulator: this one.
+    """
+    spec = "privileged:planner:own_planners:AsksForTheWorld"
+
+    record = record_of_episode(spec)
+
+    assert not read_policy(spec).is_hosted
+    assert record.usage["process"] == os.getpid()
+
+
+def test_a_planner_that_needs_the_world_is_refused_if_not_declared_privileged():
+    """AsksForTheWorld has a method attach(env): unmarked, it could read the goal unnoticed."""
     with pytest.raises(InvalidValueError, match="has attach"):
         make_policy("planner:own_planners:AsksForTheWorld", 0)
+
+
+@pytest.mark.sim
+def test_without_processes_for_policies_a_planner_runs_in_the_process_of_the_world():
+    """An EpisodeRunner without `hosts` starts no process for a policy. The planner reports the
+    number of its process, and names the same two subgoals as elsewhere.
+    """
+    spec = "planner:own_planners:StaysThenPicksUp"
+
+    record, _ = EpisodeRunner(Path()).play_once(job_of(spec))
+
+    assert record.usage["process"] == os.getpid()
+    assert len(record.subgoals) == 2
+    assert record.policy_version == "mine-1 + scripted hands"
 
 
 @pytest.mark.parametrize(
@@ -90,5 +152,8 @@ def test_a_planner_that_needs_the_world_runs_next_to_it_only_if_declared_privile
     ],
 )
 def test_a_planner_that_cannot_be_used_is_refused_with_the_reason(spec, words):
+    """The planners are in own_planners.py of this folder: one that needs the simulator, none of
+    that name, one without a method plan(), and one that takes no options.
+    """
     with pytest.raises(InvalidValueError, match=re.escape(words)):
         open_policy(read_policy(spec))

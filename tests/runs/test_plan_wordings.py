@@ -46,7 +46,9 @@ def plan_in_words_of(path, **options):
 
 
 def test_each_episode_in_words_of_a_file_has_their_digest_and_the_path(wording_file):
-    """Two episodes in three settings."""
+    """The plan has two episodes in three settings. All are in the words of the file named *test*;
+    the digest begins with that name.
+    """
     jobs = plan_in_words_of(wording_file).jobs()
 
     assert len(jobs) == 2 * 3
@@ -125,6 +127,10 @@ def test_a_worker_refuses_a_file_of_words_that_has_changed(wording_file, monkeyp
 def test_a_plan_is_refused_if_its_file_of_words_lacks_a_task_a_goal_or_a_name(
     wording_file, content, options, words
 ):
+    """FILE_OF_SENTENCES has a sentence for each goal of PickXtimes: one of three colors, one to
+    five times. It has no words for StopCube; without *once* a goal has no sentence; the last two
+    files have no name, and a task that does not exist.
+    """
     wording_file.write_text(content)
 
     with pytest.raises(InvalidValueError, match=words):
@@ -153,27 +159,47 @@ def record_in_words_of_file(wording_file):
     return begin_record(PreparedJob(job))
 
 
-@pytest.mark.usefixtures("no_file_is_open")
-def test_words_of_a_record_are_compared_with_those_of_its_file(record_in_words_of_file):
-    """Or of none: here with our words of the same task."""
+@pytest.fixture
+def record_with_a_wrong_digest(record_in_words_of_file):
+    """The same record with the digest of the benchmark's own words, which the file has not."""
     ours = words_of("PickXtimes", record_in_words_of_file.pool)
-    in_our_words = replace(record_in_words_of_file, words=ours)
-
-    assert not other_versions(record_in_words_of_file)
-    assert [mismatch.what for mismatch in other_versions(in_our_words)] == [WORDS]
+    return replace(record_in_words_of_file, words=ours)
 
 
 @pytest.mark.usefixtures("no_file_is_open")
-@pytest.mark.parametrize("content", [FILE_WITH_A_TEMPLATE.replace("Do", "Move"), None])
-def test_words_of_a_record_are_not_compared_if_its_file_is_gone_or_changed(
-    record_in_words_of_file, wording_file, monkeypatch, content
+def test_a_record_in_the_words_of_its_file_is_of_no_other_version(record_in_words_of_file):
+    """A record has a digest of the words it was made with, and the path of their file."""
+    assert not other_versions(record_in_words_of_file)
+
+
+@pytest.mark.usefixtures("no_file_is_open")
+def test_a_record_in_other_words_than_those_of_its_file_is_reported(record_with_a_wrong_digest):
+    """A record has a digest of the words it was made with, and the path of their file."""
+    assert [mismatch.what for mismatch in other_versions(record_with_a_wrong_digest)] == [WORDS]
+
+
+def test_words_of_a_record_are_not_compared_if_its_file_is_gone(
+    record_with_a_wrong_digest, wording_file, monkeypatch
 ):
-    """So that a report can be made without the file."""
-    ours = words_of("PickXtimes", record_in_words_of_file.pool)
+    """The digest of the record is wrong, which is found only by reading the file. (Processes keep
+    files that they have read in `_OPEN`, which is emptied here.) A report can be made without.
+    """
     monkeypatch.setattr(wording_store, "_OPEN", {})
-    wording_file.unlink()
-    if content is not None:
-        wording_file.write_text(content)
 
-    assert not other_versions(record_in_words_of_file)
-    assert not other_versions(replace(record_in_words_of_file, words=ours))
+    wording_file.unlink()
+
+    assert not other_versions(record_with_a_wrong_digest)
+
+
+def test_words_of_a_record_are_not_compared_if_its_file_has_changed(
+    record_with_a_wrong_digest, wording_file, monkeypatch
+):
+    """The record has another digest than the file, but this may be another file by now: it says
+    *Move* in place of *Do*. (Processes keep files that they have read in `_OPEN`, which is emptied
+    here.)
+    """
+    monkeypatch.setattr(wording_store, "_OPEN", {})
+
+    wording_file.write_text(FILE_WITH_A_TEMPLATE.replace("Do", "Move"))
+
+    assert not other_versions(record_with_a_wrong_digest)

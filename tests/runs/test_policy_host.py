@@ -50,7 +50,6 @@ from roboirg.runs.run import ray_machines
 from roboirg.runs.run.executor import InProcess, LocalProcesses
 from roboirg.runs.run.ray_machines import MachineAgent, MachineVersions
 from roboirg.runs.run.runner import run_plan
-from roboirg.util.process_guard import descendants
 
 NUMBER_OF_KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "8"))
 THREE_POLICIES = tuple(f"hosting_fakes:{name}" for name in ("Dice", "BatchedDice", "Picky"))
@@ -66,12 +65,14 @@ def host_pool_of_test():
 def write_policy(tmp_path, monkeypatch):
     """Return what writes a module of a name with a class ``It``, and returns its spec.
 
-    The module has imported os, pathlib, sys, time, numpy and hostile_policies.
+    The module has imported os, pathlib, sys, time, numpy and hostile_policies. `BasePolicy` stands
+    still and needs no cameras.
     """
 
     def write(name, text):
         (tmp_path / f"{name}.py").write_text(
-            "import os, pathlib, sys, time\nimport hostile_policies\nimport numpy as np\n" + text
+            "import os, pathlib, sys, time\nimport hostile_policies\nimport numpy as np\n"
+            f"from hostile_policies import Hostile as BasePolicy\n{text}"
         )
         monkeypatch.syspath_prepend(tmp_path)
         return f"{name}:It"
@@ -80,11 +81,16 @@ def write_policy(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def begun_policy(host_pool_of_test, write_policy):
-    """Return what writes a policy and begins an episode of it in a process of its own."""
-    return lambda name, text: HostedPolicy(
-        host_pool_of_test.connect(), read_policy(write_policy(name, text)), 0
-    )
+def begin_episode(host_pool_of_test):
+    """Return what opens a policy for an episode, in the process that all its episodes share."""
+    with contextlib.ExitStack() as episodes:
+
+        def begin(spec, seed=0, limit_s=None):
+            policy = HostedPolicy(host_pool_of_test.connect(), read_policy(spec), seed, limit_s)
+            episodes.callback(policy.close)
+            return policy
+
+        yield begin
 
 
 def records_by_job(plan, folder, executor):
@@ -139,30 +145,26 @@ def test_objects_are_not_sent_to_the_process_of_a_policy(value):
 
 
 def test_a_policy_in_its_own_process_gets_the_instruction_the_video_and_later_utterances(
-    begun_policy,
+    begin_episode, write_policy
 ):
     """The policy notes what it gets in its metadata; numbers of NumPy arrive there as plain ones.
 
-    Its video has 30 pictures whose pixels are all 1, so that the sum is their number. Usage that is
-    no finite number is left out; to close twice does no harm.
+    Its video has 30 pictures whose pixels are all 1, so that the sum is their number.
     """
-    policy = begun_policy(
+    spec = write_policy(
         "notes_what_it_gets",
         """
-class It:
+class It(BasePolicy):
     def reset(self, instruction, demonstration):
         video = demonstration["front_rgb"]
         self.metadata = {"instruction": instruction, "fields": list(demonstration)}
         self.metadata |= {"sum": video.sum(dtype=np.int64), "shape": np.array(video.shape)}
     def hear(self, text, step):
         self.metadata["heard"] = [text, step]
-    def act(self, observation):
-        pass
-    def usage(self):
-        return {"calls": 2, "cost": float("nan")}
 """,
     )
     frames = np.ones((30, 256, 256, 3), np.uint8)
+    policy = begin_episode(spec)
 
     policy.reset("Pick it.", {"front_rgb": frames, "joint_positions": np.zeros((30, 7))})
     policy.hear("The blue one.", 3)
@@ -174,27 +176,42 @@ class It:
         "shape": [30, 256, 256, 3],
         "heard": ["The blue one.", 3],
     }
-    assert policy.usage() == {"calls": 2.0}, "what is no finite number is no usage"
+
+
+def test_usage_of_a_hosted_policy_that_is_no_finite_number_is_left_out(begin_episode, write_policy):
+    """The policy's usage is sent from its process to this one: the cost, which is NaN, is not. Once
+    the policy is closed, it has none, and to close it again does no harm.
+    """
+    text = """
+class It(BasePolicy):
+    def usage(self):
+        return {"calls": 2, "cost": float("nan")}
+"""
+    policy = begin_episode(write_policy("spends", text))
+
+    assert policy.usage() == {"calls": 2.0}
+
     policy.close()
-    policy.close()  # again does no harm
+    policy.close()
+    assert policy.usage() == {}
 
 
-def test_a_policy_in_its_own_process_answers_to_an_observation_and_cannot_change_it(begun_policy):
+def test_a_policy_in_its_own_process_answers_to_an_observation_and_cannot_change_it(
+    begin_episode, write_policy
+):
     """The policy blackens its picture and answers with the mean of the picture in the history.
 
     All pixels are 9, so the answer is 9; the world's own picture is still 9, as the policy has a
     copy.
     """
-    policy = begun_policy(
-        "writes_into_pictures",
-        """
-class It(hostile_policies.Hostile):
+    text = """
+class It(BasePolicy):
     def act(self, observation):
         assert isinstance(observation["history"], tuple)
         observation["front_rgb"][:] = 0
         return np.full((2, 8), observation["history"][0]["front_rgb"].mean())
-""",
-    )
+"""
+    policy = begin_episode(write_policy("writes_into_pictures", text))
     picture = np.full((256, 256, 3), 9, np.uint8)
     policy.reset("Pick it.", {})
 
@@ -202,36 +219,42 @@ class It(hostile_policies.Hostile):
 
     assert np.array_equal(actions, np.full((2, 8), 9.0))
     assert (picture == 9).all()
-    policy.close()
 
 
-def test_needs_and_seed_of_a_policy_in_its_own_process_are_those_that_it_has_there(
-    host_pool_of_test, write_policy
-):
-    """`grounded` is left out: pixels of subgoals are for privileged policies only."""
-    spec = write_policy(
-        "needy",
-        """
-class It(hostile_policies.Hostile):
-    observe_every = 4
-    depth = grounded = True
+def test_a_hosted_policy_has_the_needs_that_it_declares_in_its_process(begin_episode, write_policy):
+    """The object that stands for the policy here declares the same, also what is a property there.
+
+    `grounded` is left out: it asks for the pixels of subgoals, which only privileged policies get.
+    """
+    text = """
+class It(BasePolicy):
     cameras = ("front",)
+    observe_every = 4
+    depth = True
+    grounded = True
     prompt_tokens = property(lambda self: 7)
-    def __init__(self, seed=0):
-        self.metadata = {"seed": seed}
-    def reset(self, instruction, demonstration):
-        pass
-""",
-    )
-
-    policy = HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 5)
+"""
+    policy = begin_episode(write_policy("needy", text))
 
     assert PolicyNeeds.of(policy) == PolicyNeeds(
-        observe_every=4, depth=True, prompt_tokens=7, cameras=("front",)
+        cameras=("front",), observe_every=4, depth=True, prompt_tokens=7
     )
+
+
+def test_a_hosted_policy_is_made_with_its_seed(begin_episode, write_policy):
+    """The policy, in a process of its own, tells its seed in its metadata."""
+    text = """
+class It(BasePolicy):
+    def __init__(self, seed):
+        self.seed = seed
+    def reset(self, instruction, demonstration):
+        self.metadata = {"seed": self.seed}
+"""
+    policy = begin_episode(write_policy("seeded", text), seed=5)
+
     policy.reset("Pick it.", {})
+
     assert policy.metadata == {"seed": 5}
-    policy.close()
 
 
 class VideoThatNotesWhatIsDrawn(dict[str, Any]):
@@ -247,37 +270,40 @@ class VideoThatNotesWhatIsDrawn(dict[str, Any]):
         return super().__getitem__(field)
 
 
+def fields_drawn_for(policy):
+    """Return the fields of a video that are drawn while a policy begins an episode."""
+    video = VideoThatNotesWhatIsDrawn()
+    policy.reset("Pick it.", video)
+    return set(video.drawn)
+
+
 def test_pictures_of_a_video_are_drawn_only_for_a_policy_that_reads_them(
-    host_pool_of_test, write_policy
+    begin_episode, write_policy
 ):
-    """In its first episode the policy asks for each; in the next all that it read are sent."""
-    spec = write_policy(
-        "reads_wrist_later",
-        """
-class It:
+    """A video has the fields joint_positions, front_rgb and wrist_rgb; pictures are slow to draw.
+
+    In its first episode a policy asks for each field of pictures when it reads it: this one reads
+    the front camera's in reset(), and the wrist's not before act(). In the next episode all that it
+    ever read are sent with the reset.
+    """
+    text = """
+class It(BasePolicy):
     def reset(self, instruction, demonstration):
-        demonstration["front_rgb"]
         self.video = demonstration
-        self.metadata = {}
+        self.video["front_rgb"]
     def act(self, observation):
         self.video["wrist_rgb"]
         return np.zeros((1, 8))
-""",
-    )
-    drawn_by_reset = []
+"""
+    spec = write_policy("reads_wrist_later", text)
 
-    for _ in range(2):
-        video = VideoThatNotesWhatIsDrawn()
-        policy = HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 0)
-        policy.reset("Pick it.", video)
-        drawn_by_reset.append(sorted(video.drawn))
-        policy.act({})
-        policy.close()
+    first = begin_episode(spec)
+    drawn_at_first = fields_drawn_for(first)
+    first.act({})
+    drawn_later = fields_drawn_for(begin_episode(spec))
 
-    assert drawn_by_reset == [
-        ["front_rgb", "joint_positions"],
-        ["front_rgb", "joint_positions", "wrist_rgb"],
-    ]
+    assert drawn_at_first == {"joint_positions", "front_rgb"}
+    assert drawn_later == {"joint_positions", "front_rgb", "wrist_rgb"}
 
 
 # Records
@@ -292,15 +318,14 @@ def records_without_a_host(tmp_path_factory):
 
 @pytest.mark.parametrize(("workers", "batch"), slow_but([(3, 3)], [(3, 3), (0, 16), (5, 16)]))
 def test_records_are_the_same_whatever_the_number_of_workers_or_the_size_of_batches(
-    tmp_path, monkeypatch, records_without_a_host, workers, batch
+    tmp_path, records_without_a_host, workers, batch
 ):
-    """The expected records are those of policies in the world's own process, one episode at a time.
+    """Three policies play eight episodes each, in worlds of so many worker processes (0: in this
+    one); a policy's own process asks it about `batch` episodes at once at most.
 
-    Some episodes of `Picky` raise: what fails for one of a batch costs only that one. BatchedDice
-    and Picky note how many episodes they were asked about at once: no more than a batch or the
-    workers; of three workers two can wait while one is asked about.
+    The expected records are those of policies in the world's process, one episode at a time (the
+    fixture). One policy raises in some episodes: of a batch these alone end in an error.
     """
-    monkeypatch.setenv("ROBOIRG_TEST_SIZES", str(tmp_path / "sizes"))
     plan = changed(fake_world_plan("Dice", batch=batch), policies=THREE_POLICIES)
     executor = InProcess()
     if workers:
@@ -310,23 +335,32 @@ def test_records_are_the_same_whatever_the_number_of_workers_or_the_size_of_batc
 
     assert found == records_without_a_host
     assert {record["outcome"] for record in found.values()} == {"success", "failure", "error"}
-    sizes = [int(line) for line in (tmp_path / "sizes").read_text().split()]
-    assert max(sizes) <= min(batch, max(workers, 1))
-    if workers > 2:  # of three, two wait while one is asked about
-        assert max(sizes) > 1
 
 
-def test_all_worlds_share_one_object_of_a_batched_policy(host_pool_of_test):
-    """It tells in its metadata how many of it were made."""
-    ref = read_policy("hosting_fakes:BatchedDice")
-    worlds = [HostedPolicy(host_pool_of_test.connect(), ref, seed) for seed in range(3)]
+def test_a_policy_is_asked_about_no_more_episodes_at_once_than_a_batch_has(tmp_path, monkeypatch):
+    """A batch has two episodes. Of three workers two wait while the policy is asked about the
+    third, and are then asked about together.
+
+    BatchedDice writes how many it is asked about each time into a file, which the variable names.
+    """
+    sizes = tmp_path / "sizes"
+    monkeypatch.setenv("ROBOIRG_TEST_SIZES", str(sizes))
+
+    records_by_job(fake_world_plan("BatchedDice", batch=2), tmp_path / "run", LocalProcesses(3))
+
+    assert max(sizes.read_text().split()) == "2"
+
+
+def test_all_worlds_share_one_object_of_a_batched_policy(begin_episode):
+    """BatchedDice plays many episodes with one object. It tells in its metadata how many of it
+    were made: one for three episodes.
+    """
+    worlds = [begin_episode("hosting_fakes:BatchedDice", seed) for seed in range(3)]
 
     for world in worlds:
         world.reset("Pick it.", {})
 
     assert [world.metadata for world in worlds] == [{"made": 1}] * 3
-    for world in worlds:
-        world.close()
 
 
 def test_a_privileged_policy_runs_in_the_worlds_process_and_reads_its_secret(
@@ -358,22 +392,19 @@ class It:
 
 def test_worlds_share_one_process_of_a_policy_on_each_device(write_policy):
     """Four worlds and two devices, 0 and 3: the policy tells its device and process."""
-    spec = write_policy(
-        "located",
-        """
-class It(hostile_policies.Hostile):
+    text = """
+class It(BasePolicy):
     def reset(self, instruction, demonstration):
         self.metadata = {"device": os.environ["CUDA_VISIBLE_DEVICES"], "process": os.getpid()}
-""",
-    )
-    with HostPool(Hosting(devices=("0", "3")).settings or HostSettings()) as pool:
-        worlds = [HostedPolicy(pool.connect(), read_policy(spec), 0) for _ in range(4)]
+"""
+    ref = read_policy(write_policy("located", text))
+    with HostPool(Hosting(devices=("0", "3")).settings) as pool:
+        worlds = [HostedPolicy(pool.connect(), ref, 0) for _ in range(4)]
         for world in worlds:
             world.reset("Pick it.", {})
-        found = [(world.metadata["device"], world.metadata["process"]) for world in worlds]
 
-    assert sorted(device for device, _ in found) == ["0", "0", "3", "3"]
-    assert len({process for _, process in found}) == 2
+    assert sorted(world.metadata["device"] for world in worlds) == ["0", "0", "3", "3"]
+    assert len({world.metadata["process"] for world in worlds}) == 2
 
 
 # What a policy is
@@ -411,7 +442,7 @@ def test_version_and_needs_of_a_policy_are_read_without_importing_it_here(write_
     spec = write_policy(
         "versioned",
         """
-class It(hostile_policies.Hostile):
+class It(BasePolicy):
     version = "2.1"
     prompt_tokens = 9
     cameras = property(lambda self: ("front",))
@@ -426,11 +457,13 @@ class It(hostile_policies.Hostile):
 
 
 def test_a_policys_version_is_shortened_and_its_control_characters_are_escaped(write_policy):
-    """So that it never controls the terminal that it is printed on."""
+    """The version begins with codes that clear a terminal, turn text around, and end a line, and
+    half a surrogate pair, which becomes *?*; it has 500 digits more.
+    """
     spec = write_policy(
         "controls_terminals",
         """
-class It(hostile_policies.Hostile):
+class It(BasePolicy):
     version = "\\x1b[2J\\u202e\\n-\\ud800" + "7" * 500
 """,
     )
@@ -466,84 +499,114 @@ def test_a_policy_that_cannot_be_loaded_is_reported_before_the_run(
 # Deaths
 
 
-def child_of(host_pool_of_test):
-    (child,) = host_pool_of_test._children.values()
-    return child
+def process_in(pool):
+    """Return the only policy's process of a pool, as its supervisor has it."""
+    (process,) = pool._children.values()
+    return process
 
 
-CODE_OF_A_POLICY_THAT_DIES_IF_TOLD = """
-class It:
+@pytest.fixture
+def dies_if_told(write_policy):
+    """The spec of a policy whose act() prints *last words* and ends the process with exit code 7,
+    if its instruction was *die*; otherwise it returns one action.
+    """
+    return write_policy(
+        "fragile",
+        """
+class It(BasePolicy):
     def reset(self, instruction, demonstration):
+        self.metadata = {}
         self.word = instruction
     def act(self, observation):
         if self.word == "die":
             print("last words")
             os._exit(7)
         return np.zeros((1, 8))
-"""
+""",
+    )
 
 
-def test_a_crash_of_a_policys_process_is_an_error_only_for_the_episode_that_caused_it(
-    host_pool_of_test, write_policy
+@pytest.fixture
+def crashed_episode(begin_episode, dies_if_told):
+    """The error of an episode whose policy has just ended its process in act(), as it was told."""
+    policy = begin_episode(dies_if_told)
+    policy.reset("die", {})
+    with pytest.raises(EpisodeError) as error:
+        policy.act({})
+    return error.value
+
+
+def test_a_crash_of_a_policys_process_is_an_error_of_the_episode_that_caused_it(crashed_episode):
+    """The process ended with exit code 7 within act(), as the policy was told to die."""
+    assert crashed_episode.kind == "policy"
+    assert str(crashed_episode) == "the process ended with exit code 7 in the policy's act()"
+
+
+def test_a_crash_of_a_policys_process_loses_the_other_episodes_that_share_it(
+    begin_episode, dies_if_told
 ):
-    """The other episodes are lost, and so played again."""
-    ref = read_policy(write_policy("fragile", CODE_OF_A_POLICY_THAT_DIES_IF_TOLD))
-    good, bad, over = (HostedPolicy(host_pool_of_test.connect(), ref, 0) for _ in range(3))
-    good.reset("live", {})
-    bad.reset("die", {})
+    """Three episodes share a process, which the act() of one of them ends.
 
-    with pytest.raises(EpisodeError) as guilty:
-        bad.act({})
-
-    assert guilty.value.kind == "policy"
-    assert str(guilty.value) == "the process ended with exit code 7 in the policy's act()"
-    with pytest.raises(EpisodeLostError):
-        good.act({})
-    with pytest.raises(EpisodeLostError):
-        over.usage()  # what it has cost is lost
-
-
-def test_after_a_crash_a_policy_gets_a_new_process(host_pool_of_test, write_policy):
-    """A policy that was told to die ends its process with exit code 7 when it is asked to act.
-
-    The next episode gets a new process and an answer of one action.
+    Whatever the others ask next, they are lost, which is no error: they are played again.
     """
-    ref = read_policy(write_policy("fragile", CODE_OF_A_POLICY_THAT_DIES_IF_TOLD))
-    bad = HostedPolicy(host_pool_of_test.connect(), ref, 0)
+    bad, playing, ending = (begin_episode(dies_if_told) for _ in range(3))
     bad.reset("die", {})
+    playing.reset("live", {})
     with pytest.raises(EpisodeError):
         bad.act({})
-    # Each episode that asks gets the same answer.
-    child = child_of(host_pool_of_test)
-    expected = Loss("policy", "the process ended with exit code 7", b"last words\n")
-    assert child.loss() == child.loss() == expected
-    bad.close()
 
-    again = HostedPolicy(host_pool_of_test.connect(), ref, 0)
+    with pytest.raises(EpisodeLostError):
+        playing.act({})
+    with pytest.raises(EpisodeLostError):
+        ending.usage()
 
+
+@pytest.mark.usefixtures("crashed_episode")
+def test_all_episodes_learn_the_same_about_the_end_of_a_policys_process(host_pool_of_test):
+    """The policy printed *last words* and ended its process with exit code 7."""
+    process = process_in(host_pool_of_test)
+
+    first_told = process.loss()
+    told_again = process.loss()
+
+    assert first_told == Loss("policy", "the process ended with exit code 7", b"last words\n")
+    assert told_again == first_told
+
+
+@pytest.mark.usefixtures("crashed_episode")
+def test_after_a_crash_a_policy_gets_a_new_process(begin_episode, dies_if_told):
+    """The next episode gets an answer of one action."""
+    again = begin_episode(dies_if_told)
     again.reset("live", {})
+
     assert again.act({}).shape == (1, 8)
-    again.close()
 
 
 def test_episodes_whose_policy_was_asked_together_and_crashed_are_played_again_one_by_one(
-    begun_policy,
+    begin_episode, write_policy
 ):
-    """One of them may be to blame, the others are not; alone it shows."""
+    """A policy's process says with `Begun(together)` whether it asks the policy about several
+    episodes at once. Here it always says so, as the policy has replaced that message, and then ends
+    with exit code 5.
+
+    Any of these episodes may be to blame. So this one is lost, and is to be played again `alone`.
+    """
     text = """
 from roboirg.runs.hosting import host_process
 from roboirg.runs.hosting.messages import Begun
-class It(hostile_policies.Hostile):
+class It(BasePolicy):
     def reset(self, instruction, demonstration):
-        host_process.Begun = lambda together: Begun(True)
+        self.metadata = {}
+        host_process.Begun = lambda together: Begun(together=True)
     def act(self, observation):
         os._exit(5)
 """
-    world = begun_policy("joint", text)
+    world = begin_episode(write_policy("joint", text))
     world.reset("Pick it.", {})
 
     with pytest.raises(EpisodeLostError, match="exit code 5") as lost:
         world.act({})
+
     assert lost.value.alone
 
 
@@ -555,98 +618,108 @@ def test_an_episode_whose_policy_process_cannot_be_started_is_lost(host_pool_of_
 
 
 def test_an_interrupt_while_a_picture_is_drawn_stops_the_world_and_not_the_policys_process(
-    host_pool_of_test,
+    begin_episode,
 ):
-    """Ctrl-C comes while the policy waits for a picture of the video; later it still answers."""
+    """In its reset() the policy Dice reads the pictures of the video, which the world then draws.
 
-    class InterruptedVideo(dict[str, Any]):
+    Here the user presses Ctrl-C at this moment: drawing raises KeyboardInterrupt. That ends this
+    episode; the policy's process lives on, and serves another one.
+    """
+
+    class VideoInterruptedWhileDrawn(dict[str, Any]):
         def __getitem__(self, field):
             raise KeyboardInterrupt
 
-    world = HostedPolicy(host_pool_of_test.connect(), read_policy("hosting_fakes:Dice"), 0)
+    other = begin_episode("hosting_fakes:Dice")
+    interrupted = begin_episode("hosting_fakes:Dice")
 
     with pytest.raises(KeyboardInterrupt):
-        world.reset("Pick it.", InterruptedVideo(front_rgb=None))
+        interrupted.reset("Pick it.", VideoInterruptedWhileDrawn(front_rgb=None))
 
-    assert world.usage() == {}
-    world.close()
+    assert interrupted.usage() == {}  # it has ended
+    assert other.usage() == {"calls": 0}
 
 
 def test_a_policys_process_serves_other_worlds_after_one_died_in_the_middle_of_a_message(
-    host_pool_of_test,
+    host_pool_of_test, begin_episode
 ):
     """A message begins with its length in 8 bytes, here 1000; only 14 bytes follow."""
-    ref = read_policy("hosting_fakes:Dice")
     line = host_pool_of_test.connect()
-    HostedPolicy(line, ref, 0)
+    HostedPolicy(line, read_policy("hosting_fakes:Dice"), 0)
 
     line.sendall((1000).to_bytes(8, "big") + b"half a message")
     line.close()
 
-    HostedPolicy(host_pool_of_test.connect(), ref, 1).close()
+    assert begin_episode("hosting_fakes:Dice").usage() == {"calls": 0}
 
 
-def test_a_call_has_its_time_limit_from_when_it_begins_and_a_frozen_process_is_ended(
-    host_pool_of_test, write_policy
-):
-    """Four calls of 1.5 s wait for each other; the limit is 4 s. Then the process is stopped.
+def test_a_call_has_its_time_limit_from_when_it_begins(begin_episode, write_policy):
+    """Four episodes share a process, which carries out one call after the other, each in 1.5 s.
 
-    Would find a limit that begins when a call is sent, and a wait without any limit.
+    The last call returns after 6 s. That is within its limit of 4 s, as it began 1.5 s before.
     """
-    spec = write_policy(
-        "stopping",
-        """
-import signal, threading
-class It:
+    text = """
+class It(BasePolicy):
     def reset(self, instruction, demonstration):
+        self.metadata = {}
         time.sleep(1.5)
-    def hear(self, text, step):
-        threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGSTOP)).start()
-    def act(self, observation):
-        return np.zeros((1, 8))
-""",
-    )
-    worlds = [
-        HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 0, 4.0) for _ in range(4)
-    ]
+"""
+    spec = write_policy("slow", text)
+    episodes = [begin_episode(spec, limit_s=4.0) for _ in range(4)]
+
     with ThreadPoolExecutor() as threads:
-        list(threads.map(lambda world: world.reset("wait", {}), worlds))  # the last for 6 s
-    worlds[0].hear("stop", 0)
-    time.sleep(1)
+        calls = [threads.submit(episode.reset, "Pick it.", {}) for episode in episodes]
+
+    assert [call.exception() for call in calls] == [None, None, None, None]
+
+
+def test_a_frozen_process_is_ended_when_the_limit_of_a_call_is_over(begin_episode):
+    """The policy Resident tells the number of its process in its usage. This process is stopped
+    (SIGSTOP) between two calls, so that it does not begin the next one.
+
+    After the 4 s that a call may take it is ended. The episode is lost: its call is not to blame.
+    """
+    world = begin_episode("hosting_fakes:Resident", limit_s=4.0)
+
+    os.kill(int(world.usage()["process"]), signal.SIGSTOP)
 
     with pytest.raises(EpisodeLostError, match="began no call within 4 s"):
-        worlds[1].act({})
-
-    for world in worlds:
-        world.close()
+        world.usage()
 
 
 def test_an_episode_whose_policy_was_ended_by_another_world_is_lost_and_not_to_blame(
-    host_pool_of_test, tmp_path, write_policy
+    host_pool_of_test, begin_episode, tmp_path, write_policy
 ):
-    """Would catch a call that begins when an earlier one returns just after its limit."""
+    """Two episodes share a process. While the call of the second is under way, the first one has
+    the process killed, as an episode does whose own call hangs.
+
+    The call that was under way is not to blame, so its episode is lost: it is played again.
+    """
     text = """
-class It(hostile_policies.Hostile):
+class It(BasePolicy):
     def reset(self, instruction, demonstration):
-        pathlib.Path(__file__).with_name("begun").touch()
+        pathlib.Path(__file__).with_name("has_begun").touch()
         time.sleep(3600)
 """
-    ref = read_policy(write_policy("sleepy", text))
-    hosts = host_pool_of_test.connect()
-    late = HostedPolicy(hosts, ref, 0)
-    world = HostedPolicy(host_pool_of_test.connect(), ref, 0)
+    spec = write_policy("sleepy", text)
+    line_of_first = host_pool_of_test.connect()
+    _first = HostedPolicy(line_of_first, read_policy(spec), 0)
+    second = begin_episode(spec)
+
     with ThreadPoolExecutor() as threads:
-        call = threads.submit(world.reset, "Pick it.", {})
-        while not (tmp_path / "begun").exists():
+        call = threads.submit(second.reset, "Pick it.", {})
+        while not (tmp_path / "has_begun").exists():
             time.sleep(0.01)
-        ask(hosts, HostRequest("kill"))
+        ask(line_of_first, HostRequest("kill"))
+
         with pytest.raises(EpisodeLostError, match="another episode broke the process"):
             call.result()
-    late.close()
 
 
 def test_a_process_that_is_starting_is_not_ended_as_frozen():
-    """After 0.01 s it cannot have answered yet."""
+    """A process that hangs does not answer in time. This one has just been started, and cannot
+    have answered after 0.01 s; it is given longer.
+    """
     starting = PolicyChild(os.environ)
 
     starting.check(0.01)
@@ -655,146 +728,185 @@ def test_a_process_that_is_starting_is_not_ended_as_frozen():
     starting.end()
 
 
-def test_a_process_that_waits_for_a_picture_is_not_ended_as_frozen(host_pool_of_test, begun_policy):
-    """The policy adds up the pixels of a video, whose pictures are drawn when it reads them.
+def test_a_process_that_waits_for_a_picture_is_not_ended_as_frozen(
+    host_pool_of_test, begin_episode, write_policy
+):
+    """The policy reads the pictures of the video, and its process waits until the world has drawn
+    them.
 
-    While one is drawn, the process is checked as if it had been silent for 10 s. It goes on: all of
-    2 * 4 * 4 * 3 pixels are 1.
+    Meanwhile the supervisor checks whether the process hangs: it would be ended if it did not
+    answer within some 10 s. It answers, gets the picture, and adds up its 2 * 4 * 4 * 3 pixels of
+    1.
     """
     text = """
-class It(hostile_policies.Hostile):
+class It(BasePolicy):
     def reset(self, instruction, demonstration):
         self.metadata = {"sum": int(demonstration["front_rgb"].sum())}
 """
-    world = begun_policy("viewer", text)
 
     class VideoCheckedWhileDrawn(dict[str, Any]):
         def __getitem__(self, field):
-            child_of(host_pool_of_test).check(10.0)  # of a world that waits
+            process_in(host_pool_of_test).check(10.0)
             return super().__getitem__(field)
+
+    world = begin_episode(write_policy("viewer", text))
 
     world.reset("Pick it.", VideoCheckedWhileDrawn(front_rgb=np.ones((2, 4, 4, 3), np.uint8)))
 
     assert world.metadata == {"sum": 2 * 4 * 4 * 3}
-    world.close()
 
 
 def test_the_time_that_the_world_takes_to_draw_is_not_that_of_the_policy(monkeypatch):
-    """A call of at most a second asks for a picture, which takes a thousand seconds."""
-    seconds = [0.0]
-    monkeypatch.setattr(policy_line, "time", SimpleNamespace(monotonic=lambda: seconds[0]))
+    """A call may take one second. Within it the policy asks for a picture, and drawing this takes
+    the world a thousand seconds, on a clock that the test moves. The call has its outcome.
+
+    The test plays the policy's process: it sends on, in advance, that the call begins, a question
+    for a picture, and the outcome.
+    """
+    clock = [0.0]
+    monkeypatch.setattr(policy_line, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+
+    def draw(question):
+        clock[0] += 1000.0
+        return Call("answer", value=question.fields)
+
     world, supervisor = socket.socketpair()
     with world, supervisor:
         line = PolicyLine(world, read_policy("random"), limit_s=1.0)
         _, process = receive_request(supervisor)
         assert process is not None
-        supervisor.shutdown(socket.SHUT_RDWR)  # an error is not looked into
+        supervisor.close()  # no one answers, if the call should fail
         with process, contextlib.closing(line):
-            for message in (Begun(), Question(("front_rgb",)), Outcome(message="done")):
-                send(process, message)
-
-            def draw(question):
-                seconds[0] += 1000.0
-                return Call("answer", value=question.fields)
+            send(process, Begun())
+            send(process, Question(("front_rgb",)))
+            send(process, Outcome(message="done"))
 
             outcome = line.call(Call("act"), draw)
 
-            assert outcome.message == "done"
-            assert [receive_call(process).method for _ in range(2)] == ["act", "answer"]
+            received = [receive_call(process).method, receive_call(process).method]
+
+    assert outcome.message == "done"
+    assert received == ["act", "answer"]
 
 
 def test_a_frozen_process_is_noticed_although_it_had_sent_many_answers_in_advance(
-    host_pool_of_test, begun_policy
+    host_pool_of_test, begin_episode, write_policy
 ):
-    """Its answers to *are you alive?*: "!", a thousand times."""
-    text = """
-class It(hostile_policies.Hostile):
-    def reset(self, instruction, demonstration):
-        hostile_policies.host_of(sys._getframe())._supervisor.send(b"!" * 1000)
-"""
-    world = begun_policy("eager", text)
-    world.reset("Pick it.", {})
-    *_, pid = descendants(os.getpid())
-    os.kill(pid, signal.SIGSTOP)
+    """Its supervisor asks a process whether it hangs; the answer is one byte, *!*.
 
-    child_of(host_pool_of_test).check(0.1)
-
-    assert child_of(host_pool_of_test).is_over
-    world.close()
-
-
-@pytest.mark.parametrize("answer", ["nothing", "half a message", "to take in half a call"])
-def test_a_policy_that_never_begins_a_call_is_an_error_although_its_process_is_alive(
-    host_pool_of_test, write_policy, monkeypatch, answer
-):
-    text = """
-def answer_checks(supervisor, line, way):
-    if way == "half a message":
-        line.sendall((64).to_bytes(8, "big"))
-    while True:
-        time.sleep(0.05)
-        supervisor.recv(4096)
-        supervisor.send(b"!")
-        if way == "half a message":
-            line.sendall(b"0")
-        if way == "to take in half a call":
-            line.recv(1)
-class It(hostile_policies.Hostile):
-    def reset(self, instruction, demonstration):
-        host = hostile_policies.host_of(sys._getframe())
-        line = hostile_policies.line_of(host)
-        host._collect = lambda _seconds: answer_checks(host._supervisor, line, instruction)
-"""
-    world = HostedPolicy(host_pool_of_test.connect(), read_policy(write_policy("silent", text)), 0)
-    world.reset(answer, {})
-    world._line._limit_s = 0.5
-    for name, seconds in (("DRAW_S", 1.0), ("MARGIN_S", 60.0)):
-        monkeypatch.setattr(f"roboirg.runs.hosting.policy_child.{name}", seconds)
-    picture = {"front_rgb": np.zeros((2000, 2000, 3), np.uint8)}
-
-    with pytest.raises(EpisodeError, match=r"did not begin the policy's act.., though"):
-        world.act(picture)
-
-
-def test_a_message_that_arrives_byte_by_byte_is_ended_at_the_time_limit_of_a_call(begun_policy):
-    """The policy announces 1000 bytes and sends one every 0.1 s; the call may take 0.5 s.
-
-    Would find a limit that begins anew with each byte.
+    This process sends a thousand of them before it is asked, and is then stopped (SIGSTOP). Asked,
+    it has 0.1 s, and a second more, to answer; as it does not, it is ended.
     """
     text = """
-class It(hostile_policies.Hostile):
+class It(BasePolicy):
     def reset(self, instruction, demonstration):
-        line = hostile_policies.line_of(hostile_policies.host_of(sys._getframe()))
+        self.metadata = {"process": os.getpid()}
+        hostile_policies.host_process()._supervisor.send(b"!" * 1000)
+"""
+    world = begin_episode(write_policy("eager", text))
+    world.reset("Pick it.", {})
+    os.kill(world.metadata["process"], signal.SIGSTOP)
+
+    process_in(host_pool_of_test).check(0.1)
+
+    assert process_in(host_pool_of_test).is_over
+
+
+@pytest.mark.parametrize(
+    ("at_first", "after_each_check"),
+    [
+        ("pass", "pass"),
+        ("line.sendall((64).to_bytes(8, 'big'))", "line.sendall(b'0')"),
+        ("pass", "line.recv(1)"),
+    ],
+    ids=["says nothing", "sends one of 64 bytes at a time", "takes in one byte at a time"],
+)
+def test_a_policy_that_never_begins_a_call_is_an_error_although_its_process_is_alive(
+    begin_episode, write_policy, monkeypatch, at_first, after_each_check
+):
+    """A process should receive a call and say that it begins. After the policy's reset() this one
+    does nothing any more but to answer *!* whenever its supervisor asks whether it hangs: its
+    method `_collect`, which receives calls, is replaced. It may send or take in a byte each time.
+
+    A call may take 0.5 s here (from the reset on, as to start takes longer) and then wait as long
+    as other episodes may need: 0.5 s, and 1 s in which their world draws. (MARGIN_S gives a busy
+    machine time for the answer.) The call is of 12 MB, more than a line holds.
+    """
+    text = f"""
+class It(BasePolicy):
+    def reset(self, instruction, demonstration):
+        self.metadata = {{}}
+        host = hostile_policies.host_process()
+        line = hostile_policies.line_to_world()
+        def only_answer_checks(_seconds):
+            {at_first}
+            while True:
+                time.sleep(0.05)
+                host._supervisor.recv(4096)
+                host._supervisor.send(b"!")
+                {after_each_check}
+        host._collect = only_answer_checks
+"""
+    world = begin_episode(write_policy("silent", text))
+    world.reset("Pick it.", {})
+    world._line._limit_s = 0.5
+    monkeypatch.setattr("roboirg.runs.hosting.policy_child.DRAW_S", 1.0)
+    monkeypatch.setattr("roboirg.runs.hosting.policy_child.MARGIN_S", 60.0)
+
+    with pytest.raises(EpisodeError, match=r"did not begin the policy's act.., though"):
+        world.act({"front_rgb": np.zeros((2000, 2000, 3), np.uint8)})
+
+
+def test_a_message_that_arrives_byte_by_byte_is_ended_at_the_time_limit_of_a_call(
+    begin_episode, write_policy
+):
+    """In its reset() the policy sends a message of its own to the world: it announces 1000 bytes,
+    and sends one of them every 0.1 s.
+
+    The limit of 0.5 s for a call does not begin anew with each byte. (It is set after the start,
+    which takes longer.)
+    """
+    text = """
+class It(BasePolicy):
+    def reset(self, instruction, demonstration):
+        line = hostile_policies.line_to_world()
         line.sendall((1000).to_bytes(8, "big"))
         while True:
             time.sleep(0.1)
             line.sendall(b"0")
 """
-    world = begun_policy("piecemeal", text)
+    world = begin_episode(write_policy("piecemeal", text))
     world._line._limit_s = 0.5
 
     with pytest.raises(EpisodeError, match=r"did not return within 0[.]5 s"):
         world.reset("slowly", {})
 
 
-def test_a_message_that_begins_before_its_call_loses_the_episode(begun_policy):
-    """It announces 1,000 bytes after the outcome of a call, and sends nothing of them."""
+def test_a_message_that_begins_before_its_call_loses_the_episode(begin_episode, write_policy):
+    """A message begins with its length in 8 bytes. Right behind the outcome of each call, this
+    policy announces another message, of 1,000 bytes: it has replaced the function `send`, with
+    which its process sends the outcome.
+
+    So the announcement comes before the next call begins, and may be due to any episode that shares
+    the process: this one is lost, which is no error.
+    """
     text = """
 from roboirg.runs.hosting import host_process
 from roboirg.runs.hosting.messages import Outcome, send
-class It(hostile_policies.Hostile):
+class It(BasePolicy):
     def reset(self, instruction, demonstration):
-        def reply(line, message):
+        self.metadata = {}
+        def send_too_much(line, message):
             send(line, message)
             if isinstance(message, Outcome):
                 line.sendall((1000).to_bytes(8, "big"))
-        host_process.send = reply
+        host_process.send = send_too_much
 """
-    world = begun_policy("early", text)
-    world.reset("too early", {})
+    world = begin_episode(write_policy("early", text))
+    world.reset("Pick it.", {})
 
     with pytest.raises(EpisodeLostError, match="a message of 1,000 bytes"):
-        world.reset("again", {})
+        world.act({})
 
 
 def host_pids(supervisor):
@@ -811,34 +923,42 @@ def host_pids(supervisor):
     return found
 
 
-@pytest.mark.slow
-def test_a_run_whose_processes_are_killed_at_random_has_the_same_records_in_the_end(tmp_path):
-    """Killed are policies' processes, workers, and the run itself, which is then begun again."""
-    folder = tmp_path / "killed"
-    folder.mkdir()
-    undisturbed = records_by_job(hosting_fakes.KILLED_PLAN, tmp_path / "undisturbed", InProcess())
-    command = [sys.executable, hosting_fakes.__file__, str(folder)]
+def kill_at_random(command, folder, times):
+    """Begin a run, and kill one of its processes at random moments: a policy's process, a worker,
+    or the run itself, which is then begun again. Return how many were killed.
+    """
     rng = random.Random(0)
     kills = 0
-
-    child = subprocess.Popen(command)
-    for _ in range(NUMBER_OF_KILLS):
+    run = subprocess.Popen(command)
+    for _ in range(times):
         time.sleep(rng.uniform(0.1, 1.5))
-        if child.poll() is not None:
-            child = subprocess.Popen(command)
+        if run.poll() is not None:
+            run = subprocess.Popen(command)
             continue
         workers = [pid for pid in worker_pids(folder) if is_alive(pid)]
-        victims = rng.choice([host_pids(child.pid), workers, [child.pid]])
-        for victim in victims[:1]:
-            with contextlib.suppress(ProcessLookupError):  # it has just ended
-                os.kill(victim, signal.SIGKILL)
-                kills += 1
-    child.wait()
-    for _ in range(5):  # what ended in an error is played again
-        done = subprocess.run(command, check=False)
-        outcomes = {record.outcome for record in read_records(folder)}
-        if done.returncode == 0 and "error" not in outcomes:
-            break
+        victims = rng.choice([host_pids(run.pid), workers, [run.pid]])
+        with contextlib.suppress(ProcessLookupError, IndexError):  # it has just ended, or is none
+            os.kill(victims[0], signal.SIGKILL)
+            kills += 1
+    run.wait()
+    return kills
+
+
+@pytest.mark.slow
+def test_a_run_whose_processes_are_killed_at_random_has_the_same_records_in_the_end(tmp_path):
+    """Killed are policies' processes, workers, and the run itself, at random moments; then the run
+    is begun again up to five times, as episodes that ended in an error are played again.
+
+    Its records are those of a run of the same plan that nothing disturbed, and no worker is left.
+    """
+    folder = tmp_path / "killed"
+    folder.mkdir()
+    command = [sys.executable, hosting_fakes.__file__, str(folder)]
+    undisturbed = records_by_job(hosting_fakes.KILLED_PLAN, tmp_path / "undisturbed", InProcess())
+
+    kills = kill_at_random(command, folder, NUMBER_OF_KILLS)
+    for _ in range(5):
+        subprocess.run(command, check=False)
 
     found = {record.identity: comparable(record) for record in read_records(folder)}
     assert found == undisturbed
@@ -849,40 +969,48 @@ def test_a_run_whose_processes_are_killed_at_random_has_the_same_records_in_the_
 def test_an_episode_whose_policy_ends_between_calls_is_repeated_and_then_an_error(
     tmp_path, monkeypatch, write_policy, capfd
 ):
-    spec = write_policy(
-        "deserter",
-        """
+    """The policy ends its process (exit code 5) 0.6 s after the reset. By then act() has returned,
+    as it does at once, and the world is at work on its actions, for 2 s.
+
+    No call is to blame, so the episode is played again. It may be lost twice here (`MAX_LOSSES`):
+    the second attempt is an error. What the policy printed is printed again, for the episode's log.
+    """
+    text = """
 import threading
-class It:
-    cameras = ()
+class It(BasePolicy):
     def reset(self, instruction, demonstration):
-        print("last words")
-        threading.Timer(0.6, lambda: os._exit(5)).start()  # between two calls
         self.metadata = {}
+        print("last words")
+        threading.Timer(0.6, os._exit, [5]).start()
     def act(self, observation):
         return np.ones((1, 8))
-""",
-    )
+"""
     monkeypatch.setattr("roboirg.runs.play.rollout.MAX_LOSSES", 2)
-    plan = fake_world_plan(spec, 1)
+    plan = fake_world_plan(write_policy("deserter", text), 1)
     runner = fake_world_runner(plan, tmp_path, seconds=2.0)
 
     (record,) = InProcess().run(deque(plan.jobs()), runner)
 
     assert (record.outcome, record.error, record.attempt) == ("error", "policy", 2)
     assert "the process ended with exit code 5" in str(record.cause)
-    assert "last words" in capfd.readouterr().err  # in a worker, of the episode's log
+    assert "last words" in capfd.readouterr().err
 
 
 def test_a_worker_is_served_while_idle_clients_may_still_send_their_key(tmp_path, monkeypatch):
-    """On a machine of a Ray cluster, where they may be silent for longer than this test lasts."""
+    """On each machine of a Ray cluster an agent has the policies' processes. Who connects to it
+    sends the key of the run first, within `KEY_S` seconds.
+
+    One client connects and stays silent, for which it has an hour here. A worker that connects
+    after it is served all the same: its policy answers that it was not called so far.
+    """
     monkeypatch.setattr(ray_machines, "KEY_S", 3600.0)
     agent = MachineAgent(tmp_path / "agent", HostSettings())
     address = agent.check(MachineVersions(())).hosts
 
-    with socket.socket(socket.AF_UNIX) as idle:
-        idle.connect(address.path)
+    with socket.socket(socket.AF_UNIX) as silent:
+        silent.connect(address.path)
         with address.connect() as line:
-            HostedPolicy(line, read_policy("hosting_fakes:Dice"), 0).close()
-
+            usage = HostedPolicy(line, read_policy("hosting_fakes:Dice"), 0).usage()
     agent.close()
+
+    assert usage == {"calls": 0}

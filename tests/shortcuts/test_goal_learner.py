@@ -1,5 +1,6 @@
 """Learners of words and of scenes find what is planted, and nothing where there is nothing."""
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -45,6 +46,7 @@ def episodes_with_made_up_texts(text_of, first, count):
     return found
 
 
+@functools.cache
 def share_of_right_colors(text_of):
     """Return how often each learner gets the color of 100 texts right, after it learned from 150.
 
@@ -99,18 +101,20 @@ def test_a_learner_finds_a_word_that_gives_the_color_or_its_position_away(text_o
     assert found["majority"] < 0.5
 
 
-def test_a_learner_is_at_chance_if_nothing_gives_the_color_away():
-    """Two of three colors are named, so knowing the words gives 1 of 2; the scene, 1 of 3.
+@pytest.mark.parametrize(
+    ("learner", "least", "most"),
+    [("text-only", 36, 64), ("union", 0, 64), ("scene-only", 0, 49), ("majority", 0, 49)],
+)
+def test_a_learner_is_at_chance_if_nothing_gives_the_color_away(learner, least, most):
+    """A text names two of three colors, red, green and blue, and either of the two may be meant.
 
-    Of 100 texts, 35 to 65 right are within three standard deviations (5) of one half; below 50
-    leaves as much room above a third.
+    Of 100 texts a learner that sees the text, alone or with the scene (union), gets 50 right by
+    chance, as it can leave out the third color. One that sees the scene alone, or nothing
+    (majority), gets 33. Chance varies with a standard deviation of 5, of which three are allowed.
     """
-    found = share_of_right_colors(color_not_given_away)
+    right = 100 * share_of_right_colors(color_not_given_away)[learner]
 
-    assert 0.35 < found["text-only"] < 0.65
-    assert found["union"] < 0.65
-    assert found["scene-only"] < 0.5
-    assert found["majority"] < 0.5
+    assert least <= right <= most
 
 
 def episodes_with_instructions(first, count):
@@ -119,27 +123,40 @@ def episodes_with_instructions(first, count):
     return [(episode, instruct(episode, "direct")) for episode in episodes]
 
 
-def test_a_learner_without_words_finds_what_the_scene_gives_away():
-    """In the video the robot moves the cube that the goal asks for, which shows its color.
+@functools.cache
+def goals_and_guesses_from_scenes():
+    """Return the goals of 80 episodes, and what a learner guesses that sees their scenes alone.
 
-    So all 80 colors are right. The relation (before or after the press) is not shown: 1 of 2, so
-    40 of 80, and 25 to 55 are within four standard deviations (4.5).
+    It has learned from 100 others. In the task the goal is a color and *before* or *after*.
     """
     learner = GoalLearner(
         episodes_with_instructions(1000, 100), episodes_with_instructions(5000, 40)
     )
     told = episodes_with_instructions(9000, 80)
     wordless = [LearnerInput.of(episode)._replace(text="", candidates={}) for episode in told]
+    goals = [episode.goal for episode, _ in told]
+    return goals, learner.guesses("scene-only", wordless)
 
-    guesses = learner.guesses("scene-only", wordless)
 
-    right_colors = 0
-    right_relations = 0
-    for (episode, _), guess in zip(told, guesses, strict=True):
-        right_colors += guess["color"] == ((episode.goal["color"],),)
-        right_relations += guess["relation"] == ((episode.goal["relation"],),)
-    assert right_colors == 80
-    assert 24 < right_relations < 56
+def test_a_learner_without_words_finds_a_color_that_the_scene_gives_away():
+    """In the video of this task the robot moves the cube that the goal asks for. Its color is thus
+    in the scene, and a learner that sees no words gets it right in all 80 episodes."""
+    goals, guesses = goals_and_guesses_from_scenes()
+
+    assert [guess["color"] for guess in guesses] == [((goal["color"],),) for goal in goals]
+
+
+def test_a_learner_without_words_is_at_chance_for_what_the_scene_does_not_show():
+    """The goal asks for a place *before* or *after* a press of the button, which nothing in the
+    scene tells: of 80 episodes 40 are right by chance, which varies with a standard deviation of
+    4.5. Four of these are allowed, as the learner's own errors add to it."""
+    goals, guesses = goals_and_guesses_from_scenes()
+
+    right = 0
+    for goal, guess in zip(goals, guesses, strict=True):
+        right += guess["relation"] == ((goal["relation"],),)
+
+    assert 40 - 18 < right < 40 + 18
 
 
 FACTS_TASKS = (TASK, "BinFill", "StopCube", "VideoUnmaskSwap")

@@ -23,27 +23,20 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct, instruct_with
 from roboirg.language.settings import settings_of
 from roboirg.main import app
-from roboirg.shortcuts import SURFACE_RULES, draw_goal, goal_share, guess_goal
 from roboirg.shortcuts.goal_learner import LEARNED_FLOORS
 from roboirg.shortcuts.goal_vocabulary import goal_vocabulary
 from roboirg.shortcuts.shortcut_scores import (
-    CHANCE,
     counted_positions,
     counted_slots,
-    hidden_slots,
     rule_scores,
     score_chance,
     score_guess,
     score_rule,
 )
-from roboirg.shortcuts.shortcut_tables import (
-    Excess,
-    ShortcutRow,
-    excess_text,
-    shortcut_rows,
-    shortcut_table,
-)
-from roboirg.shortcuts.text_guess import slot_share
+from roboirg.shortcuts.shortcut_shares import Excess, ShortcutRow
+from roboirg.shortcuts.shortcut_tables import excess_text, shortcut_rows, shortcut_table
+from roboirg.shortcuts.surface_rules import SURFACE_RULES
+from roboirg.shortcuts.text_guess import draw_goal, goal_share, guess_goal, slot_share
 from roboirg.tasks import get_task, goals_of
 from roboirg.tasks.splits.splits import get_episode
 
@@ -267,16 +260,15 @@ def instructions_of(task, setting):
 
 @each_task
 def test_a_rule_is_scored_on_the_slots_of_the_goal_that_the_words_hide(task):
-    """A slot is a part of the goal, such as its color.
-
-    `told` is an episode with its instruction. The score has a share for each hidden slot, and for
-    the whole goal one from 0 to 1.
-    """
+    """A slot is a part of the goal, such as its color; `counted_slots` has those whose values an
+    instruction does not state. For two episodes in every setting and form, each rule gets a share
+    of right values, 0 to 1, for just these slots, and one for the goal as a whole."""
     for setting in settings_of(get_task(task)):
         for told in instructions_of(task, setting):
+            _, said = told
             for score in rule_scores(told).values():
-                assert tuple(score.slots) == counted_slots(told), told[1].text
-                assert 0 <= score.goal <= 1, told[1].text
+                assert tuple(score.slots) == counted_slots(told), said.text
+                assert all(0 <= share <= 1 for share in (score.goal, *score.slots.values()))
 
 
 @each_task
@@ -297,14 +289,21 @@ def test_elimination_is_right_if_the_command_names_every_value(task, setting):
 
 
 def test_in_a_known_episode_the_first_mention_is_right_and_elimination_wrong():
-    """*I'm supposed to test the target the robot used right after pressing the button. Put the
-    green cube there.* Hidden is which target: *after*."""
+    """Hidden is to which of two targets, the one used *before* or *after* the press. The text names
+    *after*, which is right: "first-mention" guesses what is named first, and "elimination" what is
+    not named."""
     episode = get_episode("VideoPlaceButton", "test", 0)
-    told = episode, instruct(episode, "direct")
+    said = instruct(episode, "direct")
 
-    assert hidden_slots(told) == ("relation",)
-    assert score_rule("first-mention", told).slots == {"relation": 1}
-    assert score_rule("elimination", told).slots == {"relation": 0}
+    first_mention = score_rule("first-mention", (episode, said))
+    elimination = score_rule("elimination", (episode, said))
+
+    assert said.text == (
+        "I'm supposed to test the target the robot used right after pressing the button. Put the "
+        "green cube there."
+    )
+    assert first_mention.slots == {"relation": 1}
+    assert elimination.slots == {"relation": 0}
 
 
 def test_an_explicit_instruction_leaves_nothing_to_chance():
@@ -330,22 +329,35 @@ def test_a_guess_is_scored_by_the_share_of_the_goals_three_values_that_it_gets_r
     assert slot_share({"colors": guessed}, "colors", ("red", "green", "red"), range(3)) == share
 
 
-@pytest.mark.parametrize("hidden", [0, 1], ids=["first", "second"])
-def test_of_two_containers_one_of_which_is_named_only_the_other_is_scored(hidden):
-    """It is described by its place: a draw from three colors is right in 1/3, chance in 1/2.
+def episodes_that_hide(hidden):
+    """Return episodes with two colors in their goal, and spatial words that name all but one.
 
-    The color of the other one is stated, so that every guess has it.
+    The hidden one is the first (0) or the second (1) of the goal; its container is described by its
+    place.
     """
-    scored = 0
+    found = []
     for episode in first_episodes("ButtonUnmaskSwap", "test", 50):
         told = episode, instruct(episode, "spatial")
         if len(episode.goal["colors"]) == 2 and counted_positions(told)["colors"] == [hidden]:
-            guess = [(color,) for color in episode.goal["colors"]]
-            guess[hidden] = COLORS
-            assert score_guess({"colors": guess}, told).slots == {"colors": Fraction(1, 3)}
-            assert score_chance(told).slots == {"colors": Fraction(1, 2)}
-            scored += 1
-    assert scored
+            found.append(told)
+    return found
+
+
+@pytest.mark.parametrize("hidden", [0, 1], ids=["first", "second"])
+def test_of_two_containers_one_of_which_is_named_only_the_other_is_scored(hidden):
+    """The goal has two of three colors. A guess has the named one right, and for the hidden one all
+    three colors, of which one is right: it scores 1/3, as the named one does not count. Chance is
+    1/2, as the two colors of a goal differ, so two are left."""
+    instructions = episodes_that_hide(hidden)
+    assert instructions
+
+    for told in instructions:
+        episode, _ = told
+        guess = [(color,) for color in episode.goal["colors"]]
+        guess[hidden] = ("blue", "green", "red")
+
+        assert score_guess({"colors": guess}, told).slots == {"colors": Fraction(1, 3)}
+        assert score_chance(told).slots == {"colors": Fraction(1, 2)}
 
 
 def test_only_the_parts_of_a_goal_that_a_text_touches_are_scored():
@@ -369,15 +381,24 @@ def spatial_instructions(names_a_color):
     return found
 
 
-def test_words_for_a_place_give_a_color_away_only_if_they_name_another_cube():
-    """*Left of the red one*: elimination draws from two colors, and other rules guess red."""
-    told = spatial_instructions(names_a_color=True)
+@pytest.mark.parametrize(
+    ("rule", "share"),
+    [
+        ("first-mention", 0),
+        ("last-mention", 0),
+        ("surface", 0),
+        ("elimination", Fraction(1, 2)),
+    ],
+)
+def test_words_for_a_place_that_name_another_cube_rule_its_color_out(rule, share):
+    """Of three colors the goal is one; the words describe its cube by another one, such as *left of
+    the red one*. Rules that guess what is named guess red, which is wrong; elimination guesses what
+    is not named, one of two colors, and is right half of the time."""
+    instructions = spatial_instructions(names_a_color=True)
+    assert instructions
 
-    assert 0 < len(told) < 25
-    for episode_and_words in told:
-        for rule in SURFACE_RULES:
-            share = Fraction(1, 2) if rule == "elimination" else 0
-            assert score_rule(rule, episode_and_words).slots == {"color": share}
+    for told in instructions:
+        assert score_rule(rule, told).slots == {"color": share}
 
 
 @pytest.mark.parametrize("rule", SURFACE_RULES)
@@ -412,14 +433,20 @@ def test_rows_by_task_have_the_task_in_their_name():
 
 
 def test_rows_by_slot_add_up_to_the_row_of_all_instructions():
-    """The chance level of all hidden slots is the mean of those of the rows by slot."""
+    """A goal of BinFill has two slots, colors and counts, and an instruction may hide one or both.
+    In a table by slot each has a row, with the number of instructions that hide it and the share
+    that chance gets right. Their mean, weighted by that number, is the share of the table's only
+    row if it is not divided."""
     (whole,) = rows_by(None)
-    rows = rows_by("slot")
+    colors, counts = sorted(rows_by("slot"), key=lambda row: row.group)
 
-    assert {row.group[1] for row in rows} == {"BinFill colors", "BinFill counts"}
-    by_chance = sum(row.count * row.shares[CHANCE].slots for row in rows)
-    hidden = sum(row.count for row in rows)
-    assert by_chance / hidden == pytest.approx(whole.shares[CHANCE].slots)
+    right = colors.count * colors.shares["chance"].slots
+    right += counts.count * counts.shares["chance"].slots
+
+    assert colors.group == ("reasoning", "BinFill colors")
+    assert counts.group == ("reasoning", "BinFill counts")
+    share = right / (colors.count + counts.count)
+    assert share == pytest.approx(whole.shares["chance"].slots)
 
 
 def shortcuts_command(*words):
@@ -450,16 +477,27 @@ def test_how_far_a_shortcut_exceeds_chance_is_printed_with_sign_and_interval(val
     assert excess_text(Excess(value, 0.02), 1) == text
 
 
-def test_the_caption_of_a_table_names_the_adjustment_of_its_intervals():
-    """Two rows with an interval are two comparisons with chance; that of 49 texts has none."""
-    counts = {"direct": 50, "spatial": 80, "grounded": 49}
-    rows = [ShortcutRow((name,), count, {}, Excess(0.1, 0.02)) for name, count in counts.items()]
+def table_of_rows(**texts):
+    """Return a table of shortcuts with rows of so many texts, each 0.1 above chance."""
+    excess = Excess(0.1, 0.02)
+    rows = [ShortcutRow((name,), count, {}, excess) for name, count in texts.items()]
+    return shortcut_table(rows, "Shortcuts")
 
-    table = shortcut_table(rows, "Shortcuts")
+
+def test_the_caption_of_a_table_names_the_adjustment_of_its_intervals():
+    """An interval needs 50 texts, so two of three rows have one. Each compares a shortcut with
+    chance, so intervals are adjusted for two comparisons."""
+    table = table_of_rows(direct=50, spatial=80, grounded=49)
 
     assert "95 % intervals, Bonferroni-adjusted for 2 rows;" in str(table.caption)
-    *_, excesses = table.columns
-    assert list(excesses.cells)[-1] == "+10.0 (too few texts)"
+
+
+def test_a_row_of_fewer_than_50_texts_has_no_interval():
+    """The last column is how far a shortcut exceeds chance: here by 0.1, in points, without an
+    interval."""
+    *_, excesses = table_of_rows(grounded=49).columns
+
+    assert list(excesses.cells) == ["+10.0 (too few texts)"]
 
 
 @pytest.mark.parametrize(
@@ -483,6 +521,8 @@ def test_a_wrong_option_of_the_shortcuts_command_is_one_sentence(words, sentence
 
 
 def test_without_scikit_learn_the_learned_floors_are_refused_with_what_to_install(monkeypatch):
+    """Importing scikit-learn's networks fails, as where it is not installed. The learners need
+    them; the extra `report` brings them."""
     monkeypatch.setitem(sys.modules, "sklearn.neural_network", None)
     outcome = shortcuts_command("--tasks", "StopCube", "--learned")
 

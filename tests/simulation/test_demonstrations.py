@@ -2,7 +2,6 @@
 
 import dataclasses
 import pickle
-import sys
 import weakref
 from typing import Any, NamedTuple
 
@@ -107,24 +106,31 @@ def check_same(first, second):
         assert np.array_equal(value, second[key]), key
 
 
+def states_of_demonstration(session, recording=None):
+    """Play the demonstration of a session, as recorded if a recording is given.
+
+    Returns a recording of it, and a hash of the state at each moment of its video.
+    """
+    states = []
+    played = session.play_demonstration(lambda _: states.append(session.state_hash()), recording)
+    return played, states
+
+
 @pytest.mark.parametrize("task", slow_but((SHORT, "VideoRepick"), VIDEO_TASKS))
 def test_replaying_a_recorded_demonstration_gives_bit_identical_states(task):
     """One session plans the robot's motions, the other repeats the recorded actions, which went
-    through bytes. All hashes of the state, one for each moment of the video, the hash at the
-    end, and the events must be the same."""
-    planned = EpisodeSession(get_episode(task, "test", 3), visible=False)
-    replayed = EpisodeSession(get_episode(task, "test", 3), visible=True)
-    states = []
-    states_again = []
-    recording = planned.play_demonstration(lambda _: states.append(planned.state_hash()))
+    through bytes, and has cameras. All hashes of the state, one for each moment of the video, the
+    hash at the end, and the events must be the same."""
+    episode = get_episode(task, "test", 3)
+    planned = EpisodeSession(episode, visible=False)
+    replayed = EpisodeSession(episode, visible=True)
 
+    recording, states = states_of_demonstration(planned)
     restored = Recording.from_bytes(recording.to_bytes())
-    again = replayed.play_demonstration(
-        lambda _: states_again.append(replayed.state_hash()), restored
-    )
+    again, states_again = states_of_demonstration(replayed, restored)
 
     assert states_again == states
-    assert len(states) == restored.video_length(planned.episode)
+    assert len(states) == restored.video_length(episode)
     assert again.end == recording.end == restored.end
     assert replayed.events == planned.events
 
@@ -150,20 +156,15 @@ def test_after_a_replay_random_actions_lead_to_the_same_state_as_after_planning(
     ("task", "every"), slow_but([(SHORT, 3)], [(SHORT, 3), ("VideoPlaceOrder", 60)])
 )
 def test_video_pictures_read_after_the_policy_acted_show_the_demonstration(task, every):
-    """Pictures are drawn only when they are read, by replaying the demonstration.
-
-    Of the video every third, or sixtieth, moment has a picture, from the first one on.
-    """
-    steps = []
-    front = []
-    wrist = []
+    """A hook takes a picture with both cameras at each moment of the video while it is played. The
+    video that the reset returns has pictures of every third, or sixtieth, moment, which are drawn
+    when they are read: here after the robot has moved and the environment was closed."""
+    taken = {"front_rgb": [], "wrist_rgb": []}
 
     def take_pictures(env, is_demonstration):
         if is_demonstration:
-            if len(steps) % every == 0:
-                front.append(env.picture("front"))
-                wrist.append(env.picture("wrist"))
-            steps.append(env.session.world.elapsed)
+            taken["front_rgb"].append(env.picture("front"))
+            taken["wrist_rgb"].append(env.picture("wrist"))
 
     env = roboirg.make(task, episode=1, demonstration_frames=every)
     env.set_frame_hook(take_pictures)
@@ -173,9 +174,9 @@ def test_video_pictures_read_after_the_policy_acted_show_the_demonstration(task,
 
     video = info["demonstration"]
 
-    assert np.array_equal(video["front_rgb"], front)
-    assert np.array_equal(video["wrist_rgb"], wrist)
-    assert video.length == len(steps) == len(video["gripper"])
+    assert video.length == len(taken["front_rgb"]) == len(video["gripper"])
+    for key, pictures in taken.items():
+        assert np.array_equal(video[key], pictures[::every]), key
 
 
 def test_depth_and_calibration_of_the_video_are_those_of_its_moments():
@@ -244,24 +245,40 @@ def test_reading_a_camera_draws_all_its_pictures_in_one_replay(cameras_drawn, re
     assert video["wrist_rgb"] is wrist
 
 
+def video_of_which_the_wrist_was_read():
+    """Return a video of 14 pictures from each of two cameras, after those of the wrist were read.
+
+    It has 66 moments, every fifth of which has pictures.
+    """
+    video = reset(cameras=("front", "wrist"), depth=True, demonstration_frames=5).video
+    assert video["wrist_rgb"].shape == (14, 256, 256, 3)
+    return video
+
+
 def test_drawing_a_video_draws_what_was_not_read_and_nothing_twice(cameras_drawn, replays):
-    """Every fifth of 66 moments has a picture: 14 of each camera. Those of the wrist were read
-    before, so `draw` has only the front ones to draw, in one replay; a second `draw` has nothing
-    to do."""
-    options = {"cameras": ("front", "wrist"), "depth": True, "demonstration_frames": 5}
-    read_at_once = dict(reset(**options).video)
-    video = reset(**options).video
-    wrist = video["wrist_rgb"]
+    """Reading the pictures of the wrist camera has drawn them. `draw` has only the 14 of the front
+    camera to draw, for which it plays the video again, once; a second `draw` has nothing to do. The
+    fixtures note the camera of each picture that is drawn, and each time the video is played."""
+    video = video_of_which_the_wrist_was_read()
     cameras_drawn.clear()
     replays.clear()
 
     video.draw()
     video.draw()
 
-    assert (len(replays), cameras_drawn) == (1, ["front"] * 14)
+    assert cameras_drawn == ["front"] * 14
+    assert len(replays) == 1
     assert "not drawn" not in repr(video)
-    assert video["wrist_rgb"] is wrist
-    check_same(dict(video), read_at_once)
+
+
+def test_a_video_that_was_drawn_has_the_same_arrays_as_one_that_was_read():
+    """One is drawn as a whole after its wrist camera was read, the other is read array by array."""
+    drawn = video_of_which_the_wrist_was_read()
+    read = video_of_which_the_wrist_was_read()
+
+    drawn.draw()
+
+    check_same(dict(drawn), dict(read))
 
 
 class Viewer:
@@ -291,9 +308,9 @@ def record_of_viewer(folder):
 
 
 def test_a_run_records_the_same_with_an_empty_a_filled_and_no_cache(cache, tmp_path, monkeypatch):
-    """The policy acts on the pictures of the video, which come from the simulator at first and from
-    the cache afterwards. A wrong picture would change its actions and so the record."""
-    monkeypatch.setitem(sys.modules, __name__, sys.modules[__name__])
+    """The policy acts on the pictures of a video of 66 steps, which come from the simulator at
+    first and from the cache afterwards. A wrong picture would change its actions and so the
+    record."""
     with_empty_cache = record_of_viewer(tmp_path)
     with_filled_cache = record_of_viewer(tmp_path)
     monkeypatch.setenv("ROBOIRG_CACHE", "off")
@@ -330,25 +347,30 @@ def test_with_a_filled_cache_no_picture_of_the_video_is_drawn(
     check_same(again, first)
 
 
-@pytest.mark.parametrize(
-    ("task", "source", "recordings"),
-    [(SHORT, "planned", 1), ("VideoRepick", "recorded", 0)],
-)
-def test_a_reset_from_the_cache_equals_one_that_plans_the_demonstration(
-    task, source, recordings, cache, forbid_planning
-):
-    """After the first reset, planning is forbidden: the second one has to read the cache.
+def test_only_a_demonstration_that_was_planned_is_recorded_in_the_cache(cache):
+    """`cache` is the folder of an empty cache. The robot's motions in VideoUnmask are planned, and
+    written there in less than 200 kB; those in VideoRepick come recorded with the benchmark."""
+    planned = reset("VideoUnmask").info["demonstration_source"]
+    (entry,) = cache.glob("actions/*")
+    recorded = reset("VideoRepick").info["demonstration_source"]
 
-    A recording that comes with the benchmark needs no cache.
-    """
+    assert (planned, recorded) == ("planned", "recorded")
+    assert entry.stat().st_size < 200_000
+    assert list(cache.glob("actions/*")) == [entry]
+
+
+@pytest.mark.parametrize("task", ["VideoUnmask", "VideoRepick"])
+def test_a_reset_without_planning_equals_one_that_plans_the_demonstration(
+    task, cache, forbid_planning
+):
+    """After the first reset, planning is made to fail: the second one repeats the actions that the
+    first has left in the cache or, in VideoRepick, that come with the benchmark. All that it gives
+    must be the same to the bit, and the stages of the video must count as done."""
     first = reset(task, grounded=True)
-    entries = list(cache.glob("actions/*"))
     forbid_planning()
 
     second = reset(task, grounded=True)
 
-    assert (first.info["demonstration_source"], len(entries)) == (source, recordings)
-    assert all(entry.stat().st_size < 200_000 for entry in entries)
     assert second.info == first.info
     check_same(second.observation, first.observation)
     check_same(dict(second.video), dict(first.video))
@@ -432,17 +454,20 @@ def _fingerprint_made_anew():
 
 @pytest.mark.usefixtures("_fingerprint_made_anew")
 @pytest.mark.parametrize(
-    ("name", "other"), [("_SOURCE_HASH", "another"), ("processor_features", lambda: "another")]
+    ("name", "other"),
+    [("_SOURCE_HASH", "of other code"), ("processor_features", lambda: "of another processor")],
 )
 def test_the_cache_key_of_a_demonstration_changes_with_code_and_processor(monkeypatch, name, other):
-    """A recording replays only with the same code and kind of processor, both of which are part of
-    the key. One of them is replaced by "another"."""
+    """A recording repeats the same motions only with the same code of the simulation and the same
+    kind of processor, so both are part of its key: the hash of the code, and what the processor can
+    do. One of them is replaced; what keys contain of them is computed once, so it is forgotten."""
     episode = get_episode(SHORT, "test", 1)
-    key = demonstration_cache.recording_key(episode)
-    demonstration_cache._platform_fingerprint.cache_clear()
-    monkeypatch.setattr(demonstration_cache, name, other)
+    usual_key = demonstration_cache.recording_key(episode)
 
-    assert demonstration_cache.recording_key(episode) != key
+    monkeypatch.setattr(demonstration_cache, name, other)
+    demonstration_cache._platform_fingerprint.cache_clear()
+
+    assert demonstration_cache.recording_key(episode) != usual_key
 
 
 def test_the_cache_key_of_a_demonstration_names_the_libraries_that_compute_motions():

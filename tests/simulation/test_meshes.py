@@ -1,5 +1,6 @@
 """Derived meshes: exact, cached, and unaffected by damage to the cache."""
 
+import re
 import subprocess
 import sys
 
@@ -77,12 +78,14 @@ def test_cached_meshes_take_at_most_a_sixteenth_of_the_cache(mesh_folder, monkey
 
 
 def test_meshes_that_fill_their_share_displace_no_recorded_actions(monkeypatch, mesh_folder):
-    """The cache may have 160,000 bytes, of which meshes and actions may fill 10,000 each."""
+    """The cache may have 160,000 bytes, a sixteenth of which, 10,000, is for meshes and as much for
+    recorded actions. Actions of 5,000 bytes are kept although 20 meshes of 1,600 bytes, 32,000
+    together, are written after them: these displace each other."""
     monkeypatch.setenv("ROBOIRG_CACHE_GIB", str(160_000 / 2**30))
     open_cache("actions").write("a1", bytes(5_000))
 
     for number in range(20):
-        cached_arrays("thing", bytes([number]), lambda: {"zeros": np.zeros(200)})
+        cached_arrays("thing", bytes([number]), lambda: {"zeros": np.zeros(1_600 // 8)})
 
     assert open_cache("actions").read("a1") == bytes(5_000)
 
@@ -104,29 +107,32 @@ def printed_by_a_process_that_draws():
     return done.stdout, done.stderr
 
 
+def flip_a_bit(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
 @pytest.mark.slow
 @pytest.mark.sim
 def test_damaged_cached_meshes_are_rebuilt_with_a_warning(mesh_folder):
-    """One file is cut off, in another one a bit is flipped; the picture must not change.
-
-    There are 13: ten links of the robot, what each camera sees of one of them, and the table.
-    """
+    """A process that draws leaves 13 files of meshes: of the table, of ten links of the robot, and
+    of what each of two cameras sees of link 0. The file of the table is cut off, and in one of link
+    0 a bit is flipped. The next process must draw the same picture and make both files again."""
     picture, _ = printed_by_a_process_that_draws()
     sound = {path: path.read_bytes() for path in mesh_folder.iterdir()}
     (table,) = mesh_folder.glob("table-*")
+    link, _ = sorted(mesh_folder.glob("link0-*"))
     table.write_bytes(sound[table][:-1000])
-    link = min(mesh_folder.glob("link0-*"))  # what one of the cameras sees of it
-    flipped = bytearray(sound[link])
-    flipped[len(flipped) // 2] ^= 1
-    link.write_bytes(flipped)
+    flip_a_bit(link)
 
-    again, warnings = printed_by_a_process_that_draws()
+    picture_after_damage, warnings = printed_by_a_process_that_draws()
 
-    assert again == picture
-    assert f"The cache entry {table} is damaged and will be rebuilt." in warnings
-    assert f"The cache entry {link} is damaged and will be rebuilt." in warnings
-    assert warnings.count("rebuilt") == 2
-    assert len(sound) == 13
+    assert picture_after_damage == picture
+    assert set(re.findall("entry (.*) is damaged and will be rebuilt", warnings)) == {
+        str(table),
+        str(link),
+    }
     assert {path: path.read_bytes() for path in mesh_folder.iterdir()} == sound
 
 
@@ -151,17 +157,35 @@ def test_our_reduced_table_mesh_has_the_geometry_of_the_installed_model(installe
 
 @pytest.mark.sim
 def test_what_our_table_leaves_out_of_its_material_has_no_effect(installed_table_parts):
-    """The model is everywhere equally metallic, and neither shines nor lets light through."""
+    """Our table is drawn with one number, `METALLIC`, in place of the model's texture that says how
+    metallic each point is, and without textures for emitted or transmitted light. In the installed
+    model that texture, the blue channel as always in glTF, has this number everywhere, and there
+    are none of the others."""
     material = installed_table_parts[0].material
-    metallic = material.metallic_texture.download()[..., 2]
+    blue = 2
 
-    assert (metallic == 255 * table_mesh.METALLIC).all()
+    metallic_of_255 = material.metallic_texture.download()[..., blue]
+
+    assert (metallic_of_255 == 255 * table_mesh.METALLIC).all()
     assert material.emission_texture is None
     assert material.transmission_texture is None
-    for texture in table_mesh._TEXTURES:
-        held = getattr(material, texture.field)
-        assert (held.is_srgb, held.mipmap_levels) == (texture.srgb, 1)
-        assert held.address_mode == "repeat"
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize(
+    ("name", "has_srgb_colors"),
+    [("base_color_texture", True), ("normal_texture", False), ("roughness_texture", False)],
+)
+def test_textures_of_the_installed_table_are_sampled_as_ours(
+    installed_table_parts, name, has_srgb_colors
+):
+    """Ours are made from pixels, with the renderer's defaults: one level of detail, repeated at the
+    edges. The installed model's must have the same; colors alone are encoded as sRGB."""
+    texture = getattr(installed_table_parts[0].material, name)
+
+    assert texture.is_srgb == has_srgb_colors
+    assert texture.mipmap_levels == 1
+    assert texture.address_mode == "repeat"
 
 
 def test_the_cache_key_of_a_mesh_changes_with_the_code_that_computes_it(mesh_folder, monkeypatch):

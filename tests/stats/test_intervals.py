@@ -18,14 +18,12 @@ from roboirg.stats.intervals import (
 )
 
 
-def rates_of_pairs(*, only_first, only_second, neither):
-    """Return the rates of a task of so many paired episodes with one seed.
-
-    No episode is solved by both.
-    """
-    numbers = (only_first, only_second, neither)
+def rates_of_pairs(*, only_first, only_second, neither, both=0):
+    """Return the rates of a task of so many paired episodes with one seed."""
+    numbers = (both, only_first, only_second, neither)
     # Successes and trials of the first side, then of the second.
-    return TaskRates.of(np.repeat([[1, 1, 0, 1], [0, 1, 1, 1], [0, 1, 0, 1]], numbers, axis=0))
+    rows = [[1, 1, 1, 1], [1, 1, 0, 1], [0, 1, 1, 1], [0, 1, 0, 1]]
+    return TaskRates.of(np.repeat(rows, numbers, axis=0))
 
 
 def gap_interval(*, only_first, only_second, neither):
@@ -68,20 +66,28 @@ def test_two_solved_of_50_may_be_a_rate_of_one_percent():
     assert 0.006 < low < 0.008
 
 
-def test_the_interval_of_a_gap_is_tangos_but_for_a_degree_of_freedom():
-    """Of 20 episodes, 6 are solved by the first alone and 2 by the second alone.
+def tango_statistic(gap, *, only_first, only_second, episodes):
+    """Return how many standard errors a gap of two paired rates is from the observed one.
 
-    At the ends his statistic, with n - 1 for n, is the critical value, or more where skewness moves
-    an end out.
+    As in Tango, Statistics in Medicine 17 (1998), but with a degree of freedom less.
     """
-    low, high = gap_interval(only_first=6, only_second=2, neither=12)
-    for gap in (low, high):
-        # Shares of the largest likelihood if the gap is the true one (Tango's quadratic equation).
-        linear = -(6 + 2) + (2 * 20 - 6 + 2) * gap
-        constant = -2 * gap * (1 - gap)
-        share = (np.sqrt(linear**2 - 8 * 20 * constant) - linear) / (4 * 20)
-        variance = 20 * (2 * share + gap * (1 - gap))
-        assert abs(6 - 2 - 20 * gap) / np.sqrt(variance * 20 / 19) >= critical_value() - 1e-3
+    # The share that only the second solves, most likely if the gap is the true one.
+    linear = (2 * episodes - only_first + only_second) * gap - (only_first + only_second)
+    constant = -2 * gap * (1 - gap)
+    share = (np.sqrt(linear**2 - 8 * episodes * constant) - linear) / (4 * episodes)
+    variance = episodes * (2 * share + gap * (1 - gap)) * episodes / (episodes - 1)
+    return abs(only_first - only_second - episodes * gap) / np.sqrt(variance)
+
+
+def test_the_interval_of_a_gap_is_tangos_but_for_a_degree_of_freedom():
+    """Of 20 episodes, 6 are solved by the first side alone and 2 by the second alone. Tango's score
+    interval of 95 % ends where his statistic is 1.96, the normal distribution's value. Ours ends
+    there, or further out by up to 0.2 where the outcomes are skewed; it is never shorter."""
+    interval = gap_interval(only_first=6, only_second=2, neither=12)
+
+    at_ends = [tango_statistic(end, only_first=6, only_second=2, episodes=20) for end in interval]
+
+    assert 1.959 <= min(at_ends) <= max(at_ends) < 2.16
 
 
 @pytest.mark.parametrize(
@@ -151,15 +157,12 @@ def test_one_episode_or_none_has_no_interval(cells):
     assert rate_interval(cells) is None
 
 
-def test_the_interval_of_a_ratio_holds_those_for_which_the_weighted_difference_may_be_0():
-    """Of 50 episodes both sides solve 9, the first alone 3 and the second alone 12: 12/21.
-
-    At an end of the interval the difference of the first rate and that many times the second may
-    just be 0.
-    """
-    rates = TaskRates.of(
-        np.repeat([[1, 1, 1, 1], [1, 1, 0, 1], [0, 1, 1, 1], [0, 1, 0, 1]], [9, 3, 12, 26], axis=0)
-    )
+def test_the_interval_of_a_ratio_ends_where_the_weighted_difference_may_just_be_0():
+    """Of 50 episodes the first side solves 9 + 3 and the second 9 + 12: the ratio is 12/21. Another
+    ratio r may be the true one as long as the first rate less r times the second, which is
+    `combined(1, -r)`, may be 0: at an end of the ratio's interval, the interval of that difference
+    begins or ends at 0."""
+    rates = rates_of_pairs(both=9, only_first=3, only_second=12, neither=26)
 
     low, high = ratio_interval([rates])
 
@@ -248,23 +251,29 @@ def test_more_episodes_give_a_shorter_interval_of_a_share():
     assert many.high - many.low < (few.high - few.low) / 2
 
 
-def test_the_interval_of_a_share_holds_the_true_one_in_most_simulated_runs():
-    """60 % as said, 72 % rewritten, 90 % explicit: a rewriter gains 12 of 30 points, 40 %.
+def simulated_rates(rng, *, rewritten, said, explicit):
+    """Return the rates of 50 simulated episodes of a task, if the true rates are these.
 
-    In 150 simulated runs of 50 episodes, which differ in ease, 90 % of intervals hold it; where
-    there is no interval, it counts as missed.
+    The episodes differ in ease: what is solved in one way is likelier to be so in the others.
     """
-    rng = np.random.default_rng(3)
-    # The chance that a mean of two uniform numbers is below these limits is the rate.
-    limits = 1 - np.sqrt(2 * (1 - np.array([0.72, 0.6, 0.9]))) / 2
+    ease = (rng.random((50, 1)) + rng.random((50, 3))) / 2
+    # The mean of two uniform numbers is below such a limit, of 0.5 or more, at the given rate.
+    limits = 1 - np.sqrt((1 - np.array([rewritten, said, explicit])) / 2)
+    rows = np.ones((50, 6), dtype=np.int64)  # successes and trials of the first way, and so on
+    rows[:, [0, 2, 4]] = ease < limits
+    return TaskRates.of(rows)
+
+
+def test_the_interval_of_a_share_holds_the_true_one_in_most_simulated_runs():
+    """Instructions are solved at 60 % as said, at 72 % rewritten and at 90 % as explicit commands:
+    rewriting gains 12 of 30 points, a share of 0.4. An interval of 95 % should hold it in about 95
+    of 100 runs; 90 allow for chance, and for runs with too small a gap for an interval."""
+    rng = np.random.default_rng(seed=3)
 
     runs_that_hold_it = 0
     for _ in range(150):
-        ease = rng.random((50, 1)) * 0.5 + rng.random((50, 3)) * 0.5
-        rows = np.ones((50, 6), dtype=np.int64)
-        rows[:, 0::2] = ease < limits
-        interval = share_interval([TaskRates.of(rows)])
+        interval = share_interval([simulated_rates(rng, rewritten=0.72, said=0.6, explicit=0.9)])
         if interval is not None and interval.low <= 0.4 <= interval.high:
             runs_that_hold_it += 1
 
-    assert runs_that_hold_it >= 0.9 * 150
+    assert runs_that_hold_it / 150 >= 0.9

@@ -73,28 +73,43 @@ def test_a_task_of_another_package_has_the_settings_but_spatial(task):
 
 
 def test_the_instructions_of_a_task_of_another_package_mean_its_goals(task):
-    """*Understood* are the goals that a command leaves open."""
+    """The fixture has registered the documentation's task, "PlaceAndPress". Of eight episodes every
+    instruction that its words can express is read by the interpreter, which returns the goals that
+    the words leave open: of a good instruction that is the episode's own and no other."""
+    instructions = 0
     for index in range(8):
         episode = get_episode(OUTSIDE_TASK, "test", index)
         for options in expressible_options(episode):
             said = instruct_with(episode, options)
+            instructions += 1
 
             assert understood_goals(said, episode) == (episode.goal,), said.text
 
+    assert instructions >= 8
 
-def test_planning_a_run_of_a_task_without_a_file_of_words_is_refused(task, monkeypatch):
+
+@pytest.fixture
+def _task_without_words(task, monkeypatch):
     """The documentation's task is registered again without the file that has its words, and what
     was read of such files is forgotten."""
-    read = scenario_file.task_scenarios.__wrapped__
-    # Undone before the fixture puts the registry back.
+    without_words = replace(task, words="")
+    read_anew = scenario_file.task_scenarios.__wrapped__
+    # Undone before the fixture `task` puts the registry back.
     with monkeypatch.context() as patch:
-        patch.setattr(tasks, "_registry", lambda: (replace(task, words=""),))
-        patch.setattr(scenario_file, "task_scenarios", read)
+        patch.setattr(tasks, "_registry", lambda: (without_words,))
+        patch.setattr(scenario_file, "task_scenarios", read_anew)
         tasks.all_tasks.cache_clear()
-        with pytest.raises(
-            RoboIRGError, match=rf"{OUTSIDE_TASK} names no file of words \(write one, see"
-        ):
-            make_plan(["random"], tasks=OUTSIDE_TASK, episodes="1")
+        yield
+
+
+@pytest.mark.usefixtures("_task_without_words")
+def test_planning_a_run_of_a_task_without_a_file_of_words_is_refused():
+    """The fixture has registered the documentation's task, "PlaceAndPress", without the name of a
+    file of words: there would be nothing to tell a policy."""
+    message = r"PlaceAndPress names no file of words \(write one, see"
+
+    with pytest.raises(RoboIRGError, match=message):
+        make_plan(["random"], tasks="PlaceAndPress", episodes="1")
 
 
 def test_a_failure_in_a_task_of_another_package_has_a_readable_cause(task):

@@ -142,16 +142,37 @@ def names_moved(motion):
     raise AssertionError(motion)
 
 
-@each_task
-def test_stages_point_at_and_handle_only_objects_of_the_scene(task):
-    """The facts of stages are checked wherever an episode is made."""
+def stages_of(task):
+    """Yield all stages of a task's episodes, those of videos first, each after its episode."""
     for episode in episodes(task):
-        objects = {item.name for item in episode.scene.objects}
         for stage in (*episode.demonstration, *episode.stages):
-            handled = {stage.primitive.subject, stage.primitive.place, stage.points_at}
-            assert handled <= objects | {"robot", None}, episode.key
-            assert stage.expects not in stage.forbids, episode.key
-            assert ("{at}" in stage.subgoal) == (stage.points_at is not None), episode.key
+            yield episode, stage
+
+
+@each_task
+def test_stages_handle_and_point_at_only_objects_of_the_scene(task):
+    """A stage has a motion primitive, such as to place something at a place, and may point at an
+    object in its words. All these names must be of the scene; a primitive without an object has
+    the name of the robot."""
+    for episode, stage in stages_of(task):
+        names = {stage.primitive.subject, stage.primitive.place, stage.points_at}
+        objects = {item.name for item in episode.scene.objects}
+        assert names <= objects | {"robot", None}, episode.key
+
+
+@each_task
+def test_no_stage_forbids_the_fact_that_completes_it(task):
+    """A stage ends with the fact that it expects, and fails with one that it forbids."""
+    for episode, stage in stages_of(task):
+        assert stage.expects not in stage.forbids, episode.key
+
+
+@each_task
+def test_the_words_of_a_stage_have_a_place_for_a_pixel_if_it_points_at_something(task):
+    """In a subgoal such as "pick up the cube {at}", the pixel of the object at which the stage
+    points takes the place of `{at}`."""
+    for episode, stage in stages_of(task):
+        assert ("{at}" in stage.subgoal) == (stage.points_at is not None), episode.key
 
 
 @each_task
@@ -242,11 +263,10 @@ def test_objects_lie_on_the_table(task):
 def test_objects_to_handle_are_within_the_robot_s_reach(task):
     """0.85 m from its base, in the plane. Its own reach is 0.855; the farthest corner of all
     regions in which things are placed is 0.815 away."""
-    for episode in episodes(task):
-        for stage in (*episode.demonstration, *episode.stages):
-            for name in {stage.primitive.subject, stage.primitive.place} - {None, "robot"}:
-                place = episode.scene[name].position
-                assert math.dist(place[:2], ROBOT_BASE[:2]) <= 0.85, (episode.key, name)
+    for episode, stage in stages_of(task):
+        for name in {stage.primitive.subject, stage.primitive.place} - {None, "robot"}:
+            place = episode.scene[name].position
+            assert math.dist(place[:2], ROBOT_BASE[:2]) <= 0.85, (episode.key, name)
 
 
 @each_task

@@ -37,8 +37,8 @@ class PolicyWithFixedWaypoints(LearnedPolicy):
         return self.left.pop(0)
 
 
-class PolicyGuidedByExpert(PolicyWithFixedWaypoints):
-    """Returns the expert's waypoints, to be rehearsed."""
+class ExpertThatNotesItsWaypoints(PolicyWithFixedWaypoints):
+    """Acts as the expert does, and keeps its waypoints, pictures and poses of the tool."""
 
     def __init__(self):
         super().__init__([])
@@ -57,25 +57,32 @@ class PolicyGuidedByExpert(PolicyWithFixedWaypoints):
         return super().act(observation)
 
 
-@pytest.mark.sim
-def test_a_waypoint_policy_run_in_joint_angles_does_the_same():
-    """`JointChunks` turns each waypoint (a pose to move to) into a chunk of joint angles.
-
-    Looks within the last waypoint are not seen any more where that is one action.
-    """
+def play_button_unmask(policy):
+    """Return how the policy's play of one episode ended: its status and number of steps."""
     episode = get_episode("ButtonUnmask", "train", 0)
-    guided = PolicyGuidedByExpert()
-    waypoints_end = play(make(episode, **PolicyNeeds.of(guided).env_options), guided)
-    again = PolicyWithFixedWaypoints(guided.waypoints)
-    chunks = JointChunks(again)
+    return play(make(episode, **PolicyNeeds.of(policy).env_options), policy)
 
-    angles_end = play(make(episode, **PolicyNeeds.of(chunks).env_options), chunks)
 
-    assert waypoints_end["status"] == angles_end["status"] == "success"
-    assert waypoints_end["steps"] == angles_end["steps"]
-    count = len(guided.tools)
-    assert np.allclose(guided.tools, again.tools[:count], atol=1e-5)
-    assert np.array_equal(guided.pictures, again.pictures[:count])
+@pytest.mark.sim
+def test_a_policy_of_waypoints_that_is_run_in_joint_angles_does_and_sees_the_same():
+    """The expert solves an episode with waypoints: poses, to each of which the arm moves.
+
+    Then a second policy answers with these waypoints, and `JointChunks` turns each into joint
+    angles, eight control steps at a time. The arm moves along the same path, so that the episode
+    ends alike, and both policies see the same pictures and poses of the tool (in meters).
+    """
+    expert = ExpertThatNotesItsWaypoints()
+    end_in_waypoints = play_button_unmask(expert)
+    repeater = PolicyWithFixedWaypoints(expert.waypoints)
+
+    end_in_joint_angles = play_button_unmask(JointChunks(repeater))
+
+    assert end_in_waypoints["status"] == end_in_joint_angles["status"] == "success"
+    assert end_in_waypoints["steps"] == end_in_joint_angles["steps"]
+    # In joint angles the policy is asked, and sees, some more times within the last waypoint.
+    seen_by_both = slice(len(expert.tools))
+    assert np.allclose(expert.tools, repeater.tools[seen_by_both], atol=1e-5)
+    assert np.array_equal(expert.pictures, repeater.pictures[seen_by_both])
 
 
 STATE = {"front_rgb": 0, "joint_positions": HOME, "gripper": np.full(2, 0.04)}

@@ -1,6 +1,5 @@
 """The listener that learns: labels, what it reads and sees, its file, and its command."""
 
-import itertools
 import json
 import re
 import sys
@@ -116,6 +115,7 @@ def test_the_parts_of_an_answer_identify_its_goal(task):
 
 
 def test_digits_are_read_as_words():
+    """ "3rd" and "third", or "2" and "two", are the same words to a reader; 57 has no word."""
     said = "Pick up the 3rd cube 2 times, then 57."
     assert split_words(said) == split_words("pick up the third cube two times, then 57.")
     assert "57" in split_words(said)
@@ -143,6 +143,7 @@ def test_the_interval_of_trainings_that_differ_contains_each_of_their_rates():
 
 
 def test_a_rate_of_one_has_an_interval_below_it():
+    """Three trainings are right in all of 50 episodes; the next episode may still be wrong."""
     certain = trained_rate([np.ones((3, 50))])
     assert certain.rate == 1.0
     assert 0.9 < certain.interval[0] < certain.interval[1] == 1.0
@@ -215,6 +216,10 @@ def test_a_trained_listener_understands_stopcube_also_after_loading(
 
 @pytest.mark.sim
 def test_a_loaded_listener_knows_its_words_and_what_it_was_trained_on(trained_listener):
+    """The fixture trained it on StopCube, in two settings, and saved it.
+
+    After loading it has the same vocabulary, and refuses BinFill, on which it was not trained.
+    """
     from roboirg_learn.listener.learned_model import load_model
 
     model, path = trained_listener
@@ -229,7 +234,11 @@ def test_a_loaded_listener_knows_its_words_and_what_it_was_trained_on(trained_li
 
 
 def test_training_sentences_by_place_cover_several_goals_of_a_scene(torch):
-    """With three goals a scene: one explicit sentence, and three that name places."""
+    """A reader learns from one scene with three different goals, its own and two others of it.
+
+    What *explicit* words mean does not depend on the scene, so there is one such sentence, for its
+    own goal. *Spatial* words name places of the scene: a sentence for each of the three goals.
+    """
     from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.listener.reader_training import instructions_of
 
@@ -238,11 +247,11 @@ def test_training_sentences_by_place_cover_several_goals_of_a_scene(torch):
 
     told = list(instructions_of([episode], plan))
 
-    explicit, *by_place = [told_episode.goal for told_episode, _ in told]
-    assert explicit == by_place[0] == episode.goal
-    assert len(set(by_place)) == 3
-    assert set(by_place) <= set(get_task("ButtonUnmask").goals(episode.scene))
-    assert len({text for _, text in told}) == 4
+    explicit_goal, own_goal, *others = [told_episode.goal for told_episode, _ in told]
+    assert explicit_goal == own_goal == episode.goal
+    assert len({own_goal, *others}) == 3
+    assert set(others) <= set(get_task("ButtonUnmask").goals(episode.scene))
+    assert len({text for _, text in told}) == 1 + 3
 
 
 def test_training_on_a_task_that_no_sentence_speaks_of_is_refused(torch, monkeypatch):
@@ -260,9 +269,11 @@ def test_training_on_a_task_that_no_sentence_speaks_of_is_refused(torch, monkeyp
 
 @pytest.mark.sim
 def test_a_trained_listener_plays_an_episode_with_the_oracle_s_hands(trained_listener):
-    """It understands the episode's own goal and answers with actions of eight numbers.
+    """The fixture trained a listener on explicit StopCube; the episode is one of its training.
 
-    It is privileged, as the hands know the state of the simulator.
+    It understands the episode's own goal, and the oracle's hands act on it: actions have eight
+    numbers, seven joint angles and the gripper. As these hands read the simulator, the policy is
+    privileged.
     """
     import roboirg
 
@@ -280,33 +291,46 @@ def test_a_trained_listener_plays_an_episode_with_the_oracle_s_hands(trained_lis
     assert read_policy(f"learned:{path}").is_privileged
 
 
-@pytest.mark.sim
-def test_the_documentation_s_own_encoder_is_trained_saved_and_loaded(
-    few_episodes, torch, tmp_path, monkeypatch
-):
-    """Its encoder sees shades of pictures: a darker one is read differently."""
+@pytest.fixture
+def encoder_of_the_documentation(monkeypatch):
+    """Execute the Python example of the page, which registers the encoder "shades" for a while."""
     from roboirg_learn.listener import encoders
+
+    monkeypatch.setitem(encoders.ENCODERS, "shades", None)  # so that it is taken away in the end
+    (example,) = re.findall(r"```python\n(.*?class .*?)```", PAGE.read_text(), re.DOTALL)
+    exec(example, {})  # noqa: S102 - the page's example
+
+
+def scores_of(listener, picture):
+    """Return the scores of all goals for "Stop it." and this picture."""
+    seen = listener.see([picture])._replace(task="StopCube", text="Stop it.")
+    return listener.reader([seen])[0]
+
+
+@pytest.mark.sim
+@pytest.mark.usefixtures("few_episodes", "encoder_of_the_documentation")
+def test_a_listener_with_the_documentation_s_own_encoder_is_trained_saved_and_loaded(
+    torch, tmp_path
+):
+    """The encoder "shades" reads the mean colors of fields of a picture, here of 4 x 4.
+
+    The loaded listener has it, too: it gives a picture the same scores as before, and other ones to
+    the picture at half its brightness.
+    """
     from roboirg_learn.listener.learned_model import load_model, save_model
     from roboirg_learn.listener.listener_training import train_listener
 
-    monkeypatch.setitem(encoders.ENCODERS, "shades", None)  # which takes it away in the end
-    (block,) = re.findall(r"```python\n(.*?class .*?)```", PAGE.read_text(), re.DOTALL)
-    exec(block, {})  # noqa: S102 - the page's example
-    plan = plan_of(reader_epochs=2, encoders={"shades": {"size": 4}, "words": {}})
+    encoders = {"shades": {"size": 4}, "words": {}}
+    plan = plan_of(reader_epochs=2, encoders=encoders)
+    picture = views_at_start(get_episode("StopCube", "val", 0))[0].picture
 
     trained = train_listener(plan, tmp_path, "own", 0, lambda *_: None)
     save_model(trained, tmp_path / "own.safetensors")
     loaded = load_model(tmp_path / "own.safetensors")
 
-    def scores(listener, picture):
-        seen = listener.see([picture])._replace(task="StopCube", text="Stop it.")
-        with torch.no_grad():
-            return listener.reader([seen])[0]
-
-    picture = views_at_start(get_episode("StopCube", "val", 0))[0].picture
-    assert loaded.about["encoders"] == {"shades": {"size": 4}, "words": {}}
-    assert torch.equal(scores(trained, picture), scores(loaded, picture))
-    assert not torch.equal(scores(loaded, picture), scores(loaded, picture // 2))
+    assert loaded.about["encoders"] == encoders
+    assert torch.equal(scores_of(loaded, picture), scores_of(trained, picture))
+    assert not torch.equal(scores_of(loaded, picture), scores_of(loaded, picture // 2))
 
 
 @pytest.mark.parametrize(
@@ -318,6 +342,10 @@ def test_the_documentation_s_own_encoder_is_trained_saved_and_loaded(
     ids=["misspelled", "without such an option"],
 )
 def test_a_wrong_encoder_is_refused_before_pictures_are_drawn(torch, tmp_path, encoders, words):
+    """The plan of a training misspells the encoder "words", or gives it a size, which it has not.
+
+    The command stops at once: it leaves no file.
+    """
     plan = plan_file(tasks="StopCube", training={"encoders": encoders})
 
     done = CliRunner().invoke(
@@ -354,7 +382,12 @@ def scene_of(*views):
 def test_variants_of_the_listener_get_no_words_no_pictures_or_no_video(
     torch, hidden, text, objects
 ):
-    """A variant shows what an input is worth; the cube and the container are seen in a video."""
+    """A variant of the listener lacks an input, which shows what that is worth.
+
+    Given are the sentence "Stop it." and two pictures, a cube and later a container: two objects.
+    Without words the sentence is empty, without pictures nothing is seen. Nor is anything seen
+    without the video of a scene that has one, which is known by its two pictures.
+    """
     from roboirg_learn.listener.learned_model import hide_inputs
     from roboirg_learn.listener.vocabulary import ListenerInput
 
@@ -367,6 +400,7 @@ def test_variants_of_the_listener_get_no_words_no_pictures_or_no_video(
 
 
 def test_a_listener_without_a_video_sees_a_scene_that_has_none(torch):
+    """StopCube shows no video, so to hide the video hides nothing."""
     from roboirg_learn.listener.learned_model import hide_inputs
     from roboirg_learn.listener.vocabulary import ListenerInput
 
@@ -392,16 +426,20 @@ def short_study(few_episodes, tmp_path):
 
 @pytest.mark.sim
 def test_the_study_writes_every_listener_its_answers_and_tables(short_study):
+    """The fixture trained two kinds of listener, *all* and *explicit*, with seeds 0 and 1 each.
+
+    Each of the four has a file of its weights, and one of its answers, a line each: what it
+    understood of StopCube, that is the visit at which to stop, and whether that is right. The page
+    has three tables: for two pools of words, and for commands with a rival object.
+    """
     folder, _ = short_study
 
-    expected = set()
-    for variant, seed in itertools.product(VARIANTS[:2], (0, 1)):
-        name = f"{variant.name}-{seed}"
-        expected |= {f"{name}.safetensors", f"{name}.jsonl"}
-    assert {path.name for path in folder.glob("*-?.*")} == expected
-    text = (folder / "study.md").read_text()
-    assert text.count("## ") == 3
-    assert "2 training seeds" in text
+    listeners = {"all-0", "all-1", "explicit-0", "explicit-1"}
+    assert {path.stem for path in folder.glob("*.safetensors")} == listeners
+    assert {path.stem for path in folder.glob("*-?.jsonl")} == listeners
+    page = (folder / "study.md").read_text()
+    assert page.count("## ") == 3
+    assert "2 training seeds" in page
     for line in (folder / "all-1.jsonl").read_text().splitlines():
         answer = json.loads(line)
         goal = get_episode("StopCube", "test", answer["episode"]).goal
@@ -410,7 +448,11 @@ def test_the_study_writes_every_listener_its_answers_and_tables(short_study):
 
 @pytest.mark.sim
 def test_a_study_trains_again_only_the_listener_that_is_lost(short_study):
-    """One listener of the study is deleted; running it again writes this one and its answers."""
+    """The fixture ran a study with four listeners, of which the file of one is deleted.
+
+    Running it again writes only this file and that of its answers (by the times of change). The
+    page of results is the same: a training can be repeated to the bit.
+    """
     folder, run = short_study
     times = {path: path.stat().st_mtime_ns for path in folder.glob("*-?.*")}
     text = (folder / "study.md").read_text()

@@ -1,7 +1,6 @@
 """The policy that learns to act: what it is recorded from, its file, its command, and its play."""
 
 import json
-import shlex
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +11,9 @@ from plan_files import plan_file
 from typer.testing import CliRunner
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.envs.factory import make
 from roboirg.extension.sight import ExpertRecording, record_expert
 from roboirg.language.settings import plain_settings
 from roboirg.main import app
-from roboirg.policies import play
-from roboirg.policies.builtin.waypoint_expert import WaypointExpert
 from roboirg.policies.by_name.finding import make_policy, read_policy
 from roboirg.records.store import read_records
 from roboirg.runs.plan.plan_maker import make_plan
@@ -55,13 +51,6 @@ def test_a_wrong_name_of_a_learned_policy_is_refused_with_the_reason(spec, words
     pytest.importorskip("torch")
     with pytest.raises(InvalidValueError, match=words):
         make_policy(spec, 0)
-
-
-@pytest.mark.sim
-def test_the_waypoint_expert_solves_an_episode():
-    """The expert knows the goal and moves by waypoints; policies learn from its recordings."""
-    env = make(get_episode("PickXtimes", "train", 0), actions="waypoint", cameras=())
-    assert play(env, WaypointExpert())["status"] == "success"
 
 
 @pytest.fixture(scope="module")
@@ -151,18 +140,24 @@ def test_a_repeated_waypoint_is_labeled_with_the_gripper_command_that_follows():
 
 
 def test_passes_of_a_moving_cube_over_its_target_are_counted_at_each_look():
-    """The cube moves along x: -3, -1, 2, 1, -1, with the target at 0.
+    """A moving cube is of the class *shuttle*. It moves along x, and the target stays at 0.
 
-    It passes between the second and third look, and back between the last two. Without a moving
-    cube nothing is counted.
+    At five looks it is at -3, -1, 2, 1 and -1: it passes between the second and third look, and
+    back between the last two.
     """
-    recorded = recording_with_actions([np.zeros(7)], [4])
-    assert (passes_so_far(recorded) == NO_LABEL).all()
-    things = np.zeros((5, 2, 4))
+    things = np.zeros((5, 2, 4))  # looks, objects, and x, y, z, yaw of each
     things[:, 0, 0] = [-3, -1, 2, 1, -1]
+    recorded = recording_with_actions([np.zeros(7)], looks=[4])
     moving = recorded._replace(classes=("shuttle", "target"), things=things)
 
     assert passes_so_far(moving).tolist() == [0, 0, 1, 1, 2]
+
+
+def test_without_a_moving_cube_no_passes_are_counted():
+    """At each of five looks there is no label, as opposed to no pass."""
+    recorded = recording_with_actions([np.zeros(7)], looks=[4])
+
+    assert passes_so_far(recorded).tolist() == [NO_LABEL] * 5
 
 
 def test_the_time_of_a_wait_is_counted_down_to_the_next_move():
@@ -268,7 +263,10 @@ def test_a_recording_notes_how_many_stages_are_done(recorded):
 
 @pytest.mark.sim
 def test_a_recording_notes_which_objects_are_visible(recorded):
-    """At first only the cubes, and from step 40 on only the containers that cover them."""
+    """The expert was recorded in ButtonUnmask, where containers come down over cubes.
+
+    At the first look only the cubes are visible, from control step 40 on only the containers.
+    """
     cubes = np.array([name.startswith("cube") for name in recorded.classes])
     containers = np.array([name == "container" for name in recorded.classes])
     covered = int(np.flatnonzero(recorded.steps >= 40)[0])
@@ -281,13 +279,20 @@ def test_a_recording_notes_which_objects_are_visible(recorded):
 
 @pytest.mark.sim
 def test_a_recording_is_read_as_it_was_written(recorded, tmp_path):
-    """A file that is cut off after 100 bytes is refused, with what to do."""
-    path = tmp_path / "one.npz"
-    save_recording(recorded, path)
-    for name, value in load_recording(path)._asdict().items():
+    """All its fields are equal, arrays value by value."""
+    save_recording(recorded, tmp_path / "one.npz")
+
+    loaded = load_recording(tmp_path / "one.npz")
+
+    for name, value in loaded._asdict().items():
         np.testing.assert_equal(value, getattr(recorded, name), err_msg=name)
 
-    path.write_bytes(path.read_bytes()[:100])
+
+def test_a_recording_that_is_cut_off_is_refused_with_what_to_do(tmp_path):
+    """The file has only the first bytes of an archive, as after a full disk."""
+    path = tmp_path / "one.npz"
+    path.write_bytes(b"PK\x03\x04")
+
     with pytest.raises(InvalidValueError, match="delete it to make it again"):
         load_recording(path)
 
@@ -303,6 +308,10 @@ def test_a_recording_is_read_as_it_was_written(recorded, tmp_path):
     ids=["no description", "earlier format", "a reader", "no plan"],
 )
 def test_a_wrong_file_of_a_body_is_refused_with_the_reason(tmp_path, description, words):
+    """The description in a file has its kind, the version of its format (1), and the plan.
+
+    Each of the given descriptions lacks one of them, or has another one.
+    """
     torch = pytest.importorskip("torch")
     from safetensors.torch import save_file
 
@@ -316,6 +325,7 @@ def test_a_wrong_file_of_a_body_is_refused_with_the_reason(tmp_path, description
 
 
 def test_a_file_that_was_never_a_trained_one_is_refused(tmp_path):
+    """The file has the seven bytes "nothing"."""
     pytest.importorskip("torch")
     from roboirg_learn.trained_file import load_trained
 
@@ -364,6 +374,7 @@ def test_another_plan_weight_or_table_is_another_version(version_of):
 
 
 def test_the_same_numbers_in_another_shape_are_another_version():
+    """Two zeros in a row or in a column: a version is of weights and their shapes."""
     torch = pytest.importorskip("torch")
     from roboirg_learn.trained_file import TrainedFile
 
@@ -451,83 +462,109 @@ SHORT_TRAINING = {
 
 @pytest.fixture(scope="module")
 def folder_of_policy(tmp_path_factory):
-    """A policy that has hardly learned, made by the command."""
+    """The folder of a policy for ButtonUnmask that has hardly learned, in which a command trained.
+
+    It was trained in 2 passes, with 2 drawn scenes, and has a recurrent memory.
+    """
     pytest.importorskip("torch")
-    folder_of_policy = tmp_path_factory.mktemp("policy")
+    folder = tmp_path_factory.mktemp("policy")
     plan = plan_file(training=SHORT_TRAINING)
-    call = [
-        "learn",
-        "policy",
-        "--tasks",
-        "ButtonUnmask",
-        "--out",
-        str(folder_of_policy),
-        "--plan",
-        plan,
-    ]
-    done = CliRunner().invoke(app, [*call, "--workers", "0"])
+    words = f"learn policy --tasks ButtonUnmask --out {folder} --plan {plan} --workers 0"
+    done = CliRunner().invoke(app, words.split())
     assert done.exit_code == 0, done.output
-    assert PolicyFiles(folder_of_policy / BODY, folder_of_policy / READER).spec in done.output
-    return folder_of_policy, call
+    assert PolicyFiles(folder / BODY, folder / READER).spec in done.output
+    return folder
 
 
 @pytest.mark.sim
 @pytest.mark.slow
-def test_the_command_learn_makes_a_policy_that_plays_from_pictures_alone(
-    folder_of_policy, tmp_path
-):
-    """The fixture holds the folder of a policy that `learn policy` trained in two short passes.
+def test_a_trained_policy_reads_no_state_of_the_simulator(folder_of_policy):
+    """A command trained it for ButtonUnmask. It is not privileged, and not attached to a world.
 
-    It is not privileged, runs in a process of its own, and plays one episode in two settings
-    without an error. The curve has a line for each pass.
+    So it can run in a process of its own (hosted).
     """
-    spec = PolicyFiles(folder_of_policy[0] / BODY, folder_of_policy[0] / READER).spec
-    assert (read_policy(spec).is_privileged, read_policy(spec).is_hosted) == (False, True)
-    assert read_policy(spec).needs.trained_tasks == ("ButtonUnmask",)
+    spec = PolicyFiles(folder_of_policy / BODY, folder_of_policy / READER).spec
+
+    ref = read_policy(spec)
+
+    assert (ref.is_privileged, ref.is_hosted) == (False, True)
+    assert ref.needs.trained_tasks == ("ButtonUnmask",)
     assert not hasattr(make_policy(spec, 0), "attach")
 
-    out = tmp_path / "runs"
-    call = ["run", "--policy", spec, "--tasks", "ButtonUnmask", "--settings", "explicit,direct"]
-    done = CliRunner().invoke(app, [*call, "--episodes", "1", "--out", str(out)])
+
+@pytest.mark.sim
+@pytest.mark.slow
+def test_a_trained_policy_plays_and_its_records_say_what_memory_it_has(folder_of_policy, tmp_path):
+    """It plays one episode in two settings, as any policy does: without an error.
+
+    A command trained it with the usual memory, a recurrent network.
+    """
+    spec = PolicyFiles(folder_of_policy / BODY, folder_of_policy / READER).spec
+    words = f"run --policy {spec} --tasks ButtonUnmask --settings explicit,direct --episodes 1"
+
+    done = CliRunner().invoke(app, [*words.split(), "--out", str(tmp_path)])
+
     assert done.exit_code == 0, done.output
-
-    played = read_records(next(out.rglob("records.jsonl")).parent)
-    memories = [
-        (record.error, record.policy_metadata["trained"]["body"]["memory"]) for record in played
-    ]
-    assert memories == [(None, "recurrent")] * 2
-
-    curve = json.loads((folder_of_policy[0] / "body-recurrent-0.json").read_text())
-    assert [line["epoch"] for line in curve] == [1, 2]
+    first, second = read_records(next(tmp_path.rglob("records.jsonl")).parent)
+    assert first.error is second.error is None
+    assert first.policy_metadata["trained"]["body"]["memory"] == "recurrent"
 
 
 @pytest.mark.sim
 @pytest.mark.slow
-def test_learning_again_reuses_files_and_refuses_those_of_another_plan(folder_of_policy):
-    """A folder that was learned in is given again: with other tasks, plan or passes it is refused.
+@pytest.mark.parametrize(
+    ("options", "training", "reason"),
+    [
+        ("--tasks PickXtimes --memory none", {}, "recordings with tasks"),
+        ("--tasks ButtonUnmask --memory none", {"drawn": 300}, "recordings with drawn 2, not 300"),
+        ("--tasks ButtonUnmask", {"body_epochs": 3}, "was trained by another plan"),
+    ],
+    ids=["other tasks", "more drawn scenes", "more passes"],
+)
+def test_learning_in_a_folder_with_files_of_another_plan_is_refused(
+    folder_of_policy, options, training, reason
+):
+    """In the folder a policy was trained for ButtonUnmask, in 2 passes and with 2 drawn scenes.
 
-    With the same plan but no memory a second body is made next to the first, and no file of the
-    first is written again (all times of change stay).
+    A policy without memory could use its recordings, but not with other tasks or scenes. With more
+    passes the trained body itself would be another one.
     """
-    place, call = folder_of_policy
-    plan = call[-1]
-    here = ["--out", place]
-    before = {path: path.stat().st_mtime_ns for path in place.rglob("*.*")}
+    plan = plan_file(training=SHORT_TRAINING | training)
 
-    other_task = ["--tasks", "PickXtimes", *here, "--plan", plan, "--memory", "none"]
-    assert "recordings with tasks" in error_of_learning(*other_task)
-    usual_plan = ["--tasks", "ButtonUnmask", *here, "--memory", "none"]
-    assert "recordings with drawn 2, not 300" in error_of_learning(*usual_plan)
-    three_passes = plan_file(training=SHORT_TRAINING | {"body_epochs": 3})
-    more_passes = ["--tasks", "ButtonUnmask", *here, "--plan", three_passes]
-    assert "was trained by another plan" in error_of_learning(*more_passes)
-    other_reader = ["--body", place / BODY, "--out", place / "new", "--tasks", "BinFill"]
-    assert "no task of this body 'BinFill'" in error_of_learning(*other_reader, what="reader")
+    error = error_of_learning(*options.split(), "--out", folder_of_policy, "--plan", plan)
 
-    done = CliRunner().invoke(app, [*call, "--memory", "none", "--settings", "none"])
+    assert reason in error
+
+
+@pytest.mark.sim
+@pytest.mark.slow
+def test_a_reader_for_a_task_that_the_body_does_not_know_is_refused(folder_of_policy):
+    """The body was trained for ButtonUnmask alone."""
+    body = folder_of_policy / BODY
+
+    error = error_of_learning(
+        "--body", body, "--out", folder_of_policy / "new", "--tasks", "BinFill", what="reader"
+    )
+
+    assert "no task of this body 'BinFill'" in error
+
+
+@pytest.mark.sim
+@pytest.mark.slow
+def test_a_second_policy_in_a_folder_writes_no_file_of_the_first_again(folder_of_policy):
+    """The second has the same plan, but no memory, and hears no settings but explicit (none).
+
+    It uses the recordings of the first: no time of change of the files that were there moves.
+    """
+    before = {path: path.stat().st_mtime_ns for path in folder_of_policy.rglob("*.*")}
+    plan = plan_file(training=SHORT_TRAINING)
+    words = "learn policy --tasks ButtonUnmask --memory none --settings none --workers 0"
+
+    done = CliRunner().invoke(app, [*words.split(), "--out", str(folder_of_policy), "--plan", plan])
+
     assert done.exit_code == 0, done.output
-    assert (place / "none-0.body.safetensors").exists()
-    assert (place / "none-0.reader.safetensors").exists()
+    assert (folder_of_policy / "none-0.body.safetensors").exists()
+    assert (folder_of_policy / "none-0.reader.safetensors").exists()
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
 
@@ -537,22 +574,37 @@ def trained_reader_file(tmp_path_factory):
     pytest.importorskip("torch")
     out = tmp_path_factory.mktemp("reader") / "new.reader"
     plan = plan_file(training={"scenes": 2, "reader_epochs": 2})
-    call = ["learn", "reader", "--body", str(SHIPPED.body), "--out", str(out), "--plan", plan]
-    call += ["--tasks", "StopCube", "--settings", "explicit,direct", "--workers", "0"]
-    done = CliRunner().invoke(app, call)
+    words = [
+        "learn",
+        "reader",
+        "--tasks",
+        "StopCube",
+        "--settings",
+        "explicit,direct",
+        "--workers",
+        "0",
+    ]
+    words += ["--body", str(SHIPPED.body), "--out", str(out), "--plan", plan]
+    done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
     assert PolicyFiles(SHIPPED.body, out).spec in done.output
-    return out, call
+    return out, words
 
 
 @pytest.mark.sim
 def test_a_reader_is_trained_for_an_existing_body_without_new_recordings(
     trained_reader_file, shipped_body
 ):
-    """A reader turns words into a goal, a body acts on it; no expert has to play."""
+    """A body acts on a goal, given as numbers; a reader is trained apart to turn words into them.
+
+    The fixture trained one on StopCube for the body that comes with the benchmark. The file says
+    for which body it is, and has the body's own lists of objects, tasks and parts of goals. No
+    expert had to play: there are no recordings next to it.
+    """
     from roboirg_learn.policy.trained_reader import load_reader
 
     out, _ = trained_reader_file
+
     reader = load_reader(out)
 
     assert reader.plan["tasks"] == ["StopCube"]
@@ -565,14 +617,18 @@ def test_a_reader_is_trained_for_an_existing_body_without_new_recordings(
 
 @pytest.mark.sim
 def test_a_reader_whose_file_is_lost_is_made_again_without_training(trained_reader_file):
-    """The command trains only the passes that are left, here none."""
+    """The fixture trained a reader in two passes by a command, which is given again.
+
+    It keeps the weights of each pass in a folder of its work, so that no pass is left to train:
+    there is no line of progress such as "reader: 1 of 2", and the file is the same version again.
+    """
     from roboirg_learn.policy.trained_reader import load_reader
 
-    out, call = trained_reader_file
+    out, command = trained_reader_file
     version = load_reader(out).version
     out.unlink()
 
-    again = CliRunner().invoke(app, call)
+    again = CliRunner().invoke(app, command)
 
     assert again.exit_code == 0, again.output
     assert "reader: 1 of 2" not in again.output
@@ -580,15 +636,20 @@ def test_a_reader_whose_file_is_lost_is_made_again_without_training(trained_read
 
 
 def test_the_command_printed_after_training_is_a_valid_run(capsys):
-    """Names of all settings are refused where a task lacks one of them."""
-    plan = ReaderPlan(("StopCube", "BinFill"), tuple(plain_settings()))
-    print_policy(PolicyFiles(Path("a"), Path("my b")), plan)
-    words = shlex.split(capsys.readouterr().out.partition("roboirg run ")[2])
-    options = dict(zip(words[::2], words[1::2], strict=True))
+    """The reader was trained on all plain settings, of which StopCube lacks one, *spatial*.
 
-    assert options["--policy"] == "trained:a?reader=my%20b"
+    A run with the names of these settings would be refused; the printed command says "all", which a
+    plan can be made of. The blank in the name of a file is escaped.
+    """
+    trained = ReaderPlan(("StopCube", "BinFill"), tuple(plain_settings()))
 
-    make_plan(policies=["oracle"], tasks=plan.tasks, settings=options["--settings"], split="val")
+    print_policy(PolicyFiles(Path("a"), Path("my b")), trained)
+
+    printed = capsys.readouterr().out
+    assert "roboirg run --policy 'trained:a?reader=my%20b' --tasks StopCube,BinFill" in printed
+    assert "--split val --settings all" in printed
+    plan = make_plan(policies=["oracle"], tasks=trained.tasks, settings="all", split="val")
+    assert plan.tasks == ("StopCube", "BinFill")
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 from roboirg_learn.policy.planner_history import (
     MAX_CHOSEN,
-    MAX_SWITCHES,
     RECENT,
     VIDEO_FRAMES,
     KeyframeHistory,
@@ -19,7 +18,6 @@ from roboirg_learn.policy.planner_history import (
 )
 from roboirg_learn.policy.sight import ObjectClasses
 from roboirg_learn.policy.subgoals import (
-    MOST_POINT_NOISE,
     REQUEST_WORDS,
     SubgoalTemplate,
     encode_request,
@@ -35,19 +33,22 @@ OBJECTS = ObjectClasses(
 
 @pytest.mark.parametrize("task", sorted(all_tasks()))
 def test_every_subgoal_of_a_task_is_encoded_with_its_motion(task):
-    """Learned hands read a subgoal as numbers, one of which marks the motion, such as *pick*.
+    """Learned hands read a subgoal as numbers; one of them is 1 for its motion, such as pick_cube.
 
-    The subgoals are those of ten training episodes of the task. The motion is that of its stage;
-    *press below* has no number of its own.
+    The subgoals are those of ten training episodes of the task, each pointing at a pixel. Their
+    motions are those of the expert, but for two that the words do not tell from a simpler one:
+    pressing below something is to press, and holding still until something happens is to hold.
     """
-    for number in range(10):
-        for stage in get_episode(task, "train", number).stages:
+    in_words = {"press_below": "press", "hold_until": "hold"}
+
+    for episode in range(10):
+        for stage in get_episode(task, "train", episode).stages:
             subgoal = SubgoalTemplate(stage.subgoal).at(np.array([100.0, 90.0]))
-            found = encode_request(subgoal, OBJECTS)
-            assert found is not None, subgoal
-            assert found[REQUEST_WORDS.index(stage.primitive.kind.removesuffix("_until"))] or (
-                stage.primitive.kind == "press_below"
-            )
+            motion = stage.primitive.kind
+
+            encoded = encode_request(subgoal, OBJECTS)
+
+            assert encoded[REQUEST_WORDS.index(in_words.get(motion, motion))] == 1, subgoal
 
 
 def test_a_point_in_a_subgoal_is_encoded_as_the_place_on_the_table():
@@ -73,7 +74,12 @@ def test_words_that_are_no_subgoal_are_not_encoded():
 
 
 def recording_of(episode, done):
-    """Return a recording in which every object moves a little at each look."""
+    """Return a recording in which every object moves a little at each look.
+
+    Args:
+        episode: which has the objects.
+        done: how many stages are completed at each look.
+    """
     names = tuple(item.name for item in episode.scene.objects)
     looks = len(done)
     rng = np.random.default_rng(0)
@@ -89,88 +95,112 @@ def recording_of(episode, done):
     )  # fmt: skip
 
 
-@pytest.fixture
-def recording_of_two_stages():
-    """An episode, and a recording whose first two looks are of stage 0, the others of stage 1."""
+def test_recordings_give_the_subgoal_of_the_stage_that_is_due():
+    """In the recording no stage is done at looks 0 and 1, the first one at looks 2 to 4.
+
+    So the first subgoal is due at two looks, the second at three. The episode's first subgoals are
+    to pick the red cube up and to place it onto the target.
+    """
     episode = get_episode("PickXtimes", "train", 0)
-    return episode, recording_of(episode, [0, 0, 1, 1, 1])
-
-
-def test_recordings_give_the_subgoal_of_the_stage_that_is_due(recording_of_two_stages):
-    episode, recorded = recording_of_two_stages
-    first, second, *_ = episode.stages
+    recorded = recording_of(episode, done=[0, 0, 1, 1, 1])
 
     due = subgoals_due(recorded, episode, range(5))
 
-    words = [decision.move.words for decision in due]
-    assert words == [first.subgoal] * 2 + [second.subgoal] * 3
+    pick = "pick up the red cube {at} for the first time"
+    place = "place the red cube onto the target {at}"
+    assert [decision.move.words for decision in due] == [pick] * 2 + [place] * 3
     objects = [recorded.names[decision.object_number] for decision in due]
-    assert objects == [first.points_at] * 2 + [second.points_at] * 3
+    assert objects == ["cube_red"] * 2 + ["target"] * 3
 
 
-def test_the_point_of_a_recorded_subgoal_is_that_at_its_start(recording_of_two_stages):
-    """Objects move on at every look; a point is row and column in the picture."""
-    episode, recorded = recording_of_two_stages
-    number = recorded.names.index(episode.stages[1].points_at)
-    column, row = points_of(recorded.things[2, number, :3].astype(float))
+def test_a_recorded_subgoal_points_at_its_object_where_that_was_when_the_stage_began():
+    """In the recording all objects move at every look; the first stage is done from look 2 on.
 
-    found = recorded_subgoals(recorded, episode, [0, 0, 1, 1, 1], None)
+    So at looks 2 to 4 the second subgoal points at the target, where it was at look 2. A point is
+    a pixel, row and column, rounded.
+    """
+    episode = get_episode("PickXtimes", "train", 0)
+    recorded = recording_of(episode, done=[0, 0, 1, 1, 1])
+    target = recorded.things[2, recorded.names.index("target"), :3]
+    column, row = points_of(target.astype(float))
 
-    assert found[0] == found[1] != found[2] == found[3] == found[4]
-    assert split_point(found[2])[1] == pytest.approx((row, column), abs=0.5)
+    found = recorded_subgoals(recorded, episode, stages_done=[0, 0, 1, 1, 1], rng=None)
 
-
-def test_points_of_recorded_subgoals_are_moved_a_little_for_training(recording_of_two_stages):
-    episode, recorded = recording_of_two_stages
-    done = [0, 0, 1, 1, 1]
-
-    exact = recorded_subgoals(recorded, episode, done, None)
-    moved = recorded_subgoals(recorded, episode, done, np.random.default_rng(0))
-
-    away = np.subtract(split_point(moved[2])[1], split_point(exact[2])[1])
-    assert 0 < np.abs(away).max() <= MOST_POINT_NOISE + 1
+    assert found[2:] == [f"place the red cube onto the target at <{row:.0f}, {column:.0f}>"] * 3
+    assert found[0] == found[1] != found[2]
 
 
-@pytest.fixture
-def history_of_three_changes():
-    """Of three templates of subgoals, 0 is due at looks 2 and 4, 1 at look 7, 0 again at look 9."""
-    history = PlannerHistory(3)
-    for template, look in ((0, 2), (0, 4), (1, 7), (0, 9)):
+def test_the_point_of_a_recorded_subgoal_is_moved_by_some_pixels_for_training():
+    """Learned planners err, too. A point is moved by at most 8 pixels, here to another pixel.
+
+    As both points are rounded to whole pixels, they may be 9 apart.
+    """
+    episode = get_episode("PickXtimes", "train", 0)
+    recorded = recording_of(episode, done=[0])
+
+    (exact,) = recorded_subgoals(recorded, episode, stages_done=[0], rng=None)
+    (moved,) = recorded_subgoals(recorded, episode, stages_done=[0], rng=np.random.default_rng(0))
+
+    _, point = split_point(exact)
+    _, moved_point = split_point(moved)
+    assert 0 < np.abs(np.subtract(moved_point, point)).max() <= 8 + 1
+
+
+def named_in(history, template_at_look):
+    """Return a history in which a planner has named subgoals, as in ``{2: 0, 7: 1}``.
+
+    A look is a picture that it saw, by number; a template is a subgoal without its point.
+    """
+    for look, template in template_at_look.items():
         history.name(template, look)
     return history
 
 
-def test_planner_history_keeps_the_looks_at_which_the_subgoal_changed(history_of_three_changes):
-    assert history_of_three_changes.switches == [2, 7, 9]
+def test_planner_history_keeps_the_looks_at_which_the_subgoal_changed():
+    """Subgoal 0 is named at looks 2 and 4, which is no change, 1 at look 7, and 0 again at 9."""
+    history = named_in(PlannerHistory(templates=3), {2: 0, 4: 0, 7: 1, 9: 0})
+
+    assert history.switches == [2, 7, 9]
 
 
-def test_the_context_of_a_planner_is_what_was_done_what_is_under_way_and_since_when(
-    history_of_three_changes,
-):
-    """At look 19: template 0 was done once, 1 once, 2 never; 0 is under way for 10 of 40 looks."""
-    context = history_of_three_changes.context(19)
+def test_the_context_of_a_planner_is_what_was_done_what_is_under_way_and_since_when():
+    """Of three subgoals, 0 was named at looks 2 to 6, 1 at 7 and 8, and 0 again since look 9.
 
-    assert context[:3].tolist() == [1, 1, 0]
-    assert context[3:6].tolist() == [1, 0, 0]
-    assert context[6:].tolist() == [0.25, 0, 0, 0]
+    At look 19 subgoals 0 and 1 were done once each, and 0 is under way for 10 looks, a quarter of
+    the 40 that are counted at most. Three zeros follow, where hands have a point.
+    """
+    history = named_in(PlannerHistory(templates=3), {2: 0, 7: 1, 9: 0})
+
+    times_done, under_way, since_and_point = np.split(history.context(look=19), [3, 6])
+
+    assert times_done.tolist() == [1, 1, 0]
+    assert under_way.tolist() == [1, 0, 0]
+    assert since_and_point.tolist() == [10 / 40, 0, 0, 0]
 
 
-def test_a_planner_sees_the_video_the_changes_and_the_current_look(history_of_three_changes):
-    """The video has looks 0 and 1; what is left of the fixed number of frames is -1."""
-    kept = history_of_three_changes.kept(video=2, look=19)
+def test_a_planner_sees_the_video_the_changes_and_the_current_look():
+    """The video is looks 0 and 1, the subgoal changed at looks 2, 7 and 9, and now is look 19.
 
-    assert [look for look in kept if look >= 0] == [0, 1, 2, 7, 9, 19]
-    assert len(kept) == VIDEO_FRAMES + MAX_SWITCHES + 1
+    There is room for 10 looks of the video, 4 changes and the current look; what is left is -1.
+    """
+    history = named_in(PlannerHistory(templates=3), {2: 0, 7: 1, 9: 0})
+
+    kept = history.kept(video=2, look=19)
+
+    assert kept.tolist() == [0, 1, 2, 7, 9, 19] + [-1] * 9
 
 
 def test_a_planner_with_key_frames_is_not_told_what_it_named_before():
-    """Else it could count by its own words, and key frames could not matter."""
-    named = KeyframeHistory(3)
-    for template, look in ((0, 2), (1, 7), (0, 9)):
-        named.name(template, look)
+    """Else it could count by its own words, and the frames that it chose could not matter.
 
-    assert not len(named.context(19))
-    assert named.kept(2, 19).tolist() == KeyframeHistory(3).kept(2, 19).tolist()
+    It has named subgoals at looks 2, 7 and 9. At look 19 its history has no numbers about them, and
+    keeps the same looks as that of a planner that has named nothing.
+    """
+    history = named_in(KeyframeHistory(templates=3), {2: 0, 7: 1, 9: 0})
+
+    unnamed = KeyframeHistory(templates=3)
+    assert len(history.context(look=19)) == 0
+    assert history.kept(2, look=19).tolist() == unnamed.kept(2, look=19).tolist()
 
 
 @pytest.mark.parametrize(
@@ -216,44 +246,56 @@ def test_a_planner_with_key_frames_sees_the_recent_looks_too():
     assert found[: 1 + RECENT].tolist() == [6, *recent_looks(60)]
 
 
-@pytest.fixture
-def inputs_of_five_looks():
-    """What a planner learns from looks 1, 4, 6, 9, 12, at which templates 0, 0, 1, 1, 0 are due."""
-    templates = np.array([0, 0, 1, 1, 0])
-    return ideal_planner_inputs(KeyframeHistory(2), templates, np.array([1, 4, 6, 9, 12]), 0)
+def inputs_of_perfect_planner(history, template_at_look):
+    """Return what a planner learns from if it named the right subgoals, as in ``{2: 0, 7: 1}``.
+
+    A look is a picture that it saw, by number; a template is a subgoal without its point, or -1
+    where none is due. There is no video.
+    """
+    templates = np.array(list(template_at_look.values()))
+    return ideal_planner_inputs(history, templates, np.array(list(template_at_look)), video=0)
 
 
-def test_training_inputs_equal_those_of_a_planner_that_is_always_right(inputs_of_five_looks):
-    """Before its third answer, at look 6, it has named template 0 at looks 1 and 4."""
-    history = KeyframeHistory(2)
-    history.name(0, 1)
+def test_training_inputs_equal_those_of_a_planner_that_is_always_right():
+    """At looks 1 and 4 subgoal 0 is due, at look 6 subgoal 1.
+
+    So before it answers at look 6, a planner that is right has named 0 twice, and has kept look 1,
+    where the subgoal changed.
+    """
+    inputs = inputs_of_perfect_planner(KeyframeHistory(templates=2), {1: 0, 4: 0, 6: 1})
+
+    history = named_in(KeyframeHistory(templates=2), {1: 0, 4: 0})
     history.choose([1])
-    history.name(0, 4)
-
-    assert np.array_equal(inputs_of_five_looks.context[2], history.context(6))
-    assert np.array_equal(inputs_of_five_looks.kept_looks[2], history.kept(0, 6))
+    assert inputs.context[2].tolist() == history.context(look=6).tolist()
+    assert inputs.kept_looks[2].tolist() == history.kept(0, look=6).tolist()
 
 
-def test_a_planner_learns_to_keep_the_looks_at_which_the_subgoal_changes(inputs_of_five_looks):
-    """The last column is the current look; the first has none of the recent looks before it."""
-    to_keep = inputs_of_five_looks.to_keep
+def test_a_planner_learns_to_keep_the_looks_at_which_the_subgoal_changes():
+    """Subgoal 0 is due at look 1, and subgoal 1 at looks 6 and 9: it changes at looks 1 and 6.
 
-    assert to_keep[:, -1].tolist() == [1, 0, 1, 0, 1]
-    assert to_keep[0, :-2].tolist() == [-1] * (RECENT - 2)
-    (kept_at_look_9,) = np.flatnonzero(to_keep[3] == 1)
-    assert recent_looks(9)[kept_at_look_9] == 6
+    At each look there is a label for each of the 8 latest looks, the current one last: 1 to keep
+    it, 0 not to, -1 if there is none.
+    """
+    inputs = inputs_of_perfect_planner(KeyframeHistory(templates=2), {1: 0, 6: 1, 9: 1})
+
+    assert inputs.to_keep.tolist() == [
+        [-1, -1, -1, -1, -1, -1, 0, 1],  # up to look 1
+        [-1, 0, 1, 0, 0, 0, 0, 1],  # looks -1 to 6
+        [0, 0, 0, 0, 1, 0, 0, 0],  # looks 2 to 9
+    ]
 
 
 def test_a_look_at_which_no_subgoal_is_due_teaches_nothing():
-    """A template of -1 is none: what comes after looks as if nothing had been asked."""
-    looks = np.array([1, 2, 6])
+    """At looks 1 and 6 subgoals are due, at look 2 none (-1).
 
-    unasked = ideal_planner_inputs(KeyframeHistory(2), np.array([0, -1, 1]), looks, 0)
+    So nothing is learned at look 2 about which of the 8 latest looks to keep, and what the planner
+    has named before look 6 is subgoal 0 at look 1.
+    """
+    inputs = inputs_of_perfect_planner(PlannerHistory(templates=2), {1: 0, 2: -1, 6: 1})
 
-    assert (unasked.to_keep[1] == -1).all()
-    history = KeyframeHistory(2)
-    history.name(0, 1)
-    assert np.array_equal(unasked.context[2], history.context(6))
+    history = named_in(PlannerHistory(templates=2), {1: 0})
+    assert inputs.to_keep[1].tolist() == [-1] * 8
+    assert inputs.context[2].tolist() == history.context(look=6).tolist()
 
 
 @pytest.fixture(params=["subgoal", "keyframes"])
@@ -293,18 +335,22 @@ def learned_hands(saved_policy):
 
 @pytest.mark.sim
 def test_learned_hands_name_their_own_subgoal_if_none_is_given(learned_hands):
+    """The fixture's policy has learned nothing, but knows the subgoals of a task as templates.
+
+    A template is a subgoal without its point, such as "press the button {at} to stop". Without a
+    planner the policy names one of these itself, and acts: a waypoint of seven numbers.
+    """
     action = learned_hands.act(observation_of())
 
     words, _ = split_point(learned_hands.subgoal)
-    known = {
-        SubgoalTemplate(template.words).at(None) for template in learned_hands.model.body.templates
-    }
+    known = [template.at(None) for template in learned_hands.model.body.templates]
     assert words in known
     assert action.shape == (1, 7)
 
 
 @pytest.mark.sim
 def test_learned_hands_follow_a_given_subgoal_and_ignore_words_that_are_none(learned_hands):
+    """ "sing" is no subgoal that can be carried out, so the one before stays."""
     learned_hands.follow("press the button at <100, 90>")
     learned_hands.act(observation_of())
     learned_hands.follow("sing")
@@ -324,6 +370,7 @@ def test_learned_hands_that_were_given_nothing_but_nonsense_stand_still(learned_
 
 @pytest.mark.sim
 def test_a_new_episode_forgets_the_subgoal(learned_hands):
+    """A subgoal of the last episode would point to where nothing stands any more."""
     learned_hands.follow("press the button at <100, 90>")
 
     learned_hands.reset("pick the cube", NO_VIDEO)
@@ -336,6 +383,7 @@ def test_a_new_episode_forgets_the_subgoal(learned_hands):
 def test_a_learned_policy_is_hosted_unless_hands_read_the_simulator(
     saved_policy, options, is_privileged
 ):
+    """A hosted policy has a process of its own, out of which scripted hands could not read."""
     from roboirg.policies.by_name.finding import read_policy
 
     ref = read_policy(saved_policy.spec + options)
@@ -346,6 +394,7 @@ def test_a_learned_policy_is_hosted_unless_hands_read_the_simulator(
 
 @pytest.mark.sim
 def test_a_learned_planner_can_ask_scripted_hands(saved_policy):
+    """The planner looks through the front camera; scripted hands need no picture."""
     from roboirg.policies.by_name.finding import make_policy
     from roboirg_learn.policy.subgoal_following import LearnedPlanner
 
@@ -357,15 +406,23 @@ def test_a_learned_planner_can_ask_scripted_hands(saved_policy):
 
 @pytest.mark.sim
 @pytest.mark.parametrize(
-    ("options", "actions"), [("", "waypoint"), ("%26actions=joint_angle", "joint_angle")]
+    ("options", "kind", "actions"),
+    [
+        ("", "LearnedHands", "waypoint"),
+        ("%26actions=joint_angle", "JointChunksOfHands", "joint_angle"),
+    ],
 )
-def test_the_oracle_can_ask_learned_hands(saved_policy, options, actions):
+def test_the_oracle_can_ask_learned_hands(saved_policy, options, kind, actions):
+    """The oracle names the right subgoals, and the saved policy, as its hands, carries them out.
+
+    It acts in waypoints. With the option actions=joint_angle (%26 is an escaped &) it is wrapped in
+    `JointChunksOfHands`, which turns waypoints into joint angles.
+    """
     from roboirg.policies.by_name.finding import make_policy
-    from roboirg_learn.policy.subgoal_following import LearnedHands
 
     policy = make_policy(f"planner:oracle?hands={saved_policy.spec}{options}", 0)
 
-    assert isinstance(policy.policy, LearnedHands) == (actions == "waypoint")
+    assert type(policy.policy).__name__ == kind
     assert policy.actions == actions
 
 
@@ -379,6 +436,7 @@ def test_the_oracle_can_ask_learned_hands(saved_policy, options, actions):
     ids=["joint angles of scripted hands", "a planner that waits for reports"],
 )
 def test_a_combination_that_cannot_act_is_refused(saved_policy, spec, reason):
+    """Scripted hands act in one way only, and learned hands never report that a subgoal is done."""
     from roboirg.core.errors import InvalidValueError
     from roboirg.policies.by_name.finding import make_policy
 

@@ -379,11 +379,15 @@ class _TableChoice(NamedTuple):
 
         With the published values, the tables that have some are always among them.
         """
-        from roboirg.analysis.measures.chance import FLOORS
         from roboirg.analysis.published import RATE_TABLES
         from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
-        floors = () if self.floors is None else known_names("floor", self.floors, FLOORS)
+        floors: Sequence[str] = ()
+        if self.floors is not None:
+            # Imported here because it brings the reader's patterns, which no other table needs.
+            from roboirg.analysis.measures.chance import FLOORS
+
+            floors = known_names("floor", self.floors, FLOORS)
         make = functools.partial(make_table, data=data, published=self.published, floors=floors)
         if self.which != _ALL:
             table = make(self.which)

@@ -21,14 +21,14 @@ class Trait(NamedTuple):
         meaning: a sentence on what it means that there are several.
         text: returns a value in words, or None if it fits all others.
         owner: returns what of a result has the value; only values of one owner should be the same.
-            None if those of all results should.
+            It is always "" if those of all results should.
     """
 
     path: str
     plural: str
     meaning: str
     text: Callable[[Any], str | None] = str
-    owner: Callable[[Any], str] | None = None
+    owner: Callable[[Any], str] = lambda _result: ""
 
 
 _UNFAIR = "They are kept apart and cannot be compared."
@@ -94,6 +94,13 @@ _OF_POLICY = (
 )
 """What must be equal in all results of a policy."""
 
+_read_compared = operator.attrgetter(
+    "policy",
+    "task",
+    *(trait.path for trait in (*FAIRNESS, *_COMMON, _PACKAGE, *_OF_POLICY)),
+)
+"""Returns all that is compared here of a result, and what owns its words."""
+
 
 def mixtures(results: Collection[Summary]) -> list[str]:
     """Return a warning for each property in which results differ that are compared or averaged.
@@ -102,11 +109,12 @@ def mixtures(results: Collection[Summary]) -> list[str]:
     is mixed. Some properties, such as the split, should be the same in all results, others, such as
     a policy's version, only in those of one policy.
     """
-    sentences = [*differing(results, FAIRNESS), *differing(results, _COMMON)]
-    if any(result.verdict_code is None for result in results):
-        sentences += differing(results, [_PACKAGE])
-    for policy in sorted({result.policy for result in results}):
-        of_policy = [result for result in results if result.policy == policy]
+    distinct = _distinct(results)
+    sentences = [*differing(distinct, FAIRNESS), *differing(distinct, _COMMON)]
+    if any(result.verdict_code is None for result in distinct):
+        sentences += differing(distinct, [_PACKAGE])
+    for policy in sorted({result.policy for result in distinct}):
+        of_policy = [result for result in distinct if result.policy == policy]
         sentences += differing(of_policy, _OF_POLICY, f" of {policy}")
     return sentences
 
@@ -125,21 +133,20 @@ def differing(
             others.
         of_whom: stands behind the property in a sentence, such as `` of mine``.
     """
+    distinct = _distinct(results)
     for trait in traits:
+        value_of = operator.attrgetter(trait.path)
         texts: dict[str, set[str]] = {}  # values in words, by owner
-        for owner, value in _owned_values(results, trait):
-            text = trait.text(value)
+        for result in distinct:
+            text = trait.text(value_of(result))
             if text is not None:
-                texts.setdefault(owner, set()).add(str(text))
+                texts.setdefault(trait.owner(result), set()).add(str(text))
         for owner in sorted(texts):
             if len(texts[owner]) > 1:
                 listed = ", ".join(sorted(texts[owner]))
                 yield f"Mixed {trait.plural}{of_whom}: {listed}. {trait.meaning}"
 
 
-def _owned_values(results: Iterable[Summary], trait: Trait) -> set[tuple[str, Any]]:
-    """Return the distinct values of a trait, each with its owner; an empty one if it has none."""
-    value_of = operator.attrgetter(trait.path)
-    if trait.owner is None:
-        return {("", value) for value in set(map(value_of, results))}
-    return {(trait.owner(result), value_of(result)) for result in results}
+def _distinct(results: Iterable[Summary]) -> Collection[Summary]:
+    """Return one of all results that agree in everything that is compared here."""
+    return {_read_compared(result): result for result in results}.values()

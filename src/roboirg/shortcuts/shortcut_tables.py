@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from rich.table import Table
@@ -32,7 +32,13 @@ from roboirg.shortcuts.shortcut_scores import (
     rule_scores,
     score_guess,
 )
-from roboirg.stats.intervals import ALPHA, critical_value
+from roboirg.shortcuts.shortcut_shares import (
+    FEWEST_TEXTS,
+    Excess,
+    Group,
+    ShortcutRow,
+    ShortcutShares,
+)
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode, split_episodes
 
@@ -48,70 +54,13 @@ FIRST_JUDGED = 700_000
 """The same for those on which the best learner is chosen."""
 _MADE_UP_TEXTS = 2
 """Texts that are added, one right and one wrong, so that no standard error is 0."""
-MARGIN = 0.05
-"""By how much a floor may exceed chance before its setting counts as solved by it."""
 
 Grouping = Literal["pattern", "task", "slot"]
 GROUPINGS: tuple[Grouping, ...] = get_args(Grouping)
-Group = tuple[str, ...]
-"""A setting, and within it a reasoning pattern, task or slot if the table has a row for each."""
 Scored = tuple[InstructedEpisode, Mapping[str, ShortcutScore]]
 """An instruction with its episode, and its score by shortcut, such as ``chance``."""
 GroupsOf = Callable[[InstructedEpisode], Iterable[tuple[Group, Sequence[str]]]]
 """Returns the rows in which an instruction counts, and for each its goal slots that count there."""
-
-
-FEWEST_TEXTS = 50
-"""With fewer, the interval of an excess holds the true one in less than 93 of 100 simulations."""
-
-
-class ShortcutShares(NamedTuple):
-    """How often a shortcut is right, as means over instructions, 0 to 1.
-
-    Attributes:
-        slots: the share of scored slots that it guesses right; None if none is scored.
-        goals: the share of instructions whose whole goal it guesses right.
-    """
-
-    slots: float | None
-    goals: float
-
-
-class Excess(NamedTuple):
-    """By how much the floor ``text-only`` exceeds the larger of chance and ``majority``.
-
-    Attributes:
-        value: difference of the shares of slots, -1 to 1.
-        error: its standard error, over instructions.
-    """
-
-    value: float
-    error: float
-
-    def interval(self, count: int) -> tuple[float, float]:
-        """Return its interval, Bonferroni-adjusted for `count` of them.
-
-        95 % of the time all of these are right.
-        """
-        reach = critical_value(ALPHA / count) * self.error
-        return self.value - reach, self.value + reach
-
-
-@dataclass(frozen=True, slots=True)
-class ShortcutRow:
-    """One row of the table.
-
-    Attributes:
-        group: what the row is about, ``("direct", "PickXtimes")``.
-        count: number of instructions.
-        shares: by shortcut, in the order of the columns.
-        excess: of the learner of the words; None without learned floors, or scored slots.
-    """
-
-    group: Group
-    count: int
-    shares: Mapping[str, ShortcutShares]
-    excess: Excess | None = None
 
 
 @dataclass(slots=True)

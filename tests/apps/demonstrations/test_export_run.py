@@ -41,18 +41,19 @@ def contents(root):
 
 @pytest.mark.slow
 def test_a_killed_export_continues_without_a_broken_file(tmp_path, synthetic):
-    """The export is killed after 2, 5, 8 ... written files, each time started again, until it ends.
+    """A process of killed_export.py runs the same export, but is killed (signal 9) where its second
+    file would appear; started again, it is killed at its fifth, eighth, ... until it ends.
 
-    Whenever it can be read, all is in order, and the end is what an export without a kill gives.
-    `last > 10` says that there were kills at several places.
+    After each kill, what can be read is read without an error. The whole export has more than ten
+    files, so there are several kills, and in the end they have made no difference.
     """
     whole = tmp_path / "whole"
     out = tmp_path / "killed"
     export_run.run_export(killed_export.PLAN, whole, 0, quiet)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(HERE), *sys.path])}
 
-    for last in itertools.count(2, 3):
-        command = [sys.executable, HERE / "killed_export.py", out, str(last)]
+    for killed_at_file in itertools.count(2, 3):
+        command = [sys.executable, HERE / "killed_export.py", out, str(killed_at_file)]
         done = subprocess.run(command, env=environment, check=False)
         if (out / "meta/info.json").exists():
             assert list(read_dataset(out))
@@ -60,7 +61,7 @@ def test_a_killed_export_continues_without_a_broken_file(tmp_path, synthetic):
             break
         assert done.returncode == -signal.SIGKILL
 
-    assert last > 10
+    assert killed_at_file > 10
     assert contents(out) == contents(whole)
 
 
@@ -96,9 +97,10 @@ def test_a_stopped_export_goes_on_and_records_each_trajectory_once(
 def test_progress_counts_recorded_trajectories_with_their_size_and_written_episodes(
     tmp_path, synthetic, make_plan
 ):
-    """Of six trajectories four succeed, so four are written at the end.
+    """Progress is told as what is done ("record" or "write"), how many, of how many, and the bytes
+    until then. Six trajectories are recorded, of which four succeed and are written.
 
-    Sizes are of all trajectories up to then, so they grow.
+    Sizes are of all trajectories up to then, so each is larger than the one before.
     """
     progress = []
     export_run.run_export(make_plan(), tmp_path, 0, lambda *now: progress.append(now))
@@ -109,9 +111,10 @@ def test_progress_counts_recorded_trajectories_with_their_size_and_written_episo
 
 
 def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, monkeypatch):
-    """The second export, in another format and setting, must record nothing: it can't.
+    """Trajectories of the first export are kept in a folder of their own. The second export, in
+    another format and setting, must record nothing: `record_trajectory` is None by then.
 
-    `record_trajectory` is None by then. Two tasks with two successes each are four episodes.
+    Two tasks with two successes each are four episodes.
     """
     kept = tmp_path / "kept"
     export_run.run_export(make_plan(), tmp_path / "v3", 0, quiet, kept)
@@ -160,48 +163,66 @@ def test_kept_trajectories_of_another_world_are_not_taken(
     assert export_run.run_export(make_plan(), tmp_path / "second", 0, quiet, kept).recorded == 6
 
 
-def test_a_trajectorys_name_has_all_that_it_depends_on(make_plan):
-    """Each field of a job in turn gets another value: each job has another name.
+OTHER_EPISODES = {
+    "task": "StopCube", "split": "val", "number": 1, "variation": 1, "policy": "forgetful",
+}  # fmt: skip
+OTHER_RECORDINGS = {
+    "coding": "lossless-video", "video": True, "depth": True, "cameras": ("wrist",), "size": 64,
+    "actions": "waypoint", "disturbed": True,
+}  # fmt: skip
+OTHER_WORDS = {
+    "setting": "direct", "form": "resolved", "stages": (1, 5), "frame": "camera",
+    "distractor": "competing", "distractors": 3, "wordings": "train", "delivery": "turns",
+}  # fmt: skip
+"""By the field of a recording job, of its `spec`, and of its `options`: another value."""
 
-    A field that the name lacked would give the trajectory of another plan. The first assertions say
-    that no field of recordings and of words was forgotten above.
-    """
-    other_episodes = {
-        "task": "StopCube", "split": "val", "number": 1, "variation": 1, "policy": "forgetful",
-    }  # fmt: skip
-    other_recordings = {
-        "coding": "lossless-video", "video": True, "depth": True, "cameras": ("wrist",), "size": 64,
-        "actions": "waypoint", "disturbed": True,
-    }  # fmt: skip
-    other_words = {
-        "setting": "direct", "form": "resolved", "stages": (1, 5), "frame": "camera",
-        "distractor": "competing", "distractors": 3, "wordings": "train", "delivery": "turns",
-    }  # fmt: skip
+
+@pytest.fixture
+def job(make_plan):
+    """The first trajectory to be recorded for a listener, which hears the words."""
     ((job, _), *_) = recording_jobs(make_plan(policy="listener"))
-    assert set(other_recordings) == set(job.spec._fields)
-    assert set(other_words) == set(OPTION_NAMES)
+    return job
 
+
+def test_every_field_of_a_recording_and_of_words_has_another_value_here(job):
+    """Or the test below would not try a field that was added."""
+    assert set(OTHER_RECORDINGS) == set(job.spec._fields)
+    assert set(OTHER_WORDS) == set(OPTION_NAMES)
+
+
+def test_a_trajectorys_name_has_all_that_it_depends_on(job):
+    """A kept trajectory is found by its name. Each field of a job in turn gets another value, and
+    each such job has another name; else a plan could be given the trajectory of another one.
+    """
     jobs = [job]
-    for name, value in other_episodes.items():
+    for name, value in OTHER_EPISODES.items():
         jobs.append(replace(job, **{name: value}))
-    for name, value in other_recordings.items():
+    for name, value in OTHER_RECORDINGS.items():
         jobs.append(replace(job, spec=job.spec._replace(**{name: value})))
-    for name, value in other_words.items():
+    for name, value in OTHER_WORDS.items():
         if name != "distractors":  # without a kind of distractors their number says nothing
             jobs.append(replace(job, options=replace(job.options, **{name: value})))
 
     assert len({each.path(Path()) for each in jobs}) == len(jobs)
 
 
-@pytest.mark.parametrize("name", ["language_label", "ENVIRONMENT_VERSION", "TRAJECTORY_VERSION"])
-def test_a_stopped_export_of_another_version_is_another_one(make_plan, monkeypatch, name):
-    """The label names the words of each task; each of the three is replaced by "another"."""
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("language_label", lambda *_: "another"),
+        ("ENVIRONMENT_VERSION", "another"),
+        ("TRAJECTORY_VERSION", "another"),
+    ],
+)
+def test_the_fingerprint_of_a_plan_of_an_export_follows_from_the_package_s_versions(
+    make_plan, monkeypatch, name, value
+):
+    """An export that was stopped goes on only with the same fingerprint, so not after an update of
+    the words (`language_label` names those of a task), the world, or the format of trajectories.
+    """
     before = make_plan().fingerprint()
 
-    other = "another"
-    if name == "language_label":
-        other = lambda *_: "another"  # noqa: E731
-    monkeypatch.setattr(export_plan, name, other)
+    monkeypatch.setattr(export_plan, name, value)
 
     assert make_plan().fingerprint() != before
 
@@ -209,7 +230,6 @@ def test_a_stopped_export_of_another_version_is_another_one(make_plan, monkeypat
 @pytest.mark.parametrize(
     ("options", "statuses"),
     [({}, ["success"] * 4), ({"outcomes": "all"}, ["success", "failure", "success"] * 2)],
-    ids=["by default", "on request"],
 )
 def test_failures_are_exported_only_on_request(export, options, statuses):
     """Of three episodes of two tasks the second of each fails, so four of six succeed."""
@@ -217,7 +237,9 @@ def test_failures_are_exported_only_on_request(export, options, statuses):
 
 
 def test_the_mean_of_next_success_is_the_share_of_steps_that_end_in_success(export):
-    """Four of six episodes succeed, each in its last step."""
+    """Four of six synthetic episodes succeed, each in the last of its seven steps; `next.success`
+    is 1 there and 0 in all other frames. With failures (`outcomes`), there are 6 * 7 frames.
+    """
     root = export(outcomes="all")
 
     stats = json.loads((root / "meta/stats.json").read_text())["next.success"]
@@ -283,6 +305,7 @@ def test_a_complete_export_is_not_overwritten(export, make_plan):
 
 
 def test_a_folder_of_something_else_is_not_written_to(tmp_path, make_plan):
+    """A folder with a file that is no part of an export is refused before anything is written."""
     (tmp_path / "thesis.tex").touch()
 
     with pytest.raises(InvalidValueError, match="is not empty and no export"):
@@ -334,6 +357,9 @@ def test_the_card_says_how_many_episodes_of_which_outcome_there_are(export):
 
 
 def test_the_card_of_version_3_has_the_command_that_trains(export):
+    """Below `lerobot-train` stand its options: PyAV decodes the export's videos everywhere, and
+    nothing is pushed to a hub. A sentence warns that such a policy solved 0 of 50 episodes.
+    """
     card = (export(pictures="lossy-video") / "README.md").read_text()
 
     _, _, training = card.partition("lerobot-train")
@@ -344,6 +370,10 @@ def test_the_card_of_version_3_has_the_command_that_trains(export):
 
 
 def test_the_card_of_version_2_1_has_a_configuration_that_trains(export):
+    """Version 2.1 of the format is for openpi, which is configured in Python. The card's block of
+    Python has to compile, and maps the wrist's picture to the name that openpi's policies have for
+    it.
+    """
     card = (export(format="lerobot-v2.1") / "README.md").read_text()
 
     config = card.split("```python\n")[1].split("```")[0]

@@ -137,21 +137,32 @@ def test_all_frames_are_numbered_and_counted(export, version):
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_every_frame_has_the_words_of_its_episode(export, version):
-    """The instruction of the episode in its setting is in three places, and in each frame by
-    number. `facts` is the table of what was recorded; a dataset's "task" is its text.
+    """Our table of what was recorded has the text of each episode; LeRobot's metadata have it, too,
+    and each frame has its number in the dataset's list of texts.
     """
     root = export(format=version)
     texts = texts_of(root)
-    facts = pd.read_parquet(root / "meta/demonstrations.parquet").set_index("episode_index")
+    recordings = read_rows(root / "meta/demonstrations.parquet")
 
-    for row, frames in episodes_of(root):
-        fact = facts.loc[row["episode_index"]]
-        episode = get_episode(fact.task, fact.split, int(fact.episode))
-        said = instruct(episode, fact.setting, fact.form).text
-        assert (fact.text, row["tasks"][0], fact.explicit) == (said, said, instruct(episode).text)
-        assert {texts[frame["task_index"]] for frame in frames} == {said}
+    for recording, (row, frames) in zip(recordings, episodes_of(root), strict=True):
+        assert row["episode_index"] == recording["episode_index"]
+        assert row["tasks"] == [recording["text"]]
+        assert {texts[frame["task_index"]] for frame in frames} == {recording["text"]}
 
-    assert read_json(root / "meta/info.json")["total_tasks"] == len(texts)
+
+def test_the_words_of_a_recording_are_its_instruction(export):
+    """Each row of the table has the text in its own setting, made here anew, and the same command
+    with nothing left implicit. Texts that differ are the dataset's tasks."""
+    root = export()
+
+    recordings = read_rows(root / "meta/demonstrations.parquet")
+
+    for row in recordings:
+        episode = get_episode(row["task"], row["split"], row["episode"])
+        assert row["text"] == instruct(episode, row["setting"], row["form"]).text
+        assert row["explicit"] == instruct(episode).text
+    distinct = {row["text"] for row in recordings}
+    assert read_json(root / "meta/info.json")["total_tasks"] == len(distinct)
 
 
 def test_version_3_has_pose_actions_and_subgoals(export):
@@ -223,7 +234,9 @@ def test_version_3_has_statistics_of_all_frames(export, name):
 
 
 def test_version_3_has_statistics_of_pictures_between_0_and_1(export):
-    """The mean of a color is that of all pixels, divided by 255."""
+    """LeRobot divides pixels of 0 to 255 by 255, so the mean of a color is that of all pixels of
+    all frames, divided by 255. Texts such as subgoals have no statistics.
+    """
     root = export()
 
     stats = read_json(root / "meta/stats.json")
@@ -250,37 +263,47 @@ def data_bytes(root):
     return sum(path.stat().st_size for path in (root / "data").rglob("*.parquet"))
 
 
-@pytest.fixture(params=[("lerobot-v3", "png"), ("lerobot-v2.1", "lossless-video")], ids=str)
-def small_wrist_export(export, request):
-    """The folder of an export of the wrist's pictures alone, of 96 × 96 pixels."""
-    version, pictures = request.param
-    return export(
-        cameras=("wrist",), size=96, pictures=pictures, format=version, settings=("explicit",)
-    )
+SMALL = {"cameras": ("wrist",), "size": 96, "settings": ("explicit",)}
+PICTURES_IN_TABLES = {"format": "lerobot-v3", "pictures": "png", **SMALL}
+PICTURES_IN_FILMS = {"format": "lerobot-v2.1", "pictures": "lossless-video", **SMALL}
+"""Exports of the wrist's pictures alone, of 96 × 96 pixels, of four episodes in one setting."""
 
 
-def test_one_camera_in_small_pictures_is_described_as_such(small_wrist_export):
-    """Two tasks with two successful episodes each, in one setting: pictures of four episodes."""
-    info = read_json(small_wrist_export / "meta/info.json")
-    stats = read_json(small_wrist_export / "meta/stats.json")
+@pytest.mark.parametrize("options", [PICTURES_IN_TABLES, PICTURES_IN_FILMS])
+def test_one_camera_in_small_pictures_is_described_as_such(export, options):
+    """Two tasks with two successful episodes each, of seven steps: 4 * 7 pictures."""
+    root = export(**options)
 
+    info = read_json(root / "meta/info.json")
     assert [name for name in info["features"] if "images" in name] == [WRIST]
     assert info["features"][WRIST]["shape"] == [96, 96, 3]
-    assert stats[WRIST]["count"] == [4 * synthetic.STEPS]
-    assert "Cameras: wrist; 96 × 96 pixels." in (small_wrist_export / "README.md").read_text()
+    assert read_json(root / "meta/stats.json")[WRIST]["count"] == [4 * 7]
+    assert "Cameras: wrist; 96 × 96 pixels." in (root / "README.md").read_text()
 
 
-def test_small_pictures_are_scaled(small_wrist_export):
-    """The picture at step 3 of the first episode, from its film or, if there is none, its table."""
+@pytest.fixture
+def scaled_picture():
+    """The wrist's picture at step 3 of the first synthetic episode, scaled to 96 × 96 pixels."""
     seed = get_episode("PickXtimes", "train", 0).seed
+    return scaled_square(synthetic.picture("wrist", seed, 3), 96)
 
-    films = sorted(small_wrist_export.rglob("*.mp4"))
-    if films:
-        shown = frames_of(films[0])[3]
-    else:
-        shown = decoded(read_rows(min(small_wrist_export.rglob("data/**/*.parquet")))[3][WRIST])
 
-    assert np.array_equal(shown, scaled_square(synthetic.picture("wrist", seed, 3), 96))
+def test_small_pictures_in_tables_are_scaled(export, scaled_picture):
+    """A row of the first table is a step of the first episode, and has its picture as PNG."""
+    root = export(**PICTURES_IN_TABLES)
+
+    rows = read_rows(min(root.rglob("data/**/*.parquet")))
+
+    assert np.array_equal(decoded(rows[3][WRIST]), scaled_picture)
+
+
+def test_small_pictures_in_films_are_scaled(export, scaled_picture):
+    """The first film is that of the first episode; its coding loses nothing."""
+    root = export(**PICTURES_IN_FILMS)
+
+    pictures = frames_of(min(root.rglob("*.mp4")))
+
+    assert np.array_equal(pictures[3], scaled_picture)
 
 
 @pytest.fixture
@@ -303,25 +326,28 @@ def test_the_video_comes_before_the_policys_turn_and_is_marked(export_with_video
 
 
 def test_a_film_of_an_episode_shows_the_video_too(export_with_video):
-    """Its length is that of all frames at 20 a second, from 0 on.
+    """The synthetic episode has four frames of the task's video, which come before the policy's
+    turn, and then seven of the policy: 11 frames, at 20 a second. One more picture, after the last
+    step, is in the film and belongs to no frame.
 
     The synthetic picture of a frame follows from the episode's seed and the frame's number.
     """
     seed = get_episode("VideoUnmask", "train", 0).seed
     key = f"videos/{WRIST}"
 
-    row, frames = next(episodes_of(export_with_video))
+    row, _ = next(episodes_of(export_with_video))
     film = frames_of(export_with_video / f"{key}/chunk-000/file-000.mp4")
 
     assert row[f"{key}/from_timestamp"] == 0.0
-    assert row[f"{key}/to_timestamp"] == pytest.approx(len(frames) / 20)
-    assert len(frames) == 4 + synthetic.STEPS
-    for time, picture in enumerate(film):
-        assert np.array_equal(picture, synthetic.picture("wrist", seed, time))
+    assert row[f"{key}/to_timestamp"] == pytest.approx((4 + 7) / 20)
+    expected = [synthetic.picture("wrist", seed, number) for number in range(4 + 7 + 1)]
+    assert np.array_equal(film, expected)
 
 
 def test_version_2_1_has_a_file_and_statistics_for_each_episode_and_no_videos(export):
-    """Two tasks and two settings of two episodes that succeed."""
+    """Two tasks in two settings, with two successful episodes each, are eight episodes. A chunk is
+    a folder of up to 1,000 files; pictures are in tables here, not in videos.
+    """
     root = export(format="lerobot-v2.1")
 
     assert len(list((root / "data").rglob("*.parquet"))) == 8

@@ -55,9 +55,10 @@ def test_a_policy_that_gives_up_has_its_trajectory_as_a_failure(tmp_path):
 
 
 def test_recorded_pictures_and_states_are_those_of_the_same_actions_in_a_new_world(tmp_path):
-    """Bit for bit, at reset (row 0) and after each of 13 steps.
+    """`Impatient` moves for 13 steps, so a recording has 14 rows: the reset, which has no action,
+    and the moment after each step. A new environment executes the same actions.
 
-    Row 0 has no action that was taken, hence `actions[1:]`. Depth is compared, too.
+    What it shows is equal bit for bit: states, colors and depths of both cameras.
     """
     path = tmp_path / "one.zip"
     episode = get_episode("PickXtimes", "train", 0)
@@ -66,12 +67,14 @@ def test_recorded_pictures_and_states_are_those_of_the_same_actions_in_a_new_wor
 
     env = make(episode, depth=True, grounded=True, observe_every=1, demonstration_frames="none")
     first, _ = env.reset()
-    last = env.step_chunk(recorded.actions[1:])[0]
+    last, *_ = env.step_chunk(recorded.actions[1:])
+    observations = [first, *last["history"]]
 
+    for name in ("joint_positions", "gripper", "end_effector"):
+        seen = [observation[name] for observation in observations]
+        assert np.array_equal(getattr(recorded, name), seen), name
     with zipfile.ZipFile(path) as archive:
-        for row, seen in enumerate((first, *last["history"])):
-            for name in ("joint_positions", "gripper", "end_effector"):
-                assert np.array_equal(getattr(recorded, name)[row], seen[name])
+        for row, seen in enumerate(observations):
             for camera in ("front", "wrist"):
                 assert np.array_equal(read_picture(archive, camera, row), seen[f"{camera}_rgb"])
                 assert np.array_equal(read_depth(archive, camera, row), seen[f"{camera}_depth"])
@@ -111,7 +114,9 @@ def disturbed(tmp_path, make_plan, request):
 
 
 def test_a_disturbed_expert_is_labeled_by_what_it_meant_and_replays_exactly(disturbed):
-    """Labels differ from what was executed in some steps but not in all (by more than 1e-6).
+    """A disturbed expert moves a little elsewhere than it meant to, now and then. The label
+    `action` is what it meant: in some steps it differs from what was executed (by more than 1e-6),
+    but not in all.
 
     The replay executes what was executed, so it ends with the same verdict and no difference.
     """

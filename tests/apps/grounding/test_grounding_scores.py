@@ -72,9 +72,11 @@ def test_the_oracle_is_always_right(kind):
 
 @pytest.mark.parametrize("kind", ["slots", "choice"])
 def test_random_answers_are_at_chance(kind):
-    """Random answers are right as often as `guess_chance` says of their items.
+    """The floor `chance` answers each item at random. It has to be right as often as `guess_chance`
+    computes for the items, in the mean.
 
-    Over 3,000 answers a rate has a standard error of at most 0.0091, so 0.03 is more than three.
+    At least 3,000 answers, with as many seeds as that takes, have a standard error of at most
+    sqrt(0.25 / 3000) = 0.0091, so a deviation of 0.03 is more than three of these.
     """
     known = {item.id: item for item in items()}
     right = []
@@ -313,37 +315,41 @@ def test_only_items_with_hidden_slots_have_a_rate_of_them(half_answered):
     assert (rows["explicit"].hidden, rows["direct"].hidden) == (None, 0)
 
 
+@pytest.mark.parametrize("setting", ["direct", "reasoning", "contextual"])
 @pytest.mark.parametrize("rule", ["first-mention", "surface"])
-def test_shortcuts_are_right_as_often_as_the_listeners_that_use_them(rule):
-    """A rule answers items as often right as `floor_level` says of a policy with the same rule.
+def test_shortcuts_are_right_as_often_as_the_listeners_that_use_them(rule, setting):
+    """A shortcut answers by a rule about the words, such as the color that is named first, without
+    understanding them. Answers to questions follow the same rules as listeners that play.
 
-    A setting has 48 items (24 episodes of two tasks), so 0.15 is two standard errors of a rate.
+    `floor_level` computes how often such a listener decides the right goal. The rate of answers to
+    48 items, of the same episodes, is within 0.15 of it: two standard errors, for ties are drawn.
     """
     dataset = items(episodes=24, tasks=("PickXtimes", "VideoPlaceButton"))
+    options = InstructionOptions(setting)
+    jobs = []
+    for task in ("PickXtimes", "VideoPlaceButton"):
+        for episode in range(24):
+            jobs.append(Job(policy=rule, task=task, split="test", episode=episode, options=options))
+
     _, rows = rows_of(floor_answers(rule, dataset), "slots", dataset)
 
-    for setting in ("direct", "reasoning", "contextual"):
-        jobs = []
-        for item in dataset:
-            if item.setting == setting:
-                jobs.append(Job(policy=rule, task=item.task, split="test", episode=item.episode,
-                                options=InstructionOptions(setting)))  # fmt: skip
-        expected = float(floor_level(rule, jobs))
-        assert float(rows[setting].summary.rate) == pytest.approx(expected, abs=0.15), setting
+    expected = float(floor_level(rule, jobs))
+    assert float(rows[setting].summary.rate) == pytest.approx(expected, abs=0.15)
 
 
 def test_who_hears_the_command_alone_is_right_in_explicit_and_guesses_in_direct():
-    """The floor `command` reads the last utterance alone, which says all in explicit.
+    """The floor `command` is a model that reads the last utterance alone, such as "Grab it".
 
-    In direct it picks among the goals that fit: its rate is `command_chance` within 0.15, two
-    standard errors of the rate of 48 items.
+    An explicit instruction is one utterance, so it is always right. In *direct* it guesses among
+    the goals that fit; `command_chance` is the mean chance of that guess, and the rate of 48 items
+    is within 0.15 of it, two standard errors.
     """
     dataset = items(episodes=24, tasks=("PickXtimes", "VideoPlaceButton"))
 
     _, rows = rows_of(floor_answers("command", dataset), "slots", dataset)
 
-    assert rows["explicit"].summary.rate == 1
     chance = rows["direct"].command_chance
+    assert rows["explicit"].summary.rate == 1
     assert float(rows["direct"].summary.rate) == pytest.approx(chance, abs=0.15)
 
 

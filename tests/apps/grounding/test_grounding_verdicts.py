@@ -56,9 +56,12 @@ def own_verdicts():
 
 
 def test_the_listener_is_asked_what_the_dataset_asks_and_takes_its_answer():
-    """A vision-language listener is served the item's right answer and decides the right goal.
+    """A vision-language listener plays: a model reads the instruction and names the goal. Here the
+    model is a server that always replies with the right answer of an item of the dataset, so the
+    goal is right.
 
-    The request that the server got has the texts of the dataset's item in their order.
+    The request that the server got has the texts of the item in their order: what was said, what
+    the pictures show, and the question.
     """
     item = next(item for item in items() if item.setting == "direct")
     episode = get_episode(item.task, item.split, item.episode)
@@ -107,55 +110,71 @@ def run_inspect(data, replies_of, logs, question="slots", stop_reason="stop", **
     return log
 
 
-def test_inspect_and_our_scores_agree(data, tmp_path):
-    """A scripted model answers right, wrong and unusably by turns (`replies`).
+@pytest.fixture(scope="module")
+def scripted_log(data, tmp_path_factory):
+    """Inspect's log of a model that gives `replies`: right, wrong and unusable ones by turns."""
 
-    Inspect and `score_answers` agree on each item. An unusable reply is asked for once more, so
-    that its conversation has four messages instead of two.
-    """
-    pytest.importorskip("inspect_ai")
-    from roboirg.apps.grounding.inspect_grounding import log_answers
-
-    lengths = []
-
-    def scripted(messages):
+    def reply(messages):
         texts = [part.text for part in messages[1].content if part.type == "text"]
-        lengths.append(len(messages))
         return replies()[texts[0], texts[-1]]
 
-    verdicts = own_verdicts()
-    ours = {name: verdict.right for name, verdict in verdicts.items()}
-    unusable = sum(verdict.understood is None for verdict in verdicts.values())
+    return run_inspect(data, reply, tmp_path_factory.mktemp("logs"))
 
-    log = run_inspect(data, scripted, tmp_path)
 
-    assert {str(sample.id): bool(sample.scores["right"].value) for sample in log.samples} == ours
-    given = {answer.id: answer.reply for answer in log_answers(log)}
-    assert given == {item.id: replies()[asked(item)] for item in items()}
-    assert lengths.count(4) == unusable > 0  # each of them was asked once more
-    metrics = log.results.scores[0].metrics
-    assert metrics["accuracy"].value == pytest.approx(sum(ours.values()) / len(ours))
+def test_inspect_and_our_scores_have_the_same_verdict_on_each_reply(scripted_log):
+    """In `scripted_log`, Inspect judged right, wrong and unusable replies; `own_verdicts` are those
+    of `score_answers` on the same replies, by the items' ids. The accuracy is the share of right
+    ones; a third of them is right in *direct*, which has an accuracy of its own."""
+    expected = {name: verdict.right for name, verdict in own_verdicts().items()}
+
+    found = {}
+    for sample in scripted_log.samples:
+        found[str(sample.id)] = bool(sample.scores["right"].value)
+
+    metrics = scripted_log.results.scores[0].metrics
+    assert found == expected
+    assert metrics["accuracy"].value == pytest.approx(np.mean(list(expected.values())))
     assert metrics["direct"].value > 0
+
+
+def test_the_answers_of_an_inspect_log_are_the_replies_of_the_model(scripted_log):
+    """`replies` has what the scripted model says about each item."""
+    from roboirg.apps.grounding.inspect_grounding import log_answers
+
+    given = {answer.id: answer.reply for answer in log_answers(scripted_log)}
+
+    assert given == {item.id: replies()[asked(item)] for item in items()}
+
+
+def test_inspect_asks_for_an_unusable_reply_once_more(scripted_log):
+    """A conversation has three messages: the system's, the question and the reply. With a second
+    request and its reply, it has five. A verdict in which nothing was understood is of an unusable
+    reply."""
+    verdicts = own_verdicts()
+
+    asked_twice = {str(sample.id) for sample in scripted_log.samples if len(sample.messages) == 5}
+
+    assert asked_twice
+    assert asked_twice == {name for name in verdicts if verdicts[name].understood is None}
 
 
 @pytest.mark.parametrize("question", ["choice", "points"])
 def test_inspect_asks_the_other_questions(data, tmp_path, question):
-    """The model gets one picture and gives the right reply, so that all are right: accuracy 1.
+    """The first text of a request is the instruction, its last the question, which tell the item;
+    between them is one picture, as the dataset has no video here.
 
-    Options of the task leave the setting direct and two tasks.
+    A scripted model gives the right reply, so the accuracy is 1. Options leave of the dataset the
+    items of one task in *direct*.
     """
     pytest.importorskip("inspect_ai")
-    right = {item.question(question) + item.said: item for item in items()}
+    item_by_texts = {(item.said, item.question(question)): item for item in items()}
 
-    def scripted(messages):
-        content = messages[1].content
-        assert sum(part.type == "image" for part in content) == 1
-        item = right[content[-1].text + content[0].text]
-        return right_reply(item, question)
+    def reply(messages):
+        said, *between, asked_last = messages[1].content
+        assert [part.type for part in between].count("image") == 1
+        return right_reply(item_by_texts[said.text, asked_last.text], question)
 
-    log = run_inspect(
-        data, scripted, tmp_path, question, settings="direct", tasks="PickXtimes,StopCube"
-    )
+    log = run_inspect(data, reply, tmp_path, question, settings="direct", tasks="PickXtimes")
 
     assert {sample.metadata["setting"] for sample in log.samples} == {"direct"}
     assert log.results.scores[0].metrics["accuracy"].value == 1

@@ -6,7 +6,7 @@ pytest.importorskip("inspect_ai", reason="Inspect is not installed here; run `ma
 
 from inspect_ai.log import read_eval_log
 from page_commands import check_versions, run_page
-from planning_fakes import TOKENS, fake_vlm, words_of
+from planning_fakes import fake_vlm, words_of
 from replay_table import (
     EPISODES,
     MANY,
@@ -62,48 +62,74 @@ def ours(model):
         return own_outcomes(spec, meshes="faithful")
 
 
-@pytest.mark.parametrize("samples", SAMPLES)
-def test_the_page_s_commands_have_the_outcomes_of_our_runner(model, ours, tmp_path, samples):
-    """The page's commands are played by Inspect with a scripted model, right in every other
-    episode. Replaced are the tasks, and how many episodes are played, and how many at a time.
-    `ours` has outcomes of our runner with the same model: they agree in success and steps. The
-    model is told neither setting nor seed, and is asked once an episode.
+@pytest.fixture(scope="module", params=SAMPLES)
+def inspect_log(model, request, tmp_path_factory):
+    """Inspect's log of the page's command, in which the server of `model` replies.
+
+    The page says `tasks=all`; instead, the episodes of `cases` are played, as many at a time as the
+    parameter says.
     """
     model.requests.clear()
-    more = f"-T episodes={PER_TASK} -T max_steps={MAX_STEPS}"
-
+    folder = tmp_path_factory.mktemp("inspect")
+    options = f"-T episodes={PER_TASK} -T max_steps={MAX_STEPS} --max-samples {request.param}"
     run_page(
         "Inspect",
-        tmp_path,
-        {"tasks=all": f"tasks={','.join(PLAYED)} {more} --max-samples {samples} --display plain"},
+        folder,
+        {"tasks=all": f"tasks={','.join(PLAYED)} {options} --display plain"},
         OPENAI_BASE_URL=f"{model.url}/v1",
         OPENAI_API_KEY="none",
     )
+    (path,) = (folder / "logs").glob("*.eval")
+    return read_eval_log(str(path))
 
-    (path,) = (tmp_path / "logs").glob("*.eval")
-    log = read_eval_log(str(path))
-    successes = 0
+
+def records_in(log):
+    """Return our record of each episode, which Inspect keeps in the metadata of the score."""
+    scores = [score for sample in log.samples for score in sample.scores.values()]
+    return [score.metadata["record"] for score in scores]
+
+
+def test_inspect_and_our_runner_agree_on_success_and_steps_of_each_episode(inspect_log, ours):
+    """`inspect_log` is of the documented command, `ours` of our own runner.
+
+    The model of both is one scripted server, which names the right goal in every other episode, so
+    there are successes and failures. Each entry is the task, the episode, whether it succeeded, and
+    its steps.
+    """
     found = []
-    for sample in log.samples:
-        (score,) = sample.scores.values()
-        record = score.metadata["record"]
-        assert record["options"]["setting"] == SETTING
-        assert record["usage"]["input_tokens"] == TOKENS[0]
+    for record in records_in(inspect_log):
         is_success = record["outcome"] == "success"
         found.append((record["task"], record["episode"], is_success, record["steps"]))
-        successes += score.value
-        check_not_told(model, SETTING, str(record["seed"]))
+
     assert sorted(found) == sorted(ours)
-    assert successes == sum(is_success for _, _, is_success, _ in ours)
-    assert any("accuracy" in score.metrics for score in log.results.scores)
-    assert len(model.requests) == EPISODES
 
 
-def check_not_told(model, *secrets):
-    """Check that no request to the model had these words."""
-    told = "\n".join(map(words_of, model.requests))
-    for secret in secrets:
-        assert secret not in told
+def test_a_success_scores_1_and_a_failure_0_and_inspect_reports_the_accuracy(inspect_log):
+    """`inspect_log` is of the documented command with a scripted model, right in every other
+    episode; each of its samples is one episode, with one score and our record in its metadata."""
+    scores = [score for sample in inspect_log.samples for score in sample.scores.values()]
+
+    assert scores
+    for score in scores:
+        assert score.value == (score.metadata["record"]["outcome"] == "success")
+    assert any("accuracy" in result.metrics for result in inspect_log.results.scores)
+
+
+def test_the_model_is_asked_once_an_episode_and_told_neither_setting_nor_seed(model, inspect_log):
+    """`model` is the scripted server that kept the requests of the command behind `inspect_log`;
+    it counts 100 input tokens for each reply, and a record has those of its episode.
+
+    The command says `setting=contextual`. With this name or the seed, a model could know more than
+    it is told in words.
+    """
+    told = "\n".join(words_of(request) for request in model.requests)
+
+    assert len(model.requests) == len(inspect_log.samples)
+    for record in records_in(inspect_log):
+        assert record["usage"]["input_tokens"] == 100
+        assert record["options"]["setting"] == "contextual"
+        assert "contextual" not in told
+        assert str(record["seed"]) not in told
 
 
 def test_the_page_names_the_version_that_is_played():

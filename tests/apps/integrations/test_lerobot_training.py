@@ -42,8 +42,12 @@ SMALL = {
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """The folder in which the page's commands have run, small."""
+def trained(tmp_path_factory):
+    """The folder in which the commands of docs/training.md have run, small.
+
+    They export two demonstrations, train three policies for four steps each, and play two episodes
+    of at most 40 steps with ACT, by `lerobot-eval` and by `roboirg run`.
+    """
     root = tmp_path_factory.mktemp("training")
     values = {
         "--tasks PickXtimes": f"--tasks {TASK}",
@@ -60,27 +64,57 @@ def folder(tmp_path_factory):
     return root
 
 
-def test_the_page_s_commands_have_equal_outcomes(folder):
-    """The page's commands trained ACT and played two episodes by lerobot-eval and by `roboirg run`.
+def test_lerobot_eval_and_roboirg_run_agree_on_success_of_each_episode(trained):
+    """In the folder `trained`, the documented commands trained ACT and played two episodes of it,
+    with `lerobot-eval` to runs/eval and with `roboirg run` to runs/act.
 
-    `folder` has run them with smaller networks and fewer steps. Both have the same successes.
+    Results of `lerobot-eval` are a list of successes, in the order of episodes.
     """
-    told = json.loads((folder / "runs" / "eval" / "eval_info.json").read_text())
-    (theirs,) = [task["metrics"]["successes"] for task in told["per_task"]]
+    results = json.loads((trained / "runs" / "eval" / "eval_info.json").read_text())
+    (task,) = results["per_task"]
+    records = read_records(trained / "runs" / "act")
 
-    ours = sorted(
-        (record.episode, record.outcome) for record in read_records(folder / "runs" / "act")
-    )
+    ours = {record.episode: record.outcome == "success" for record in records}
 
-    assert ours == [(index, "success" if won else "failure") for index, won in enumerate(theirs)]
-    assert len(ours) == 2
+    assert ours == dict(enumerate(task["metrics"]["successes"]))
+    assert set(ours) == {0, 1}
 
 
 def test_the_page_names_the_version_that_is_played():
     check_versions(None, page="training.md")
 
 
-def lerobot_s_actions(place, episode):
+@pytest.fixture(scope="module")
+def checkpoints(trained):
+    """Folders of the trained policies by their kind, and of a copy of ACT that ensembles."""
+    folders = {kind: trained / "outputs" / kind / LAST for kind in SMALL}
+    folders["ensembling act"] = trained / "ensembling"
+    shutil.copytree(folders["act"], folders["ensembling act"])
+    path = folders["ensembling act"] / "config.json"
+    ensembling = {"temporal_ensemble_coeff": 0.01, "n_action_steps": 1}
+    path.write_text(json.dumps(json.loads(path.read_text()) | ensembling))
+    return folders
+
+
+@pytest.fixture
+def equal_noise(monkeypatch):
+    """Each answer of a policy draws its noise from the same seed, in every loop."""
+    for kind in SMALL:
+        draw_from_one_seed(get_policy_class(kind), monkeypatch)
+
+
+def draw_from_one_seed(policy_class, monkeypatch):
+    """Let a class of policies draw the same noise in each of its answers."""
+    answer = policy_class.predict_action_chunk
+
+    def predict_action_chunk(self, *args, **options):
+        torch.manual_seed(7)
+        return answer(self, *args, **options)
+
+    monkeypatch.setattr(policy_class, "predict_action_chunk", predict_action_chunk)
+
+
+def actions_in_lerobot_s_loop(place, episode):
     """Return the actions that lerobot-eval's loop executes in an episode, (steps, 8)."""
     config = PreTrainedConfig.from_pretrained(place)
     config.device = "cpu"
@@ -94,58 +128,47 @@ def lerobot_s_actions(place, episode):
     return played["action"][0].numpy()
 
 
-def our_actions(place, episode):
-    """Return the actions that lerobot:// executes in an episode, and how many at a time."""
+def answers_in_our_loop(place, episode):
+    """Return the answers of a `lerobot://` policy in an episode, each (actions, 8)."""
     policy = make_policy(f"lerobot://{place}", 0)
-    rows = []
+    answers = []
     act = policy.act
+
+    def act_and_keep(observation):
+        answers.append(act(observation))
+        return answers[-1]
+
+    policy.act = act_and_keep
     options = {"cameras": ("front",), "demonstration_frames": "none", "max_steps": STEPS}
     env = make(TASK, episode=episode, **options)
-    policy.act = lambda seen: rows.append(act(seen)) or rows[-1]
     play(env, policy)
     env.close()
-    return np.concatenate(rows)[:STEPS], [len(row) for row in rows]
+    return answers
 
 
-@pytest.fixture
-def ensembling(folder, tmp_path):
-    """A copy of ACT's checkpoint that ensembles over time."""
-    place = tmp_path / "ensembling"
-    shutil.copytree(folder / "outputs/act" / LAST, place)
-    config = json.loads((place / "config.json").read_text())
-    config |= {"temporal_ensemble_coeff": 0.01, "n_action_steps": 1}
-    (place / "config.json").write_text(json.dumps(config))
-    return place
-
-
+@pytest.mark.usefixtures("equal_noise")
 @pytest.mark.parametrize(
-    ("kind", "at_a_time"),
-    [("act", [8] * 5), ("diffusion", [7, 1] * 5), ("vqbet", [1] * STEPS), ("ensembling", None)],
+    ("kind", "actions_per_answer"),
+    [
+        ("act", [8, 8, 8, 8, 8]),
+        ("diffusion", [7, 1, 7, 1, 7, 1, 7, 1, 7, 1]),
+        ("vqbet", [1] * 40),
+        ("ensembling act", [1] * 40),
+    ],
 )
-def test_actions_are_those_of_lerobot_s_loop(folder, kind, at_a_time, monkeypatch, request):
-    """A policy executes the same actions in our loop and in lerobot-eval's, over 40 steps.
+def test_our_loop_executes_the_actions_of_lerobot_s_loop(checkpoints, kind, actions_per_answer):
+    """A checkpoint plays 40 steps of an episode in both loops, and its noise is equal in both.
 
-    `at_a_time` is how many each answer has: ACT's chunks of 8; diffusion's 7 and 1 in turn;
-    otherwise one. Noise is drawn from the same seed in both, and the arm moves, so that
-    equal actions say something.
+    ACT was trained to execute 8 actions of an answer, and Diffusion Policy plans anew after 7 and 1
+    in turn; VQ-BeT and ACT that ensembles over time answer with one. The arm has to move, as equal
+    actions of an arm at rest would say nothing.
     """
-    place = folder / "outputs" / kind / LAST if at_a_time else request.getfixturevalue(kind)
-    draw_the_same(get_policy_class(kind if at_a_time else "act"), monkeypatch)
-    expected = lerobot_s_actions(place, 1)
+    theirs = actions_in_lerobot_s_loop(checkpoints[kind], episode=1)
 
-    found, counts = our_actions(place, 1)
+    answers = answers_in_our_loop(checkpoints[kind], episode=1)
 
-    assert np.abs(found - expected).max() == 0
-    assert np.ptp(found[:, :7], axis=0).max() > 0
-    assert counts == (at_a_time or [1] * STEPS)
-
-
-def draw_the_same(kind, monkeypatch):
-    """Let a type of policies draw the same noise in each of its answers."""
-    answer = kind.predict_action_chunk
-
-    def predict_action_chunk(self, *args, **options):
-        torch.manual_seed(7)
-        return answer(self, *args, **options)
-
-    monkeypatch.setattr(kind, "predict_action_chunk", predict_action_chunk)
+    ours = np.concatenate(answers)[:40]
+    joint_ranges = np.ptp(ours[:, :7], axis=0)
+    assert np.array_equal(ours, theirs)
+    assert [len(answer) for answer in answers] == actions_per_answer
+    assert joint_ranges.max() > 0

@@ -8,6 +8,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from typing import NamedTuple
 
 import pytest
 
@@ -16,7 +17,6 @@ pytest.importorskip("vla_eval", reason="vla-eval is not installed here; run `mak
 import yaml
 from page_commands import HERE, ROOT, check_versions, run_page
 from replay_table import (
-    EPISODES,
     MANY,
     MAX_STEPS,
     MESHES,
@@ -85,48 +85,85 @@ def in_shards(count):
     }
 
 
-@pytest.mark.parametrize("batch", BATCHES)
-def test_the_page_s_commands_have_the_outcomes_of_our_runner(table, ours, tmp_path, batch):
-    """The page's commands are played by vla-eval with a server of recorded actions.
+class VLAEvalRun(NamedTuple):
+    """What a command of vla-eval left.
 
-    Replaced are the configuration, by one with fewer episodes, and the shards, by as many as play
-    at a time. `ours` has outcomes of our runner with the same actions: they agree in success and
-    steps. The server was told nothing that gives the goal away.
+    Attributes:
+        outcomes: (task, episode, whether it succeeded, steps) of each episode.
+        told: (kind, content) of all that the server of the policy was told, in order.
     """
-    log = tmp_path / "told.jsonl"
-    with serving(table, log, batch) as port:
-        write_configuration(tmp_path / "run.yaml", port)
-        values = {"integrations/vla_eval/roboirg.yaml": "run.yaml", **in_shards(batch)}
-        run_page("vla-eval", tmp_path, values)
-    recording = tmp_path / "runs" / "vla-eval" / "recording-first.sqlite"
+
+    outcomes: list
+    told: list
+
+
+@pytest.fixture(scope="module", params=BATCHES)
+def vla_eval_run(table, request, tmp_path_factory):
+    """The page's command, played by vla-eval with a server of recorded actions.
+
+    The configuration is replaced by one with fewer episodes, and the one shard by as many as play
+    at a time.
+    """
+    folder = tmp_path_factory.mktemp("vla-eval")
+    log = folder / "told.jsonl"
+    with serving(table, log, request.param) as port:
+        write_configuration(folder / "run.yaml", port)
+        values = {"integrations/vla_eval/roboirg.yaml": "run.yaml", **in_shards(request.param)}
+        run_page("vla-eval", folder, values)
+    recording = folder / "runs" / "vla-eval" / "recording-first.sqlite"
     with contextlib.closing(sqlite3.connect(recording)) as database:
         rows = database.execute(
             "SELECT task_name, context, status, steps FROM episode_results"
         ).fetchall()
-
-    found = [
+    outcomes = [
         (task, json.loads(context)["episode_idx"], status == "success", steps)
         for task, context, status, steps in rows
     ]
-
-    assert sorted(found) == sorted(ours)
-    check_that_nothing_is_told(log)
+    return VLAEvalRun(outcomes, [json.loads(line) for line in log.read_text().splitlines()])
 
 
-def check_that_nothing_is_told(log):
-    told = [json.loads(line) for line in log.read_text().splitlines()]
+def test_vla_eval_and_our_runner_agree_on_success_and_steps_of_each_episode(vla_eval_run, ours):
+    """`vla_eval_run` is of the documented command with a policy of recorded actions, some of them
+    cut short; `ours` are outcomes of our runner with the same actions in the same episodes.
+    """
+    assert sorted(vla_eval_run.outcomes) == sorted(ours)
 
-    starts = [content for kind, content in told if kind == "start"]
-    assert len(starts) == EPISODES
+
+def test_an_episode_of_vla_eval_starts_with_the_name_of_the_benchmark_alone(vla_eval_run):
+    """vla-eval sends the task to the policy when an episode starts; the name of ours would tell
+    what is to be done."""
+    starts = [content for kind, content in vla_eval_run.told if kind == "start"]
+
+    assert len(starts) == len(vla_eval_run.outcomes)
     assert all(start["task"] == {"name": "RoboIRGBench"} for start in starts)
 
-    words = json.dumps([content for kind, content in told if kind != "observation"])
-    for secret in (SETTING, *PLAYED, "goal", "seed", "episode_idx"):
-        assert secret not in words
 
+@pytest.mark.parametrize("secret", [SETTING, *PLAYED, "goal", "seed", "episode_idx"])
+def test_what_vla_eval_tells_a_policy_does_not_give_the_goal_away(vla_eval_run, secret):
+    """Starts and ends of episodes name neither the setting, the task nor the episode.
+
+    Of observations, the names of their fields are checked by a test of their own.
+    """
+    messages = [content for kind, content in vla_eval_run.told if kind != "observation"]
+
+    assert messages
+    assert secret not in json.dumps(messages)
+
+
+def test_observations_of_vla_eval_have_the_documented_fields_and_the_first_one_the_videos(
+    vla_eval_run,
+):
+    """The server wrote down the sorted names of the fields of each observation.
+
+    Where many episodes are played, the configuration sends no videos (`SENDS_ALL` is false), and no
+    observation has the fields of a first one.
+    """
     later = ["images", "states", "task_description"]
     first = ["episode_restart", *later, "video_history", "wrist_video_history"]
-    shown = [content for kind, content in told if kind == "observation"]
+
+    shown = [content for kind, content in vla_eval_run.told if kind == "observation"]
+
+    assert later in shown
     assert (first in shown) == SENDS_ALL
     assert all(fields in (first, later) for fields in shown)
 
@@ -136,7 +173,7 @@ def test_the_page_names_the_version_that_is_played():
 
 
 def test_the_class_declares_what_it_does():
-    """11 tasks of the benchmark, 1,300 steps and 50 episodes; a pose has 7 numbers.
+    """The benchmark has 11 tasks of 50 episodes, of at most 1,300 steps; a pose has 7 numbers.
 
     Without wrist pictures, observations are the front picture, the words and the state.
     """

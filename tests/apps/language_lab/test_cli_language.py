@@ -40,7 +40,12 @@ def test_show_prints_the_words_of_a_user_s_file(stopcube_wordings):
 def test_exported_instructions_in_words_of_a_user_s_file_are_those_of_its_tasks(
     stopcube_wordings, tmp_path
 ):
-    """Without `--tasks`, since the file serves StopCube only. *Own* means: no whole sentence."""
+    """The file of the fixture is named "test" and has one command, for StopCube alone, so that the
+    export has no other task, although the command names none.
+
+    *Own* says that the words are put together by our grammar, not taken from RoboMME as whole
+    sentences.
+    """
     plan = plan_file(wordings=str(stopcube_wordings), forms="implicit")
 
     rows = exported_rows(tmp_path / "rows.jsonl", "--plan", plan)
@@ -57,6 +62,7 @@ def test_a_task_that_a_user_s_file_lacks_is_refused(stopcube_wordings):
 
 
 def test_two_exports_of_instructions_have_the_same_bytes_and_leave_nothing_else(tmp_path):
+    """Words are drawn by the number of the episode, not at random; no temporary file stays."""
     first = tmp_path / "one.jsonl"
     second = tmp_path / "two.jsonl"
 
@@ -68,7 +74,9 @@ def test_two_exports_of_instructions_have_the_same_bytes_and_leave_nothing_else(
 
 
 def test_exported_instructions_are_those_of_the_asked_tasks_settings_and_split(tmp_path):
-    """StopCube has no spatial setting, and `all` may lack it."""
+    """Two tasks of the split `val` in all settings. StopCube has no spatial setting; with `all`,
+    that is no error.
+    """
     rows = exported_rows(
         tmp_path / "rows.jsonl", "--tasks", "ButtonUnmask,StopCube", "--split", "val",
         "--settings", "all",
@@ -118,14 +126,18 @@ def test_a_wrong_option_of_an_export_is_one_sentence_and_nothing_is_written(
 
 
 def test_stats_print_tables(monkeypatch, snapshot):
-    """Counts of words and patterns, 150 characters wide."""
+    """The stored text has the tables of three tasks: counts of words, of lengths and of referring
+    expressions, 150 characters wide.
+    """
     monkeypatch.setenv("COLUMNS", "150")
     printed = call("language", "stats", "--tasks", "VideoPlaceButton,VideoUnmask,PickXtimes")
     assert printed == snapshot
 
 
 def test_stats_of_all_splits_leave_out_empty_tables():
-    """StopCube has sequential relations, and no places."""
+    """StopCube's instructions relate visits in time, so there is a table of relations; they name no
+    places, so there is none of landmarks.
+    """
     printed = call("language", "stats", "--split", "all", "--tasks", "StopCube")
     assert "Relations" in printed
     assert "Landmark" not in printed
@@ -176,12 +188,6 @@ def rating(tmp_path_factory):
     return out
 
 
-def read_key(rating):
-    """Return the rows of the key by their numbers."""
-    with (rating / "key.csv").open() as file:
-        return {row["number"]: row for row in csv.DictReader(file)}
-
-
 def read_sheets(rating):
     """Return for each rater the numbers and texts in the order of the sheet."""
     sheets = []
@@ -193,12 +199,15 @@ def read_sheets(rating):
 
 def test_raters_get_one_text_of_each_scenario(rating):
     """The two tasks share scenarios ("frames")."""
-    rows = read_key(rating).values()
+    rows = rate_words.read_key(rating / "key.csv").values()
     assert len({(row["setting"], row["frame"]) for row in rows}) == len(rows)
 
 
 def test_three_raters_get_the_texts_of_the_key_in_other_orders(rating):
-    texts = {number: row["text"] for number, row in read_key(rating).items()}
+    """`rating` is a folder with the key, which tells the scenario of each numbered text, and three
+    sheets with the same texts, each in an order of its own, so that no text is always the last.
+    """
+    texts = {number: row["text"] for number, row in rate_words.read_key(rating / "key.csv").items()}
     first, second, third = read_sheets(rating)
 
     assert dict(first) == dict(second) == dict(third) == texts
@@ -206,17 +215,23 @@ def test_three_raters_get_the_texts_of_the_key_in_other_orders(rating):
 
 
 def test_raters_table_has_intervals_around_equal_ratings(rating):
-    """Two raters give 4 to every text; other scenarios could still be rated otherwise."""
-    key = read_key(rating)
+    """Two raters give 4 of 5 points to every text in both settings, so the mean is 4.0.
+
+    The interval is that of the mean over all scenarios, of which others could be rated worse or
+    better; so it is wider than a point although no two ratings differ.
+    """
+    key = rate_words.read_key(rating / "key.csv")
     ratings = dict.fromkeys(key, 4.0)
 
-    for _, _, rated, interval, _ in rate_words.rows(key, [ratings, ratings]):
+    direct, reasoning = rate_words.rows(key, [ratings, ratings])
+
+    for setting, _, mean, interval, _ in (direct, reasoning):
         low, high = interval.split(" to ")
-        assert rated == "4.0"
+        assert mean == "4.0", setting
         assert float(low) < 4.0 < float(high)
 
 
 def test_an_empty_rating_is_refused_with_its_number(rating):
     """The sheet is as it was written: no rating is filled in."""
     with pytest.raises(SystemExit, match=r"rates text \d+ ''; it must be a number"):
-        rate_words.read_ratings(rating / "sheet-1.csv", read_key(rating))
+        rate_words.read_ratings(rating / "sheet-1.csv", rate_words.read_key(rating / "key.csv"))

@@ -9,9 +9,9 @@ from roboirg.analysis.figures import figure_style
 from roboirg.apps.language_lab import corpus_statistics
 from roboirg.core.errors import MissingDependencyError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language import plain_settings
+from roboirg.language import instruct, plain_settings
 from roboirg.language.variants import instructions
-from roboirg.tasks.splits.splits import split_episodes
+from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 TASKS = ("PickXtimes", "BinFill", "VideoUnmask", "VideoPlaceButton", "VideoPlaceOrder")
 """The last two have no spatial setting."""
@@ -33,7 +33,9 @@ def test_expressions_are_counted_once_per_scene():
 
 
 def test_an_expression_is_counted_in_50_scenes_of_a_task_at_most():
-    """Three of the five tasks have a spatial setting."""
+    """The instructions are those of the 50 test episodes of five tasks, of which three have a
+    spatial setting. A word may occur twice in an instruction and still counts once for its scene.
+    """
     counts = corpus_statistics.expression_counts(implicit_instructions())
 
     for setting, count_by_expression in counts.items():
@@ -41,14 +43,35 @@ def test_an_expression_is_counted_in_50_scenes_of_a_task_at_most():
         assert max(count_by_expression.values()) <= 50 * tasks, setting
 
 
-def test_each_setting_has_its_expressions_and_explicit_has_none():
-    """An expression is the class of a word that refers back; *explicit* has no such words."""
+@pytest.mark.parametrize(
+    ("setting", "expected"),
+    [
+        ("direct", {"it", "them", "that", "former", "latter", "first", "second"}),
+        ("reasoning", {"that", "each", "other"}),
+    ],
+)
+def test_a_setting_has_the_words_that_refer_back_in_its_way(setting, expected):
+    """Direct instructions use pronouns and *the former*, *reasoning* compares (*the other*).
+
+    The instructions are those of 250 test scenes, which use all forms of a setting.
+    """
     counts = corpus_statistics.expression_counts(implicit_instructions())
 
-    assert {"it", "them", "that", "former", "latter", "first", "second"} <= set(counts["direct"])
-    assert {"that", "each", "other"} <= set(counts["reasoning"])
-    assert {"it", "that", "there"} == set(counts["spatial"])
-    assert "explicit" not in counts
+    assert expected <= set(counts[setting])
+
+
+def test_spatial_instructions_refer_back_with_three_words_alone():
+    """They are about places: *there*, *that cube*, *left of it*; of 150 test scenes here."""
+    counts = corpus_statistics.expression_counts(implicit_instructions())
+
+    assert set(counts["spatial"]) == {"it", "that", "there"}
+
+
+def test_an_explicit_instruction_has_no_word_that_refers_back():
+    """It names each thing in full, so that nothing is counted, not even the setting."""
+    said = instruct(get_episode("PickXtimes", "test", 0), "explicit")
+
+    assert corpus_statistics.expression_counts([said]) == {}
 
 
 def test_expressions_are_in_a_fixed_order_and_none_is_left_out():

@@ -53,7 +53,9 @@ def test_each_goal_has_the_sentence_of_the_source(task):
 
 @each_task
 def test_the_explicit_setting_says_the_sentence_of_the_source(task):
-    """Two published training episodes of each task."""
+    """Sentences are imported from a stand-in of RoboMME's repository. In two training episodes of
+    each task, the explicit instruction is the sentence that the stand-in has for the goal.
+    """
     for episode in train_episodes(task, 0, 2):
         said = instruct(episode, wordings=imported(task).identity)
         assert said.text == sentence(task, episode.goal, episode.difficulty)
@@ -74,7 +76,9 @@ def import_command(folder, *options):
 
 
 def test_the_command_writes_a_file_that_is_read_again(one_task, tmp_path):
-    """The name and a digest make the identity of the words."""
+    """The stand-in of RoboMME's repository has three sentences for the goals of VideoRepick. The
+    name that was given and a digest of the words make their identity.
+    """
     outcome = import_command(tmp_path, "--name", "stand-in")
 
     out = tmp_path / "out.toml"
@@ -86,7 +90,6 @@ def test_the_command_writes_a_file_that_is_read_again(one_task, tmp_path):
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [([], "give it another name"), (["--name", "a b"], "the name 'a b'")],
-    ids=["robomme", "a b"],
 )
 def test_a_name_that_is_bad_or_robomme_s_is_refused_and_nothing_is_written(
     one_task, tmp_path, options, complaint
@@ -115,7 +118,11 @@ ASKED = r"RoboMME's get_language_goal, asked for a goal of VideoRepick \((?:once
     ],
 )
 def test_a_sentence_that_cannot_be_used_is_named(one_task, tmp_path, body, complaint):
-    """`body` is what RoboMME's function returns for each goal."""
+    """RoboMME's sentences come from a function of its repository, `get_language_goal`; a clone has
+    it in one file. Here that file has a function that returns `body`, a Python expression, for
+    each goal: an error, no list, a sentence with a placeholder or a foreign letter, or one that
+    depends on more than the goal. `complaint` is a pattern of the message.
+    """
     clone = make_clone(tmp_path)
     file = clone / robomme_import.FILE
     file.write_text(f"def get_language_goal(self, env):\n    return {body}\n")

@@ -291,6 +291,7 @@ def test_the_page_embeds_nothing_from_outside(name, run):
 
 
 def test_the_page_follows_no_circle_of_links(run):
+    """A video of the run is a link to itself, which could be followed for ever."""
     video = next(run.glob("videos/*.mp4"))
     video.unlink()
     video.symlink_to(video.name)
@@ -376,6 +377,7 @@ def test_plan_files_are_regular_files(make, tmp_path):
     },
 )
 def test_plan_files_with_other_content_are_refused_by_name(content, complaint, tmp_path):
+    """Each content is YAML that starts code, fills the memory or raises an error of the reader."""
     path = tmp_path / "plan.yaml"
     path.write_text(content)
 
@@ -435,9 +437,11 @@ UNKNOWN_METHOD = _headers_with(8, 99)
     },
 )
 def test_action_files_that_are_none_are_refused_and_named_by_verify(damaged, run):
-    """`damaged` makes other bytes of the good file, which is an archive of NumPy's arrays.
+    """A file of actions is an archive of NumPy's arrays; `damaged` makes other bytes of a good one.
 
-    Both records of the run name this file, so that verify tells of it twice.
+    Its header then says a size that the content does not have, or code, or the archive says that
+    its files are encrypted or compressed in an unknown way, or it has 20 MB instead of three rows.
+    Both records of the run name this file, so that `verify` tells of it twice.
     """
     digest = line_of(run)["action_log"]
     path = action_path(run, digest)
@@ -533,38 +537,45 @@ def test_a_pack_that_is_none_is_refused_and_leaves_nothing_behind(build, complai
     assert sorted(run.parent.rglob("*")) == files_before
 
 
-def test_what_a_command_does_not_read_of_a_pack_is_not_unpacked(run, monkeypatch):
-    """The archive says of its videos that they have 4 GiB each; only actions are asked for.
+@pytest.fixture
+def pack_with_huge_videos(run, monkeypatch):
+    """A pack whose archive says of its four files in videos/ that each unpacks to 4 GiB.
 
-    The limit is 10 GiB here. Videos that are too large keep nobody from the two records.
+    At most 10 GiB may be unpacked here.
     """
     monkeypatch.setattr("roboirg.records.packs.MOST_PACKED_BYTES", 10 << 30)
     path = pack(run)
     path.write_bytes(_swollen(path.read_bytes(), only=b"videos/"))
+    return path
 
-    with opened_run(path, [ACTION_FOLDER]) as folder:
+
+def test_what_a_command_does_not_read_of_a_pack_is_not_unpacked(pack_with_huge_videos):
+    """A pack is a zip file. `pack_with_huge_videos` says that its videos unpack to more than the
+    limit. Who asks for the folder of actions alone gets the two records, without videos.
+    """
+    with opened_run(pack_with_huge_videos, [ACTION_FOLDER]) as folder:
         assert len(read_records(folder)) == 2
         assert not (folder / "videos").exists()
 
 
-def test_a_pack_of_videos_that_are_too_large_is_refused_by_who_reads_them(run, monkeypatch):
-    """The archive says of the files in `videos` that they have 4 GiB each, above 10 GiB in all."""
-    monkeypatch.setattr("roboirg.records.packs.MOST_PACKED_BYTES", 10 << 30)
-    path = pack(run)
-    path.write_bytes(_swollen(path.read_bytes(), only=b"videos/"))
-
-    assert "unpacks to more than" in refusal(read_pack, path)
+def test_a_pack_of_videos_that_are_too_large_is_refused_by_who_reads_them(pack_with_huge_videos):
+    """`read_pack` unpacks all; the videos say 16 GiB, and 10 GiB are the limit here."""
+    assert "unpacks to more than" in refusal(read_pack, pack_with_huge_videos)
 
 
 def test_a_warning_about_a_pack_names_the_pack(run, caplog):
-    """A damaged line is added to the records in the pack; they are read with a warning."""
+    """A line that is no record is added to the file of records in a good pack, mine.roboirg.zip.
+
+    Its manifest is made to fit, so that the pack is read, with a warning about the line.
+    """
     path = pack(run)
     records = (run / RECORDS_FILE).read_bytes() + b"damaged\n"
-    path.write_bytes(_with({RECORDS_FILE: records})(path.read_bytes()))
+    add_damaged_line = _with({RECORDS_FILE: records})
+    path.write_bytes(add_damaged_line(path.read_bytes()))
 
     read_pack(path)
 
-    assert f"{path.name}/{RECORDS_FILE} has 1 damaged line" in caplog.text
+    assert "mine.roboirg.zip/records.jsonl has 1 damaged line" in caplog.text
 
 
 WORDINGS = """name = "workshop"

@@ -157,6 +157,12 @@ def test_records_in_other_words_of_the_same_pool_hold_with_a_note(run_in_other_w
 
 
 def test_steps_of_utterances_are_checked_in_records_in_other_words(run_in_other_words):
+    """`run_in_other_words` says that it is in words of a file that is not here, so its sentences
+    cannot be made anew to compare them.
+
+    But the first one is heard at step 0 in any words; the first record now says step 7.
+    """
+
     def hear_it_at_step_7(lines, _folder, _rng):
         lines[0]["instruction"][0]["step"] = 7
         return lines
@@ -173,9 +179,11 @@ def test_outcomes_are_checked_in_records_in_other_words(run_in_other_words):
 
 
 def test_a_record_has_the_words_of_its_plan_and_of_its_metadata(forged):
-    """The first record names wordings (a pool and a hash) that neither plan nor episode has.
+    """`forged` is a copy of an honest run of two records. The first one now names other words (the
+    pool of StopCube's test split, and a hash) than when it was played.
 
-    That is found three times: against the plan, against the other record, and in the record.
+    That contradicts three things: the plan, which names the words of all its records; the second
+    record, of the same pool; and the words that its own metadata name.
     """
 
     def reword_the_first(lines, _folder, _rng):
@@ -185,8 +193,9 @@ def test_a_record_has_the_words_of_its_plan_and_of_its_metadata(forged):
     forge(forged, reword_the_first)
 
     found = verify_run(forged, sample=0.0)
-    assert found.faults[0] == "1 record in words that the plan does not name."
-    assert found.faults[1].startswith("The records have several words of StopCube/test: ")
+    against_plan, against_second = found.faults
+    assert against_plan == "1 record in words that the plan does not name."
+    assert against_second.startswith("The records have several words of StopCube/test: ")
     assert "words: the record says 'StopCube/test@0a0a0a0a0a0a'; it should" in str(found.checks)
 
 
@@ -314,14 +323,15 @@ def test_larger_differences_of_another_processor_do_not_hold_and_a_note_may_excu
 
 
 def test_a_merged_run_holds_by_the_plans_of_its_parts(honest, tmp_path):
-    """Each of these has the episodes of one policy only."""
+    """`honest` is a run of two policies. A part has the plan of one of them, and all records, which
+    name their plan by its fingerprint; merged, they have two plans and each record once."""
     parts = [tmp_path / "listener", tmp_path / "forgetful"]
     for part in parts:
         shutil.copytree(honest, part)
         plan = json.loads((part / PLAN_FILE).read_bytes()) | {"policies": [part.name]}
         (part / PLAN_FILE).write_text(json.dumps(plan), "utf-8")
-        (read,) = read_plans(part)
-        forge(part, with_all(plan=read.fingerprint))
+        (stored_plan,) = read_plans(part)
+        forge(part, with_all(plan=stored_plan.fingerprint))
     merge_runs(parts, tmp_path / "merged")
 
     found = verify_run(tmp_path / "merged")
@@ -331,7 +341,8 @@ def test_a_merged_run_holds_by_the_plans_of_its_parts(honest, tmp_path):
 
 
 def test_of_a_sample_of_one_half_one_of_two_records_is_played_again(honest):
-    """Both records are read, which progress counts; one is played again and is exact."""
+    """`honest` is a run of two records. Both are read, of which `progress` tells; whatever the seed
+    draws, one is played again, and ends exactly as recorded."""
     progress = []
 
     found = verify_run(honest, sample=0.5, seed=3, progress=lambda *now: progress.append(now))
@@ -341,20 +352,54 @@ def test_of_a_sample_of_one_half_one_of_two_records_is_played_again(honest):
     assert found.holds
 
 
-def test_what_is_printed_of_a_verification(capsys, snapshot):
-    """The snapshot has a verification with 23 wrong and 22 missing records, then one that holds.
+def test_what_is_printed_of_a_verification(capsys):
+    """34 of 60 records were played again; one has two findings, and one of the plan is missing."""
+    found = Verification(
+        records=60,
+        checks=(RecordCheck("PickXtimes-7", ("one.", "two.")),),
+        missing=("StopCube-3",),
+        verdicts=Counter({"exact": 30, "tolerant": 4, "not replayed": 26}),
+        deviation=0.0123,
+        errors=2,
+        notes=("A note.",),
+    )
 
-    At most twenty of each kind are printed, and how many there are besides.
-    """
-    checks = tuple(RecordCheck(f"check-{n}", ("one.", "two.")) for n in range(23))
-    verdicts = Counter({"exact": 30, "tolerant": 4})
-    verdicts["not replayed"] = 26
-    missing = tuple(f"missing-{n}" for n in range(22))
-    commands._print(Verification(60, checks, missing, verdicts, 0.0123, 2, ("A note.",)))
+    expected = """\
+60 records; 34 were played again from stored actions.
+End states equal bit for bit: 30.
+End states from other processors equal within 0.02 (m, rad, s): 4; the largest difference is 0.01.
+2 records ended in an error: actions do not show whether a policy raised one, and the rates leave such episodes out.
+A note.
+does not hold: PickXtimes-7: one.
+does not hold: PickXtimes-7: two.
+has no record: StopCube-3
+2 things do not hold.
+"""  # noqa: E501
 
-    commands._print(Verification(2, (), (), Counter({"exact": 1, "not replayed": 1})))
+    commands._print(found)
 
-    assert capsys.readouterr().out == snapshot
+    assert capsys.readouterr().out == expected
+
+
+def test_more_than_20_findings_are_counted_instead_of_printed(capsys):
+    """23 records have a finding, and 22 episodes of the plan have no record."""
+    checks = tuple(RecordCheck(f"check-{number}", ("one.",)) for number in range(23))
+    missing = tuple(f"missing-{number}" for number in range(22))
+
+    commands._print(Verification(45, checks, missing))
+
+    printed = capsys.readouterr().out
+    assert printed.count("does not hold: ") == printed.count("has no record: ") == 20
+    assert printed.endswith("… and 2 more.\n… and 3 more records.\n45 things do not hold.\n")
+
+
+def test_a_verification_without_findings_says_that_it_holds(capsys):
+    """One of two records was played again, so it is not said that *everything* holds."""
+    verdicts = Counter({"exact": 1, "not replayed": 1})
+
+    commands._print(Verification(records=2, checks=(), missing=(), verdicts=verdicts))
+
+    assert capsys.readouterr().out.endswith(" bit for bit: 1.\nAll that was checked holds.\n")
 
 
 def verified(run, share):

@@ -75,7 +75,6 @@ def test_the_server_listens_on_this_machine_alone(served):
 @pytest.mark.parametrize(
     "fault",
     [{"key": "wrong"}, {"key": ""}, {"host": "evil.example"}, {"origin": "http://evil.example"}],
-    ids=["wrong key", "no key", "another host", "another page"],
 )
 def test_a_score_from_elsewhere_is_refused_and_does_not_show_the_key(served, fault):
     """The form is right, and the request has a wrong key or none, or comes from another page.
@@ -108,6 +107,9 @@ def test_the_page_is_refused_with_a_wrong_key(served, key_in_address):
 
 
 def test_the_page_runs_no_foreign_scripts_and_tells_others_no_address(served):
+    """The address has the key with which verdicts are stored; browsers send it to no other page,
+    and load nothing from elsewhere.
+    """
     status, headers, _ = ask(served, "/")
 
     assert status == 200
@@ -144,7 +146,10 @@ def test_a_malformed_score_leads_back_to_the_page_with_a_message(served, changes
 
 
 def test_a_page_that_is_out_of_date_scores_nothing(served):
-    """Another page has scored the trial in the meantime."""
+    """A form names the revision of the trial that its page showed. Two forms of the same revision
+    are sent, as from two pages: the first one stores a success, the second is refused with a
+    message.
+    """
     trial = served.plan.trials[0]
     form = form_of(served, trial, "success")
     ask(served, "/score", form)
@@ -156,6 +161,9 @@ def test_a_page_that_is_out_of_date_scores_nothing(served):
 
 
 def test_what_an_operator_types_is_text_and_no_part_of_the_page(served):
+    """A note, and a message in the address, have HTML in them. The note is stored as it was typed,
+    and on the page neither is a script or markup.
+    """
     trial = served.plan.trials[0]
     note = "<script>alert(1)</script> \"quoted\" & 'so'"
     ask(served, "/score", form_of(served, trial, "success", note=note))
@@ -185,6 +193,7 @@ def test_a_video_outside_the_folder_is_not_noted(served):
 
 
 def test_a_record_has_the_path_of_a_video_inside_the_folder(served):
+    """The operator names a file by its path in the study's folder, where it is."""
     trial = served.plan.trials[0]
     (served.folder / "films").mkdir()
     (served.folder / "films" / "a.mp4").write_bytes(b"film")
@@ -194,26 +203,44 @@ def test_a_record_has_the_path_of_a_video_inside_the_folder(served):
     assert served.read_trial_log().newest(trial.name).video == "films/a.mp4"
 
 
-def test_a_kill_between_two_clicks_costs_nothing(small):
-    """Each of two trials is scored by a server that is killed at once; the next goes on."""
-    plan, folder = small
+def score_and_kill(folder, trial):
+    """Score a trial as a success on the page of a new server, and kill the server at once.
+
+    The command prints an address, whose key becomes a cookie; verdicts are sent to /score.
+
+    Returns:
+        the page that the server showed before.
+    """
     command = [sys.executable, "-u", "-c", CLI, "score", str(folder), "--operator", "ann"]
+    server = subprocess.Popen(command, text=True, stdout=subprocess.PIPE)
+    try:
+        url = re.search(r"http\S+", server.stdout.readline())[0]
+        browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+        page = browser.open(url, timeout=600).read().decode()
+        form = {"trial": trial.name, "revision": "0", "choice": "success"}
+        address = url.partition("/?")[0] + "/score"
+        browser.open(address, urllib.parse.urlencode(form).encode(), timeout=600)
+    finally:
+        server.kill()
+        server.wait(timeout=600)
+    return page
 
-    for number, trial in enumerate(plan.trials[:2]):
-        server = subprocess.Popen(command, text=True, stdout=subprocess.PIPE)
-        try:
-            url = re.search(r"http\S+", server.stdout.readline())[0]
-            browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
-            page = browser.open(url, timeout=600).read().decode()
-            assert f"{number} of 4 scored" in page
-            assert f"<h1>{number + 1}. {trial.name}</h1>" in page
-            form = {"trial": trial.name, "revision": "0", "choice": "success"}
-            address = url.partition("/?")[0] + "/score"
-            browser.open(address, urllib.parse.urlencode(form).encode(), timeout=600)
-        finally:
-            server.kill()
-            server.wait(timeout=600)
 
+def test_a_kill_between_two_clicks_costs_nothing(small):
+    """Each of two trials of four is scored through a server that is killed when it has answered.
+
+    The second server knows that one trial is scored and shows the next one, and both verdicts are
+    in the records.
+    """
+    plan, folder = small
+    first, second, *_ = plan.trials
+
+    first_page = score_and_kill(folder, first)
+    second_page = score_and_kill(folder, second)
+
+    assert "0 of 4 scored" in first_page
+    assert "1 of 4 scored" in second_page
+    assert f"<h1>2. {second.name}</h1>" in second_page
     assert [record.outcome for record in read_records(folder)] == ["success", "success"]
 
 
@@ -277,6 +304,10 @@ def test_the_page_fits_narrow_screens(page):
 
 @pytest.mark.browser
 def test_everything_on_the_page_has_a_name_and_can_be_reached_by_keys(page):
+    """Screen readers need names: the drawing of the table has a title, and each of five groups of
+    verdicts (success, three kinds of failure, none) a legend. Each verdict has a key, and each
+    field for text a label; the first thing that Tab reaches is a verdict.
+    """
     assert page.locator("svg[role=img] title").count() == 1
     assert page.locator("fieldset legend").count() == 5
     for button in page.locator("main button").all():
@@ -289,9 +320,11 @@ def test_everything_on_the_page_has_a_name_and_can_be_reached_by_keys(page):
 
 
 def test_the_page_says_what_is_meant_and_what_was_scored(small, snapshot):
-    """Before and after a failure, a success, and a void trial with a note; the last is open.
+    """The stored pages are of a study of four trials: the first before it is scored, then all after
+    a failure, a success and a void trial, each with a note and a video; the last is still open.
 
-    Without its style, its script and its drawing.
+    Each says what the instruction means, what can be chosen, and what was chosen. Styles, scripts
+    and drawings are left out.
     """
     plan, folder = small
     trial_log = TrialLog.read(plan, folder)
@@ -306,7 +339,9 @@ def test_the_page_says_what_is_meant_and_what_was_scored(small, snapshot):
 
 
 def test_the_page_does_not_name_the_policy(small):
-    """The operator must not know which policy acts."""
+    """The study compares the policies "listener" and "forgetful"; who scores must not know which
+    one acts, so that nobody is judged by a name.
+    """
     plan, folder = small
     page = render_trial(TrialLog.read(plan, folder), plan.trials[0], nonce="n")
     assert not re.search("listener|forgetful", page)

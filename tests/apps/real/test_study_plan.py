@@ -39,7 +39,7 @@ studies = st.fixed_dictionaries(
         "settings": st.lists(st.sampled_from(SETTINGS), min_size=1, unique=True),
         "trials": st.integers(1, 24),
         "demonstrations": st.sampled_from([0, 1, 7, 50]),
-        "seed": st.integers(0, 2**63),
+        "seed": st.integers(0, 2**63 - 1),
     }
 )
 
@@ -61,25 +61,43 @@ def check_balance(task, episodes):
     assert spread(sides, ("left", "right")) <= 2
 
 
-@settings(max_examples=15)
-@given(study=studies)
-def test_each_condition_meets_the_same_balanced_arrangements(study):
-    """A condition is a task, a setting and a policy; an arrangement is how the table is laid."""
-    episodes_of = {}
+def episodes_by_condition(study):
+    """Return the episodes of each task, setting and policy of a study, by their numbers."""
+    found = {}
     for trial in make_study(**study).trials:
         condition = (trial.job.task, trial.job.setting, trial.job.policy)
-        episodes_of.setdefault(condition, {})[trial.episode.index] = trial.episode
+        found.setdefault(condition, {})[trial.episode.index] = trial.episode
+    return found
 
-    numbers_of = {}
-    for (task, _, _), episodes in episodes_of.items():
+
+@settings(max_examples=15)
+@given(study=studies)
+def test_each_condition_meets_the_same_arrangements(study):
+    """A condition is a task, a setting and a policy; an arrangement is how the table is laid, which
+    follows from the episode's number. Of a task, all conditions have those of the first one."""
+    first_of_task = {}
+
+    for (task, _, _), episodes in episodes_by_condition(study).items():
+        assert episodes.keys() == first_of_task.setdefault(task, episodes).keys()
+
+
+@settings(max_examples=15)
+@given(study=studies)
+def test_the_arrangements_of_each_condition_are_balanced(study):
+    """A condition is a task, a setting and a policy. `check_balance` counts how often its trials
+    have each arrangement of the table, color, left object and number: these differ by one at most,
+    as a condition can have more trials than there are arrangements, and left and right by two.
+    """
+    for (task, _, _), episodes in episodes_by_condition(study).items():
         check_balance(task, episodes.values())
-        numbers_of.setdefault(task, episodes.keys())
-        assert episodes.keys() == numbers_of[task]
 
 
 @settings(max_examples=15)
 @given(study=studies)
 def test_demonstrations_have_balanced_arrangements_and_none_is_shown_twice(study):
+    """Demonstrations show the tasks to a policy before the study. An arrangement is how the table
+    is laid; `check_balance` counts how often each occurs, and each color, number and side.
+    """
     plan = make_study(**study)
 
     for task in {demonstration.task for demonstration in plan.demonstrations}:
@@ -117,7 +135,7 @@ def test_tasks_take_turns_from_block_to_block(seed):
 
 
 @settings(max_examples=15)
-@given(study=studies, seed=st.integers(0, 2**63))
+@given(study=studies, seed=st.integers(0, 2**63 - 1))
 def test_a_seed_changes_the_order_of_trials_and_nothing_else(study, seed):
     """Two studies that differ in the seed have the same trials, demonstrations and twins."""
     plan = make_study(**study)
@@ -133,7 +151,11 @@ def test_a_seed_changes_the_order_of_trials_and_nothing_else(study, seed):
 
 
 def test_no_condition_is_early_or_late_on_average():
-    """The order in a block is uniform: each of ten conditions is first in a tenth of 800 blocks."""
+    """Five settings and two policies are ten conditions, in a random order in each block.
+
+    So each is the first in a tenth of 800 blocks (40 seeds, two tasks, ten trials): 80 times, with
+    a standard deviation of 8.5. Below 50 or above 110 is more than three of these away.
+    """
     first = Counter()
     for seed in range(40):
         plan = make_study(("a", "b"), tasks=TASKS, trials=10, demonstrations=0, seed=seed)
@@ -271,6 +293,9 @@ def test_operators_choose_among_the_failures_of_the_task(task, grounding):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_each_failure_has_a_key_of_its_own_and_wrong_things_are_not_the_one_meant(task):
+    """Operators choose among failures by keys. A failure "wrong place" or "wrong object" names a
+    color, which must not be that of the goal.
+    """
     for trial in make_study(("a",), tasks=(task,), trials=8, demonstrations=0).trials:
         choices = failure_choices(trial.episode)
         assert len({choice.key for choice in choices}) == len(choices)

@@ -18,7 +18,6 @@ from roboirg.apps.show.playthrough import (
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
 from roboirg.core.motions import Away, Glow, Point, Shuttle, Swap, Vanish
-from roboirg.core.observations import PICTURE_SIZE
 from roboirg.tasks.splits.splits import get_episode
 
 pytest.importorskip("matplotlib")
@@ -85,7 +84,9 @@ def test_no_word_leaves_the_strip(caption):
 
 @pytest.mark.parametrize("caption", ["done: pick", "done: pick up the container " * 30])
 def test_no_word_is_drawn_over_another(caption):
-    """Boxes may touch by two pixels."""
+    """The boxes around all texts of a strip are compared two by two. Boxes may touch by two pixels,
+    as letters do not fill them.
+    """
     boxes = [text.get_window_extent().padded(-2) for text in drawn(12, caption).texts]
 
     for first, second in itertools.combinations(boxes, 2):
@@ -191,7 +192,9 @@ def test_a_fact_without_a_place_is_described_in_two_words():
 
 
 def test_the_video_is_described_by_its_stages_and_facts():
-    """Going home is not in the video."""
+    """In test episode 0 of VideoPlaceButton the video shows a cube that is dropped onto a target,
+    and then a press of the button. The arm going home is no part of the video.
+    """
     lines = describe_video(get_episode("VideoPlaceButton", "test", 0))
 
     assert lines[:2] == ["1. pick up the cube", "2. drop the cube onto target"]
@@ -205,18 +208,26 @@ def test_an_episode_without_a_video_has_no_description_of_one():
 
 
 @pytest.mark.sim
-def test_a_playthrough_shows_the_start_each_stage_and_the_end(snapshot):
-    """The expert solves an episode, so that the last picture is at its last step.
-
-    The snapshot has the steps and captions of its pictures, and whether they are in the video.
+def test_a_playthrough_shows_the_start_each_stage_and_the_end():
+    """The expert solves test episode 3 of VideoUnmask: cubes are hidden in the video, and then it
+    picks up the containers over the green one and the red one. The last moment is its last step,
+    and the pictures differ, as things move in between.
     """
     played = play_through(get_episode("VideoUnmask", "test", 3))
 
-    assert (played.verdict, played.moments[-1].step) == ("success", played.steps)
-    assert [
-        (moment.step, moment.caption, moment.is_demonstration) for moment in played.moments
-    ] == snapshot
-    assert {moment.picture.shape for moment in played.moments} == {(PICTURE_SIZE, PICTURE_SIZE, 3)}
+    captions = [f"{moment.step}: {moment.caption}" for moment in played.moments]
+    assert captions == [
+        "1: the video begins",
+        "33: container 0, container 1, container 2, container 3, container 4 appear",
+        "64: done: static",
+        "67: the policy's turn begins",
+        "167: done: pick up the container that hides the green cube",
+        "207: done: put down the container",
+        "328: success: pick up the container that hides the red cube",
+    ]
+    assert [moment.is_demonstration for moment in played.moments] == [True] * 3 + [False] * 4
+    assert (played.verdict, played.steps) == ("success", 328)
+    assert {moment.picture.shape for moment in played.moments} == {(256, 256, 3)}
     assert len({moment.picture.tobytes() for moment in played.moments}) > 2
 
 

@@ -7,6 +7,7 @@ some arms in its first rate and some in its second.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
@@ -37,6 +38,9 @@ from roboirg.stats.cells import (
     rows_of,
 )
 from roboirg.stats.paired_tests import measure_gap
+from roboirg.tasks import get_task
+from roboirg.tasks.other_goals import begins_with
+from roboirg.tasks.splits.splits import get_episode
 
 LANGUAGE_USE = "language use"
 WORDS_WORTH = "words' worth"
@@ -244,3 +248,21 @@ MEANING = (
     "told, then with another policy seed."
 )
 """The two rates of each contrast."""
+
+
+@functools.lru_cache(maxsize=65_536)
+def silent_chance(task: str, split: str, number: int) -> float:
+    """Return the success, 0 to 1, to expect of executing a random goal of the scene without words.
+
+    It is the share of the scene's possible goals that are right. Goals that begin with all stages
+    of the right one succeed, too.
+    """
+    episode = get_episode(task, split, number)
+    scene = episode.scene
+    definition = get_task(task)
+    goals = 0
+    right_goals = 0
+    for goal in definition.goals(scene):
+        goals += 1
+        right_goals += begins_with(definition.stages(scene, goal), episode.stages)
+    return right_goals / goals

@@ -26,10 +26,9 @@ from roboirg.analysis.measures.measured_floors import (
 from roboirg.analysis.results.option_labels import is_usual
 from roboirg.records.record import Job
 from roboirg.runs.job_instruction import instruct_job
-from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.shortcuts.command_chance import blind_goals, goals_of_command, right_share
-from roboirg.tasks import get_task
-from roboirg.tasks.other_goals import begins_with
+from roboirg.shortcuts.surface_rules import SURFACE_RULES
+from roboirg.shortcuts.text_guess import goal_share, guess_goal
 from roboirg.tasks.splits.splits import get_episode
 
 CHANCE = "chance"
@@ -63,45 +62,6 @@ def floor_level(floor: str, jobs: Iterable[Job], language: str = "") -> Fraction
 def _without_policy(job: Job) -> Job:
     """Return only what of a job decides its instruction."""
     return Job(policy="", task=job.task, split=job.split, episode=job.episode, options=job.column)
-
-
-def unmeasured_note(floors: Iterable[str], languages: Iterable[str]) -> str:
-    """Return a sentence on learned floors that were not measured; empty if there are none.
-
-    A learned floor is the success of a learner that sees the words or the scene alone. It is
-    measured apart for each version of the benchmark's language.
-
-    Args:
-        floors: the names of those that are asked for.
-        languages: the versions of the language that were played.
-    """
-    learned = [floor for floor in floors if floor in LEARNED]
-    played = filter(None, languages)  # the version is empty for episodes that were not played
-    missing = {language for language in played if measured_floors(language) is None}
-    if not learned or not missing:
-        return ""
-    return (
-        f"No learned floors ({', '.join(learned)}) were measured for language version "
-        f"{', '.join(sorted(missing))}."
-    )
-
-
-@functools.lru_cache(maxsize=65_536)
-def silent_chance(task: str, split: str, number: int) -> float:
-    """Return the success, 0 to 1, to expect of executing a random goal of the scene without words.
-
-    It is the share of the scene's possible goals that are right. Goals that begin with all stages
-    of the right one succeed, too.
-    """
-    episode = get_episode(task, split, number)
-    scene = episode.scene
-    definition = get_task(task)
-    goals = 0
-    right_goals = 0
-    for goal in definition.goals(scene):
-        goals += 1
-        right_goals += begins_with(definition.stages(scene, goal), episode.stages)
-    return right_goals / goals
 
 
 @functools.lru_cache(maxsize=65_536)

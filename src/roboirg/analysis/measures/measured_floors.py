@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import csv
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import resources
 from typing import NamedTuple
 
-from roboirg.shortcuts.shortcut_tables import MARGIN, Excess, ShortcutRow, ShortcutShares
+from roboirg.shortcuts.shortcut_shares import MARGIN, Excess, ShortcutRow, ShortcutShares
 
 RANDOM = "random"
 TEST = "test"
@@ -65,6 +65,27 @@ def read_floors(text: str) -> Floors:
         excess = Excess(float(line["excess"]), float(line["error"]))
         floors[key] = ShortcutRow(key, int(line["texts"]), shares, excess)
     return floors
+
+
+def unmeasured_note(floors: Iterable[str], languages: Iterable[str]) -> str:
+    """Return a sentence on learned floors that were not measured; empty if there are none.
+
+    A learned floor is the success of a learner that sees the words or the scene alone. It is
+    measured apart for each version of the benchmark's language.
+
+    Args:
+        floors: the names of those that are asked for.
+        languages: the versions of the language that were played.
+    """
+    learned = [floor for floor in floors if floor in LEARNED]
+    played = filter(None, languages)  # the version is empty for episodes that were not played
+    missing = {language for language in played if measured_floors(language) is None}
+    if not learned or not missing:
+        return ""
+    return (
+        f"No learned floors ({', '.join(learned)}) were measured for language version "
+        f"{', '.join(sorted(missing))}."
+    )
 
 
 def settings_at_chance(floors: Floors) -> tuple[str, ...]:

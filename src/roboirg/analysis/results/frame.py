@@ -199,6 +199,8 @@ COLUMNS: Mapping[str, FrameColumn] = {
     )
 }
 """Columns of results, in the order of the documentation."""
+_OF_JOB = frozenset({"policy", "task", "split", "arm", "setting", "form", "episode", "policy_seed"})
+"""The columns that an episode has before it is played."""
 
 
 def suite(task: str) -> str | None:
@@ -228,11 +230,13 @@ class Frame(Mapping[str, Any]):
     def _read(self, name: str) -> Values:
         """Return the column of one of `COLUMNS`, read from each episode's result.
 
-        An episode that was not played has None.
+        An episode that was not played has only what its job says, and else None.
         """
         if name == "policy_label":
             return as_column([self.names[policy_run] for policy_run in self["run"]])
         read = COLUMNS[name].read
+        if name in _OF_JOB:
+            return as_column([read(job) for job in self["result"]])
         values = []
         for result, outcome in zip(self["result"], self["outcome"], strict=True):
             value = None
@@ -315,7 +319,7 @@ class Frame(Mapping[str, Any]):
     def names_as_played(self) -> RunNames:
         """Labels of the policy runs, in the order of their first records."""
         policy_runs = self["run"][np.argsort(self["place"])]
-        return {policy_run: self.names[policy_run] for policy_run in policy_runs}
+        return {policy_run: self.names[policy_run] for policy_run in dict.fromkeys(policy_runs)}
 
 
 def as_column(values: Sequence[object]) -> Values:
@@ -442,10 +446,13 @@ def _sorted(rows: Sequence[_FrameRow], policies: Sequence[str]) -> Frame:
     options = _Groups.of([job.column for job in jobs], options_sort_key)
     groups = zip(runs.numbers, tasks.numbers, options.numbers, strict=True)
     order = _order(groups, jobs)
-    columns = _columns_of([rows[number] for number in order])
-    columns["place"] = np.array(order, dtype=np.int64)
-    columns["run"] = runs.column(order)
-    columns["options"] = options.column(order)
+    columns: dict[str, Any] = {
+        "result": as_column([jobs[number] for number in order]),
+        "outcome": as_column([rows[number].outcome for number in order]),
+        "place": np.array(order, dtype=np.int64),
+        "run": runs.column(order),
+        "options": options.column(order),
+    }
     return Frame(columns)
 
 
@@ -455,22 +462,6 @@ def _order(groups: Iterable[tuple[int, ...]], jobs: Sequence[Job]) -> list[int]:
     for group, job in zip(groups, jobs, strict=True):
         keys.append((group, job.episode, job.policy_seed))
     return sorted(range(len(keys)), key=keys.__getitem__)
-
-
-def _columns_of(rows: Sequence[_FrameRow]) -> dict[str, Values]:
-    """Return the columns that every row has, whether its episode was played or not.
-
-    They are what the episode's job says, such as task and setting, the outcome, and the result; in
-    the column ``result`` the planned job stands for one that is missing.
-    """
-    jobs = [row.job for row in rows]
-    columns = {
-        "result": as_column(jobs),
-        "outcome": as_column([row.outcome for row in rows]),
-    }
-    for name in ("policy", "task", "split", "arm", "setting", "form", "episode", "policy_seed"):
-        columns[name] = as_column([getattr(job, name) for job in jobs])
-    return columns
 
 
 def _run_key(run: PolicyRun, policies: Sequence[str]) -> SortKey:

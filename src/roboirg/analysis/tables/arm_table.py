@@ -12,8 +12,8 @@ from roboirg.analysis.measures.arm_figures import (
     WORDS_WORTH,
     ArmFigure,
     arm_figures,
+    silent_chance,
 )
-from roboirg.analysis.measures.chance import silent_chance
 from roboirg.analysis.measures.measure import mean_rate, measure_groups
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.frame import Frame

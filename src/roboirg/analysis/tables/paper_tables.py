@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from roboirg.analysis.comparability import differences_of
-from roboirg.analysis.measures.chance import floor_level
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.published import (
     published_lines,
@@ -260,6 +259,9 @@ def _floor_entries(
         jobs: the episodes of all tasks over which it is the mean.
         language: version of the language that was played; empty if there are several.
     """
+    # Imported here because it brings the reader's patterns, which delay every command.
+    from roboirg.analysis.measures.chance import floor_level
+
     entries = {}
     for task in tasks:
         jobs_of_task = [job for job in jobs if job.task == task]

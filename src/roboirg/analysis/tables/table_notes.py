@@ -6,8 +6,8 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from roboirg.analysis.comparability import comparison_notes
-from roboirg.analysis.measures.chance import unmeasured_note
 from roboirg.analysis.measures.headline import headline_notes
+from roboirg.analysis.measures.measured_floors import unmeasured_note
 from roboirg.analysis.published import NOTES
 from roboirg.analysis.results.frame import Frame
 from roboirg.analysis.results.option_labels import is_usual, options_sort_key

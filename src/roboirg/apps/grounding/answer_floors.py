@@ -21,11 +21,11 @@ from roboirg.apps.grounding.items.verdicts import right_reply
 from roboirg.core.episode import Episode, Goal
 from roboirg.language.generator import instruct_with
 from roboirg.policies.vlm.goal_schema import goal_schema
-from roboirg.shortcuts import SURFACE_RULES, draw_goal, guess_goal
 from roboirg.shortcuts.command_chance import goals_of_command
 from roboirg.shortcuts.goal_learner import LearnerInput
 from roboirg.shortcuts.shortcut_tables import learn_goals
-from roboirg.shortcuts.text_guess import TextGuess
+from roboirg.shortcuts.surface_rules import SURFACE_RULES
+from roboirg.shortcuts.text_guess import TextGuess, draw_goal, guess_goal
 from roboirg.tasks import goals_of
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.random_draws import draw

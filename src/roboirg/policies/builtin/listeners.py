@@ -16,8 +16,8 @@ from roboirg.core.episode import Episode, Goal
 from roboirg.core.observations import Demonstration
 from roboirg.policies.builtin.scripted import READING, ScriptedPolicy
 from roboirg.policies.contract.policy_calls import GUESSED
-from roboirg.shortcuts import draw_goal, guess_goal
 from roboirg.shortcuts.command_chance import goals_of_command, understood_goals
+from roboirg.shortcuts.text_guess import draw_goal, guess_goal
 from roboirg.tasks import goals_of
 from roboirg.util.random_draws import draw
 

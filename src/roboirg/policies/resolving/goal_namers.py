@@ -15,10 +15,10 @@ from roboirg.policies.builtin.scripted import READING
 from roboirg.policies.contract.base import AttachedPolicy
 from roboirg.policies.contract.goal_naming import GoalNamer, SaidAndShown
 from roboirg.policies.vlm.goal_schema import goal_schema
-from roboirg.shortcuts import SURFACE_RULES, draw_goal, guess_goal
 from roboirg.shortcuts.command_chance import understood_goals
 from roboirg.shortcuts.goal_vocabulary import goal_vocabulary
-from roboirg.shortcuts.text_guess import TextGuess
+from roboirg.shortcuts.surface_rules import SURFACE_RULES
+from roboirg.shortcuts.text_guess import TextGuess, draw_goal, guess_goal
 from roboirg.util.random_draws import draw
 
 MEANING = "listener"

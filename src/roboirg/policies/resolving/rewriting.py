@@ -52,7 +52,7 @@ def read_rewriting(spec: str, target: str, options: Mapping[str, str]) -> Rewrit
             f"{RESOLVE}:{target or 'surface'}?{POLICY}=SPEC."
         )
     # Imported here because it brings the reader's patterns, which other policies do not need.
-    from roboirg.shortcuts import SURFACE_RULES
+    from roboirg.shortcuts.surface_rules import SURFACE_RULES
 
     if policy in BUILTIN and policy not in SURFACE_RULES:
         raise InvalidValueError(

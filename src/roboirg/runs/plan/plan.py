@@ -192,7 +192,6 @@ class Plan(PlanFields):
         """
         if not self._has_groups:
             return self.setting_names
-        scene = splits.get_episode(task, self.split, episode)
         chosen = self.setting_names
         playable = []
         for setting in settings_of(tasks.get_task(task)):
@@ -200,7 +199,7 @@ class Plan(PlanFields):
                 continue
             # Explicit is kept unchecked: a task without words should be refused, not left out.
             is_sure = setting == EXPLICIT or (task, episode, setting) in said
-            if is_sure or find_refusal(scene, InstructionOptions(setting)) is None:
+            if is_sure or self._refusal(task, episode, InstructionOptions(setting)) is None:
                 playable.append(setting)
         return tuple(playable)
 
@@ -281,10 +280,13 @@ class Plan(PlanFields):
         plain_setting = all_settings()[options.setting].plain
         if plain_setting is None:
             return False
-        scene = splits.get_episode(task, self.split, episode)
-        if find_refusal(scene, options) is None:
+        if self._refusal(task, episode, options) is None:
             return False
-        return find_refusal(scene, replace(options, setting=plain_setting)) is None
+        return self._refusal(task, episode, replace(options, setting=plain_setting)) is None
+
+    def _refusal(self, task: str, episode: int, options: InstructionOptions) -> str | None:
+        """Return why an episode cannot be said with some options; None if it can."""
+        return find_refusal(splits.get_episode(task, self.split, episode), options)
 
     def _instructions_to_check(self) -> Iterator[Job]:
         """Yield a job for each instruction of which `checked` must see that it can be said."""
