@@ -33,9 +33,9 @@ class KeepsWords:
 
 
 @functools.cache
-def job_of(policy):
-    """Return the job to play five steps of PickXtimes test/0, told in the setting *direct*."""
-    return Job(
+def record_of(policy):
+    """Play five steps of PickXtimes test/0, told in the setting *direct*; return the record."""
+    job = Job(
         policy=policy,
         ref=open_policy(read_policy(policy)),
         task="PickXtimes",
@@ -44,57 +44,39 @@ def job_of(policy):
         environment=EnvironmentOptions(max_steps=5),
         options=InstructionOptions("direct"),
     )
-
-
-@functools.cache
-def record_of(policy):
-    """Play the job and return its record."""
     with HostPool(HostSettings()) as pool, pool.connect() as line:
-        return EpisodeRunner(Path(), hosts=line).play_once(job_of(policy)).record
+        return EpisodeRunner(Path(), hosts=line).play_once(job).record
 
 
 @pytest.mark.sim
 def test_a_users_policy_behind_a_rewriter_hears_the_explicit_command_in_a_process_of_its_own():
     """The episode, PickXtimes test/0, is told in the setting *direct*, which leaves much unsaid.
 
-    A rewriter (`resolve:`) replaces its instruction with the explicit command for the same episode.
-    `KeepsWords` stands for the policy of a user behind it: it reports as its metadata what it has
-    heard and the id of its process, which must not be the one of this test.
+    A rewriter (`resolve:`) replaces its instruction with the explicit command for the same episode,
+    and counts this. `KeepsWords` stands for the policy of a user behind it: it holds still for all
+    five steps, so it fails, and reports as its metadata what it has heard and the id of its
+    process, which must not be the one of this test.
     """
     record = record_of("resolve:listener?policy=test_resolving_run:KeepsWords")
 
     explicit_command = instruct(get_episode("PickXtimes", "test", 0), "explicit").text
     reported = record.policy_metadata["policy"]
-    assert reported["heard"] == explicit_command, record.details
-    assert reported["process"] != os.getpid()
-
-
-@pytest.mark.sim
-def test_the_record_of_a_policy_behind_a_rewriter_counts_its_instruction_as_rewritten():
-    """One instruction was replaced with an explicit command (`resolved`).
-
-    The policy, `KeepsWords`, holds still for the five steps of the episode, so the task is not
-    done: a failure, and no error.
-    """
-    record = record_of("resolve:listener?policy=test_resolving_run:KeepsWords")
-
-    assert record.usage["resolved"] == 1.0
     assert record.outcome == "failure", record.details
+    assert record.usage["resolved"] == 1.0
+    assert reported["heard"] == explicit_command
+    assert reported["process"] != os.getpid()
 
 
 @pytest.mark.sim
 def test_a_policy_behind_a_rewriter_has_both_their_versions_in_the_plan_and_in_the_record():
     """The rewriter `listener` comes with the benchmark; `KeepsWords` declares the version *v7*.
 
-    The version is known before the run, from the job, and the record that is played has the same.
+    A plan opens the policy before it is played, to read its version; the record has the same.
     """
     policy = "resolve:listener?policy=test_resolving_run:KeepsWords"
 
-    planned = job_of(policy).ref.version
-    played = record_of(policy).policy_version
-
-    assert planned == "built-in → v7"
-    assert played == "built-in → v7"
+    assert open_policy(read_policy(policy)).version == "built-in → v7"
+    assert record_of(policy).policy_version == "built-in → v7"
 
 
 @pytest.mark.parametrize(("rewriter", "is_privileged"), [("listener", True), ("surface", False)])

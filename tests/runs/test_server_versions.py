@@ -14,11 +14,6 @@ from roboirg.runs.run.executor import InProcess
 from roboirg.runs.run.runner import run_plan
 
 
-def plan_of_episodes(episodes, **options):
-    few = {"tasks": "PickXtimes", "settings": "explicit", "episodes": episodes}
-    return make_plan("random", **few, **options)
-
-
 class PlaysWithServerVersions:
     """Plays jobs with a policy's server that reports these versions, one for each episode.
 
@@ -37,6 +32,12 @@ class PlaysWithServerVersions:
         return make_record(job, "success", policy_metadata=metadata, server_version=told)
 
 
+def run_with_server_versions(count, folder, *versions):
+    """Run a plan of some episodes, each tried once, with a server that reports these versions."""
+    few = {"tasks": "PickXtimes", "settings": "explicit", "episodes": count, "tries": 1}
+    run_plan(make_plan("random", **few), folder, PlaysWithServerVersions(*versions), InProcess())
+
+
 def stored_server_versions(folder):
     return [record.server_version for record in read_records(folder)]
 
@@ -46,50 +47,41 @@ def test_a_run_stops_when_its_policys_server_reports_another_version(tmp_path):
 
     Results of two versions must not be mixed, so the third one is not stored.
     """
-    plan = plan_of_episodes(4)
-
     with pytest.raises(StoreError, match=r"whose server version is a, but in random-.* it is b"):
-        run_plan(plan, tmp_path, PlaysWithServerVersions("a", "a", "b", "a"), InProcess())
+        run_with_server_versions(4, tmp_path, "a", "a", "b", "a")
 
     assert stored_server_versions(tmp_path) == ["a", "a"]
 
 
-@pytest.fixture
-def run_with_one_of_two_episodes(tmp_path):
-    """The folder of a run that stored one episode, by version a, and stopped in the second one.
+def test_a_stopped_run_goes_on_with_the_version_of_the_server_with_which_it_began(tmp_path):
+    """Two episodes are to be played. The first is stored, with version a of the server.
 
-    The server had changed to version b.
+    The run stopped in the second one, as the server had changed to version b. Now it is a again.
     """
     with pytest.raises(StoreError):
-        run_plan(plan_of_episodes(2), tmp_path, PlaysWithServerVersions("a", "b"), InProcess())
-    return tmp_path
+        run_with_server_versions(2, tmp_path, "a", "b")
 
+    run_with_server_versions(2, tmp_path, "a")
 
-def test_a_stopped_run_goes_on_with_the_version_of_the_server_with_which_it_began(
-    run_with_one_of_two_episodes,
-):
-    """The fixture has a run of two episodes: the first is stored, with version a of the server."""
-    folder = run_with_one_of_two_episodes
-
-    run_plan(plan_of_episodes(2), folder, PlaysWithServerVersions("a"), InProcess())
-
-    assert stored_server_versions(folder) == ["a", "a"]
+    assert stored_server_versions(tmp_path) == ["a", "a"]
 
 
 @pytest.mark.parametrize(("version", "named"), [("b", "b"), (None, "none")])
 def test_a_stopped_run_does_not_go_on_with_another_or_an_unknown_version_of_the_server(
-    run_with_one_of_two_episodes, version, named
+    tmp_path, version, named
 ):
-    """The fixture has a run of two episodes: the first is stored, with version a of the server.
+    """Two episodes are to be played. The first is stored, with version a of the server.
 
-    Now the server reports version b, or none at all; the second episode is not stored.
+    The run stopped in the second one, as the server had changed to version b. Now the server
+    reports version b again, or none at all; the second episode is not stored.
     """
-    folder = run_with_one_of_two_episodes
+    with pytest.raises(StoreError):
+        run_with_server_versions(2, tmp_path, "a", "b")
 
     with pytest.raises(StoreError, match=f"server version is a, but in .* it is {named}; choose"):
-        run_plan(plan_of_episodes(2), folder, PlaysWithServerVersions(version), InProcess())
+        run_with_server_versions(2, tmp_path, version)
 
-    assert stored_server_versions(folder) == ["a"]
+    assert stored_server_versions(tmp_path) == ["a"]
 
 
 def test_a_server_version_with_terminal_codes_is_stored_escaped(tmp_path):
@@ -100,7 +92,7 @@ def test_a_server_version_with_terminal_codes_is_stored_escaped(tmp_path):
     """
     version = "\x1b[2J\u202e" + "9" * 5000
 
-    run_plan(plan_of_episodes(1), tmp_path, PlaysWithServerVersions(version), InProcess())
+    run_with_server_versions(1, tmp_path, version)
 
     (stored,) = stored_server_versions(tmp_path)
     assert stored.startswith(r"\x1b[2J\u202e")
@@ -111,9 +103,7 @@ def test_an_episode_without_a_connection_has_no_server_version_that_could_differ
 
     They have the version of the episode that was played, so all three may lie in one folder.
     """
-    plan = plan_of_episodes(3, tries=1)
-
-    run_plan(plan, tmp_path, PlaysWithServerVersions("refused", "a", "refused"), InProcess())
+    run_with_server_versions(3, tmp_path, "refused", "a", "refused")
 
     assert stored_server_versions(tmp_path) == ["a"] * 3
 
