@@ -72,6 +72,7 @@ def test_a_salt_draws_the_same_episodes_again_after_another_was_used():
 
 
 def test_a_private_split_has_as_many_episodes_as_the_random_one():
+    """A salt makes a private split of its own, a drawn one as *random* is."""
     assert split_size(use_salt(SALT)) == split_size("random")
 
 
@@ -132,6 +133,8 @@ def test_a_short_salt_is_refused_without_being_printed():
 
 
 def test_a_known_salt_makes_the_random_split_private_and_no_other():
+    """Without a salt the split *random* is public. Once it is set, that name means its private
+    split; *test* stays what it is."""
     assert drawn_split("random") == "random"
 
     split = use_salt(SALT)
@@ -141,7 +144,10 @@ def test_a_known_salt_makes_the_random_split_private_and_no_other():
 
 
 def test_a_private_split_is_not_played_by_policies_that_share_the_worlds_process():
+    """In the process of the simulator a policy could read the salt. The message says that policies
+    must have processes of their own."""
     split = use_salt(SALT)
+
     with pytest.raises(InvalidValueError, match="own"):
         make_plan(["oracle"], split=split, episodes="1", policy_process="shared")
 
@@ -187,46 +193,64 @@ def test_results_of_a_private_split_are_shown_merged_and_packed_without_its_salt
 def test_the_page_of_a_private_split_says_nothing_of_it_if_the_salt_is_known(
     private_run, monkeypatch
 ):
-    run, _ = private_run
+    """The fixture has a run of private episodes, and the salt with which they were made is set."""
+    run, _plan = private_run
     monkeypatch.setenv(SALT_VARIABLE, SALT)
 
     assert "are private" not in write_report(Source(run)).read_text()
 
 
 def test_verifying_a_run_of_a_private_split_needs_its_salt(private_run):
-    run, _ = private_run
+    """The fixture has a run of private episodes. The salt is set no longer, so none can be made."""
+    run, _plan = private_run
+
     with pytest.raises(MissingSaltError):
         call("leaderboard", "verify", run)
 
 
 def test_showing_a_private_episode_needs_its_salt(private_run):
-    _, plan = private_run
+    """The fixture has a plan of private episodes. The salt is set no longer, so none is made."""
+    _run, plan = private_run
+
     with pytest.raises(MissingSaltError):
         call("show", "PickXtimes", 0, "--split", plan.split)
 
 
 def test_a_command_neither_prints_nor_writes_the_salt(tmp_path, monkeypatch):
+    """The salt is set as a variable; the command plans an episode of its private split."""
     monkeypatch.setenv(SALT_VARIABLE, SALT)
     options = ["--policy", "random", "--split", "random", "--episodes", "1", "--dry-run"]
 
-    assert SALT not in call("run", "--out", tmp_path / "run", *options)
+    printed = call("run", "--out", tmp_path / "run", *options)
+
+    assert SALT not in printed
     assert SALT.encode() not in all_bytes_written_in(tmp_path)
 
 
-@pytest.mark.slow
-def test_workers_of_a_cluster_get_the_salt_and_write_it_into_no_log(tmp_path):
-    """The cluster was started without it."""
+@pytest.fixture
+def logs_of_a_cluster():
+    """A cluster of this machine was started; the folder with the logs of its processes."""
     ray = pytest.importorskip("ray")
     with tempfile.TemporaryDirectory(prefix="ray-") as logs:  # short: sockets are in it
         ray.init(num_cpus=1, log_to_driver=False, include_dashboard=False, _temp_dir=logs)
-        split = use_salt(SALT)
-        plan = make_plan(["oracle"], tasks="PickXtimes", split=split, episodes="1")
-        try:
-            run_plan(plan, tmp_path, FakePlay(), RayCluster(1))
-        finally:
-            ray.shutdown()
-        log = all_bytes_written_in(Path(logs))
+        yield Path(logs)
+        ray.shutdown()
 
+
+@pytest.mark.slow
+def test_workers_of_a_cluster_get_the_salt_and_write_it_into_no_log(logs_of_a_cluster, tmp_path):
+    """A salt is a secret text, SALT here, without which nobody can make the episodes of its split.
+
+    The cluster was started before the salt was set, so its workers get it from the run; otherwise
+    they could not play an episode. Their logs are there, with the name of one of Ray's programs,
+    the raylet, in them, but without the salt.
+    """
+    split = use_salt(SALT)
+    plan = make_plan(["oracle"], tasks="PickXtimes", split=split, episodes="1")
+
+    run_plan(plan, tmp_path, FakePlay(), RayCluster(1))
+
+    logs = all_bytes_written_in(logs_of_a_cluster)
     assert {record.split for record in read_records(tmp_path)} == {split}
-    assert b"raylet" in log
-    assert SALT.encode() not in log
+    assert b"raylet" in logs
+    assert SALT.encode() not in logs

@@ -381,6 +381,7 @@ def test_a_full_disk_costs_the_video_but_not_the_verdict(
 
 
 def test_a_record_has_the_reasoning_pattern_of_its_words_and_the_values_drawn_for_it():
+    """In the setting *reasoning* the goal must be inferred, in one of some ways (patterns)."""
     record = make_record(JOB.with_options(setting="reasoning"), "success")
 
     assert record.metadata["pattern"]
@@ -461,9 +462,11 @@ def test_a_repeated_subgoal_is_noted_again_only_if_its_last_try_had_failed(recor
 
 
 def test_a_subgoal_is_noted_with_why_its_try_failed_and_with_which_thing(record_of_episode):
+    """Of five tries at subgoals the first ended with "time-out!" and no thing, the last with "no"
+    and the cube; a subgoal whose try has not ended is noted after it."""
     subgoals = record_of_episode(FakeWorld(length=30), RepeatsItsSubgoal()).subgoals
 
-    timed_out, *_, refused, _ = subgoals
+    timed_out, *_, refused, _under_way = subgoals
     assert (timed_out.why, timed_out.thing) == ("time-out!", None)
     assert (refused.why, refused.thing) == ("no", "cube")
 
@@ -492,14 +495,14 @@ class SpeakingWorld(FakeWorld):
 
 
 class NotesWhatItHears(FakePolicy):
-    """Writes down what it hears; its metadata are what it has heard."""
+    """Writes down what it hears; its metadata are how many notes it has."""
 
     def hear(self, text, step):
-        self.heard += [text, step]
+        self.heard.append((text, step))
 
     @property
     def metadata(self):
-        return {"heard": len(self.heard)}
+        return {"notes": len(self.heard)}
 
 
 JOB_IN_TURNS = JOB.with_options(setting="contextual", delivery="turns")
@@ -524,23 +527,28 @@ def test_a_record_has_the_step_at_which_each_utterance_was_heard(policy_class, r
 def test_a_policy_hears_the_first_utterance_in_its_reset_and_the_others_with_their_steps(
     record_of_episode,
 ):
-    """The policy notes what it gets: the first utterance and the length of the video, 3 steps.
+    """Utterances are due at steps 0, 3, 6 and 6 of an episode of ten steps.
 
-    Then each later utterance and its step, 3, 6 and 6; the fifth never comes. Its metadata are the
-    number of notes, 8.
+    The policy notes what it gets: in its reset the first utterance and a demonstration, of which it
+    notes the number of frames, 3; then each later utterance with its step. Its metadata are written
+    after the last one: 2 + 3 notes.
     """
     world = SpeakingWorld((0, 3, 6, 6), length=10)
     policy = NotesWhatItHears()
 
     record = record_of_episode(world, policy, JOB_IN_TURNS)
 
-    turns = world.instruction.turns
-    assert policy.heard == [turns[0], 3, turns[1], 3, turns[2], 6, turns[3], 6]
-    assert record.policy_metadata == {"heard": 8}
+    first, second, third, fourth, _never = world.instruction.turns
+    assert policy.heard == [first, 3, (second, 3), (third, 6), (fourth, 6)]
+    assert record.policy_metadata == {"notes": 2 + 3}
 
 
 def test_a_policy_without_a_method_hear_gets_the_first_utterance_alone(record_of_episode):
-    """It notes that and the length of the video, 3 steps; others come at steps 3 and 6."""
+    """Utterances are due at steps 0, 3, 6 and 6 of an episode of ten steps.
+
+    The policy notes what it gets in its reset: the first utterance and a demonstration, of which it
+    notes the number of frames, 3. There is no way to tell it the others.
+    """
     world = SpeakingWorld((0, 3, 6, 6), length=10)
     policy = FakePolicy()
 
@@ -550,22 +558,24 @@ def test_a_policy_without_a_method_hear_gets_the_first_utterance_alone(record_of
 
 
 def test_the_caption_of_a_video_grows_with_each_utterance(give_world_and_policy, tmp_path):
-    """Utterances at steps 0, 3, 6, 6 and 9; frames of the video, the first and after each step.
+    """Utterances are due at steps 0, 3, 6, 6 and 9 of an episode of 11 steps, and the policy acts
+    for 3 steps at a time. The caption of a frame is all that was said before its step.
 
-    Actions come in chunks of 3, and what is heard at step 3 stands in the frames after it.
+    The video begins with a frame of the demonstration; it has one before the first step and one
+    after each step. So 1 + 1 + 3 frames show one utterance, 3 (after steps 4 to 6) show two, 3 show
+    four, as two came at step 6, and the 2 after step 9 show all five. Room is kept for these.
     """
     world = SpeakingWorld((0, 3, 6, 6, 9), length=11)
     captions = []
 
     class NotesCaptions(VideoWriter):
         def add_frame(self, source, is_demonstration=False):
-            del source, is_demonstration
             captions.append(self.caption)
 
     give_world_and_policy(world, FakePolicy())
     writer = NotesCaptions(tmp_path / "x.mp4")
     EpisodeRunner(tmp_path).play_once(JOB_IN_TURNS, writer)
 
-    utterances_shown = [1, 1, 1, 1, 1, 2, 2, 2, 4, 4, 4, 5, 5]
+    utterances_shown = 5 * [1] + 3 * [2] + 3 * [4] + 2 * [5]
     assert captions == [" ".join(world.instruction.turns[:count]) for count in utterances_shown]
     assert writer.longest_caption == world.instruction.text
