@@ -9,7 +9,6 @@ from unittest import mock
 
 import pytest
 import run_fakes
-from flat_jobs import with_version
 from made_records import fill
 from msgspec.structs import replace
 from run_fakes import (
@@ -147,16 +146,23 @@ def run_with_one_error(folder):
 
 
 def test_the_same_command_plays_errors_again(tmp_path):
-    """A third attempt succeeds, and nothing is left to play."""
+    """A run has played four episodes, of which one ended in an error in each of two attempts.
+
+    The same plan plays this one again: the third attempt is no error, so that nothing is left to
+    play the next time. The folder has no earlier plan, as it was the same one each time.
+    """
     plan = run_with_one_error(tmp_path)
 
-    assert fake_run(tmp_path, plan).played == 1
-    assert max(record.attempt for record in read_records(tmp_path)) == 3
-    assert fake_run(tmp_path, plan).played == 0
-    assert not earlier_plans(tmp_path)  # it was the same one each time
+    second_run = fake_run(tmp_path, plan)
+    third_run = fake_run(tmp_path, plan)
+
+    assert (second_run.played, third_run.played) == (1, 0)
+    assert sorted(record.attempt for record in read_records(tmp_path)) == [1, 1, 1, 3]
+    assert not earlier_plans(tmp_path)
 
 
 def test_errors_are_not_played_again_if_asked_not_to(tmp_path):
+    """A run has played four episodes, of which one ended in an error."""
     plan = run_with_one_error(tmp_path)
 
     summary = fake_run(tmp_path, plan, retry_errors=False)
@@ -165,8 +171,10 @@ def test_errors_are_not_played_again_if_asked_not_to(tmp_path):
 
 
 def test_missing_graphics_stop_the_run_and_the_records_before_are_kept(tmp_path):
+    """Of four episodes, numbers 0 to 3, the third finds no graphics, which no other one would."""
     with pytest.raises(RenderDeviceError, match="No Vulkan device can render; install one"):
-        run_plan(small_plan(), tmp_path, FakePlay(fatal=2), LocalProcesses(1))
+        run_plan(small_plan(4), tmp_path, FakePlay(fatal=2), LocalProcesses(1))
+
     assert {record.episode for record in read_records(tmp_path)} == {0, 1}
 
 
@@ -207,22 +215,26 @@ def test_what_a_repeated_run_with_fewer_episodes_leaves_out_is_kept_and_not_miss
         ("language_version", "99.0", r"language version is 99\.0, but in this roboirg it is \d"),
         ("task", "Gone", "whose words version is .*, but in this roboirg it is Gone/test@none;"),
         ("words", OTHER_WORDS, f"version is {OTHER_WORDS}, but in this roboirg it is Pick"),
-        ("policy_version", "old", r"random whose policy version is old, but now it is built-in"),
+        (
+            "ref",
+            dataclasses.replace(read_policy("random"), version="old"),
+            "random whose policy version is old, but now it is built-in",
+        ),
     ],
+    ids=["seed", "episode", "environment", "language", "task", "words", "policy"],
 )
 def test_a_run_does_not_go_on_in_a_folder_with_results_of_other_scenes_words_or_versions(
     tmp_path, name, value, sentence
 ):
-    """The folder holds two records; in the second one field differs from what would be played now.
+    """The folder holds two records. In the second one a field differs from what would be played
+    now: a seed or a task that is not there, a version, or what the policy is (its `ref`).
 
-    The first fits and ended in an error, so that all have to be compared. Nothing is played, and no
-    plan is written.
+    The first fits, and ended in an error, which would be played again: all records have to be
+    compared before. Nothing is played, and no plan is written.
     """
-    played, fine = map(FakePlay(), small_plan(1).jobs())
-    is_policy = name == "policy_version"
-    record = with_version(played, "old") if is_policy else replace(played, **{name: value})
-    lost = replace(fine, outcome="error", error="connection", cause="connection: x")
-    fill(tmp_path, lost, record)  # the first record fits: all have to be compared
+    played, other = map(FakePlay(), small_plan(1).jobs())
+    fitting_error = replace(other, outcome="error", error="connection", cause="connection: x")
+    fill(tmp_path, fitting_error, replace(played, **{name: value}))
 
     with pytest.raises(StoreError, match=sentence):
         fake_run(tmp_path, small_plan(2))
@@ -232,7 +244,10 @@ def test_a_run_does_not_go_on_in_a_folder_with_results_of_other_scenes_words_or_
 
 
 def test_a_line_that_was_cut_off_is_reported_before_an_episode_is_played(tmp_path):
-    """The cut line has 22 bytes. One warning comes first, then the progress of two episodes."""
+    """The cut line has 22 bytes. One warning comes first, then the progress of two episodes.
+
+    The reporter, which would print both, is replaced by one that notes how it is called.
+    """
     (tmp_path / RECORDS_FILE).write_bytes(b'{"policy":"random","ta')
     reporter = mock.Mock(spec=Reporter)
 
@@ -240,8 +255,7 @@ def test_a_line_that_was_cut_off_is_reported_before_an_episode_is_played(tmp_pat
 
     calls = [name for name, *_ in reporter.method_calls if name in ("warn", "advance")]
     assert calls == ["warn", "advance", "advance"]
-    ((notice,), _) = reporter.warn.call_args
-    assert "(22 bytes) to" in notice
+    assert "(22 bytes) to" in reporter.warn.call_args.args[0]
 
 
 @pytest.mark.parametrize(
@@ -297,6 +311,14 @@ def test_a_record_that_a_worker_of_another_version_made_is_not_stored(tmp_path, 
     assert (tmp_path / RECORDS_FILE).read_bytes() == b""
 
 
+@pytest.fixture
+def fingerprints_of_package(tmp_path, monkeypatch):
+    """Return what computes the fingerprints of the package that is in this folder."""
+    module = tmp_path / "roboirg" / "runs" / "play" / "episode_record.py"
+    monkeypatch.setattr(episode_record, "__file__", str(module))
+    return episode_record.code_fingerprints.__wrapped__  # which keeps no values
+
+
 @pytest.mark.parametrize(
     ("name", "is_code", "decides_verdicts"),
     [
@@ -307,19 +329,21 @@ def test_a_record_that_a_worker_of_another_version_made_is_not_stored(tmp_path, 
     ],
 )
 def test_a_changed_file_changes_the_fingerprint_of_the_code_and_that_of_verdicts_if_it_matters(
-    tmp_path, monkeypatch, name, is_code, decides_verdicts
+    tmp_path, fingerprints_of_package, name, is_code, decides_verdicts
 ):
-    """A record has both. Commands cannot change a verdict, words can; caches are no code."""
-    monkeypatch.setattr(
-        episode_record, "__file__", str(tmp_path / "roboirg" / "a" / "b" / "module.py")
-    )
-    path = tmp_path / "roboirg" / name
-    path.parent.mkdir(parents=True)
+    """A record has two checksums of the code that made it: of all, and of what decides verdicts.
 
-    path.write_text("before")
-    code, verdict_code = episode_record.code_fingerprints.__wrapped__()
-    path.write_text("after")
-    new_code, new_verdict_code = episode_record.code_fingerprints.__wrapped__()
+    The package has one file, which is changed. Commands (cli) and the number of the release cannot
+    change a verdict, words can; caches of the interpreter are no code. `fingerprints_of_package`
+    computes both for the package that is in the folder of the test.
+    """
+    file = tmp_path / "roboirg" / name
+    file.parent.mkdir(parents=True)
+
+    file.write_text("before")
+    code, verdict_code = fingerprints_of_package()
+    file.write_text("after")
+    new_code, new_verdict_code = fingerprints_of_package()
 
     assert (new_code != code) == is_code
     assert (new_verdict_code != verdict_code) == decides_verdicts
@@ -345,6 +369,7 @@ def test_an_episode_that_lost_its_process_is_repeated_at_once_and_one_with_an_er
 
 
 def test_a_machine_with_another_package_version_is_refused():
+    """Machines of a cluster compare what they have; this one has the same but for version 9."""
     here = MachineVersions((read_policy("random"),))
     there = dataclasses.replace(here, installed=here.installed._replace(package_version="9"))
 
@@ -361,6 +386,7 @@ def test_a_machine_with_another_version_of_a_policy_is_refused_by_its_name():
 
 
 def test_policies_of_an_unknown_version_are_not_compared_between_machines():
+    """The first policy of a plan is of an unknown version here, the second one is the same."""
     random = read_policy("random")
     here = MachineVersions((unknown_policy("x"), random))
     there = MachineVersions((read_policy("oracle"), random))
