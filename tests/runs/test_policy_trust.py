@@ -1,5 +1,6 @@
 """No policy reaches the goal, the next policy or the run; what it breaks is its own."""
 
+import contextlib
 import fcntl
 import os
 import re
@@ -308,30 +309,6 @@ class It:
 """
 
 
-def test_a_policys_process_has_no_keys_or_salt_of_the_environment_unless_the_plan_names_them(
-    tmp_path, monkeypatch
-):
-    """The policy writes down what its environment has; the plan names HF_TOKEN alone.
-
-    TOKENIZERS_PARALLELISM is no secret, although TOKEN is in its name.
-    """
-    for name in ("OPENAI_API_KEY", "HF_TOKEN", "AWS_ACCESS_KEY_ID", "TOKENIZERS_PARALLELISM"):
-        monkeypatch.setenv(name, "secret")
-    monkeypatch.setenv(SALT_VARIABLE, "a very secret salt")
-    monkeypatch.syspath_prepend(tmp_path)
-    (tmp_path / "reader.py").write_text(CODE_OF_A_POLICY_THAT_LOOKS_FOR_SECRETS)
-    plan = fake_world_plan("reader:It", 1, policy_env="HF_TOKEN").checked()
-
-    run_plan(plan, tmp_path / "run", fake_world_runner(plan, tmp_path / "run"), LocalProcesses(1))
-
-    (record,) = read_records(tmp_path / "run")
-    assert record.error is None
-    assert record.policy_metadata["salt in command lines"] is False
-    variables = set(record.policy_metadata["variables"])
-    assert {"HF_TOKEN", "TOKENIZERS_PARALLELISM"} <= variables
-    assert not {"OPENAI_API_KEY", "AWS_ACCESS_KEY_ID", SALT_VARIABLE} & variables
-
-
 def test_a_plan_that_names_a_variable_for_policies_that_is_not_set_is_refused():
     with pytest.raises(InvalidValueError, match="NOT_SET_HERE is not set here, so policies cannot"):
         fake_world_plan(HONEST_POLICY, 1, policy_env="NOT_SET_HERE").checked()
@@ -435,14 +412,37 @@ def play_policy_here(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
     add_working_directory(last=True)
 
-    def play(policy, executor):
-        plan = make_plan([policy], tasks="PickXtimes", settings="direct", episodes="1")
+    def play(policy, executor, **options):
+        few = {"tasks": "PickXtimes", "settings": "direct", "episodes": "1"}
+        plan = make_plan([policy], **few, **options)
         run = tmp_path / "run"
         run_plan(plan, run, fake_world_runner(plan, run), executor)
         (record,) = read_records(run)
         return record
 
     return play
+
+
+def test_a_policys_process_has_no_keys_or_salt_of_the_environment_unless_the_plan_names_them(
+    tmp_path, monkeypatch, play_policy_here
+):
+    """A policy reports which variables its process has, and whether the salt, a secret text, stands
+    in the command line of any process. The plan names HF_TOKEN as a variable for policies.
+
+    Other keys of services are kept from it. TOKENIZERS_PARALLELISM is no secret, although TOKEN is
+    in its name.
+    """
+    for name in ("OPENAI_API_KEY", "HF_TOKEN", "AWS_ACCESS_KEY_ID", "TOKENIZERS_PARALLELISM"):
+        monkeypatch.setenv(name, "secret")
+    monkeypatch.setenv(SALT_VARIABLE, "a very secret salt")
+    (tmp_path / "reader.py").write_text(CODE_OF_A_POLICY_THAT_LOOKS_FOR_SECRETS)
+
+    record = play_policy_here("reader:It", LocalProcesses(1), policy_env="HF_TOKEN")
+
+    variables = set(record.policy_metadata["variables"])
+    assert record.policy_metadata["salt in command lines"] is False
+    assert {"HF_TOKEN", "TOKENIZERS_PARALLELISM"} <= variables
+    assert not {"OPENAI_API_KEY", "AWS_ACCESS_KEY_ID", SALT_VARIABLE} & variables
 
 
 CODE_THAT_NOTES_ITS_IMPORT = """
@@ -504,20 +504,14 @@ def test_files_next_to_a_policy_shadow_no_module_but_in_its_own_process(tmp_path
 
 def memory_of(pid, needle):
     """Return whether the readable memory of a process holds some bytes."""
+    maps = Path(f"/proc/{pid}/maps").read_text()
     with Path(f"/proc/{pid}/mem").open("rb", 0) as memory:
-        for line in Path(f"/proc/{pid}/maps").read_text().splitlines():
-            found = re.match(r"([0-9a-f]+)-([0-9a-f]+) r", line)
-            if found is None or "[vvar]" in line or "[vsyscall]" in line:
-                continue
-            start = int(found[1], 16)
-            end = int(found[2], 16)
-            try:
-                memory.seek(start)
-                content = memory.read(end - start)
-            except (OSError, ValueError, OverflowError):
-                continue
-            if needle in content:
-                return True
+        for start, end in re.findall(r"^(\w+)-(\w+) r", maps, re.MULTILINE):
+            # Some parts belong to the kernel and cannot be read.
+            with contextlib.suppress(OSError, ValueError, OverflowError):
+                memory.seek(int(start, 16))
+                if needle in memory.read(int(end, 16) - int(start, 16)):
+                    return True
     return False
 
 

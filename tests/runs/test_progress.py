@@ -33,17 +33,21 @@ def printed_report(*records, terminal, planned=6, stored=2):
     return console.file.getvalue()
 
 
+def last_lines_of_terminal(*records, planned, stored):
+    """Return the bar and the score that a terminal of 80 columns shows at last, without codes."""
+    text = printed_report(*records, planned=planned, stored=stored, terminal=True)
+    return Text.from_ansi(text).plain.splitlines()[-2:]
+
+
 def test_a_terminal_sees_pace_time_left_and_score_in_80_columns():
     """Of six planned episodes two were stored before; the other four are played, so none is left.
 
-    Of those told in the setting *direct* one of two is a success, in *explicit* both are. The
-    terminal has 80 columns; its codes, such as those for colors, are dropped here.
+    Of those told in the setting *direct* one of two is a success, in *explicit* both are.
     """
     played = (DIRECT_FAILURE, EXPLICIT_SUCCESS, DIRECT_SUCCESS, EXPLICIT_SUCCESS)
 
-    text = printed_report(*played, planned=6, stored=2, terminal=True)
+    bar, score = last_lines_of_terminal(*played, planned=6, stored=2)
 
-    *_, bar, score = Text.from_ansi(text).plain.splitlines()
     assert re.fullmatch(r"episodes ━+ 6/6 0:00:\d\d 0:00:00 left · \d+\.\d/min", bar)
     assert len(bar) <= 80
     assert score == "direct 1/2 · explicit 2/2"
@@ -127,11 +131,9 @@ def test_errors_are_counted_apart_and_an_episode_played_again_is_done_once():
     It is played again, which ends in an error: still 3 of 6 are done. The score counts the failure,
     0 of 1, and the error apart from it.
     """
-    failure = DIRECT_FAILURE
     error = record_of("direct", "error", attempt=2)
 
-    text = printed_report(failure, error, planned=6, stored=2, terminal=True)
+    bar, score = last_lines_of_terminal(DIRECT_FAILURE, error, planned=6, stored=2)
 
-    *_, bar, score = Text.from_ansi(text).plain.splitlines()
     assert " 3/6 " in bar
     assert score == "direct 0/1 · errors 1"

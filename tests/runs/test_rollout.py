@@ -61,21 +61,24 @@ class FakeWorld:
         return self
 
     def set_frame_hook(self, hook, every=1):
-        del every
         self.hook = hook
 
     def picture(self, camera):
         return np.full((256, 256, 3), 40 * self.steps + len(camera), np.uint8)
 
     def reset(self, seed=None):
-        del seed
         if self.hook:
             self.hook(self, True)
         first = {"step": 3, "kind": "still", "subject": "robot", "place": None, "holds": True}
         shown = {"joint_positions": np.zeros((3, 7))}
-        info = {"demonstration": shown, "elapsed_steps": 4, "events": [first]}
-        now = {"status": "ongoing", "heard": []}
-        return {}, {**info, **now, "demonstration_source": "planned"}
+        return {}, {
+            "demonstration": shown,
+            "demonstration_source": "planned",
+            "elapsed_steps": 4,
+            "events": [first],
+            "status": "ongoing",
+            "heard": self.heard_until(0),
+        }
 
     def step_chunk(self, actions):
         assert actions.shape[1:] == (8,)
@@ -93,11 +96,15 @@ class FakeWorld:
             "cause": self.cause if over else None,
             "steps": self.steps,
             "events": [{**event, "holds": True}] if over else [],
-            "heard": [],
+            "heard": self.heard_until(self.steps),
         }
         return {}, 0.0, over and self.status != "timeout", over and self.status == "timeout", info
 
     attempts = ()
+
+    def heard_until(self, step):
+        """Return the utterances that were told since the last call, none in this world."""
+        return []
 
     def end_state(self):
         return np.zeros(3), "paper"
@@ -117,7 +124,6 @@ class FakePolicy:
         self.heard += [instruction, len(demonstration["joint_positions"])]
 
     def act(self, observation):
-        del observation
         if isinstance(self.answer, BaseException):
             raise self.answer
         return self.answer
@@ -480,15 +486,7 @@ class SpeakingWorld(FakeWorld):
         self.instruction = instruct_job(job)
         self.told = list(zip(self.instruction.turns, steps, strict=False))
 
-    def reset(self, seed=None):
-        observation, info = super().reset(seed)
-        return observation, {**info, "heard": self._fresh(0)}
-
-    def step_chunk(self, actions):
-        *others, info = super().step_chunk(actions)
-        return *others, {**info, "heard": self._fresh(self.steps)}
-
-    def _fresh(self, step):
+    def heard_until(self, step):
         fresh = [{"text": text, "step": at} for text, at in self.told if at <= step]
         del self.told[: len(fresh)]
         return fresh

@@ -40,13 +40,18 @@ THREE_SUBGOALS = (
 """One names a wrong thing, with a point, one is right, and one is no act that was due (lost)."""
 
 
+def record_with_usage(job, **usage):
+    """Return the record of a failure with three subgoals, for which models took this much."""
+    return make_record(job, "failure", "no", subgoals=THREE_SUBGOALS, usage=usage)
+
+
 def printed_subgoals_table(run):
     return call("tables", "--which", "subgoals", "--format", "markdown", run)
 
 
 @pytest.mark.parametrize("subgoal", [3, b"pick", ["pick"], "x" * 301, "a\nb", "\x1b[2J", "\ud800"])
 def test_a_subgoal_that_is_no_short_printable_text_is_refused(subgoal):
-    """A policy names its subgoal in an attribute. It must be a text of up to 300 characters, without
+    """A policy names its subgoal in an attribute. It must be a text of up to 300 characters without
     line breaks, codes that control a terminal, or half a character (a lone surrogate)."""
     with pytest.raises(InvalidValueError, match="The policy's subgoal"):
         policy_subgoal(SimpleNamespace(subgoal=subgoal))
@@ -111,42 +116,37 @@ def test_the_table_has_the_means_of_what_the_calls_of_models_took_in_an_episode(
     The means of two episodes: (3 + 1) / 2 = 2 calls, 6.5 / 2 = 3.25 s until answers, and
     2.25 / 2 = 1.125 s in queues, which is rounded up.
     """
-    three_calls = {"calls": 3.0, "answered_s": 6.5, "waited_s": 2.25}
-    one_call = {"calls": 1.0}
-    first = make_record(JOB, "failure", "no", subgoals=THREE_SUBGOALS, usage=three_calls)
-    second = make_record(replace(JOB, episode=1), "failure", "no", usage=one_call)
+    three_calls = record_with_usage(JOB, calls=3.0, answered_s=6.5, waited_s=2.25)
+    one_call = record_with_usage(replace(JOB, episode=1), calls=1.0)
 
-    printed = printed_subgoals_table(fill(tmp_path, first, second))
+    printed = printed_subgoals_table(fill(tmp_path, three_calls, one_call))
 
     assert "| calls | s for answers | s in queues |" in printed
     assert "| 2 | 3.25 | 1.13 |" in printed
 
 
 def test_the_table_has_unknown_costs_where_a_service_did_not_report_all_of_them(tmp_path):
-    """In direct the one episode tells its calls, tokens and US$; they are printed in this order.
+    """In the setting *direct* the one episode tells its calls, its tokens in and out, and its US$,
+    which are printed in this order.
 
-    In contextual one of two lacks output tokens and costs: these means are unknown, but that of the
-    input tokens is (8 + 4) / 2 = 6.
+    In *contextual* the second of two episodes lacks tokens out and US$. These means are unknown,
+    but that of the tokens in is (8 + 4) / 2 = 6.
     """
-    known = {"calls": 1.0, "input_tokens": 8.0, "output_tokens": 2.0, "cost_usd": 0.5}
-    partly = {"calls": 1.0, "input_tokens": 4.0}
-    direct = replace(JOB, options=InstructionOptions("direct"))
-    contextual = replace(JOB, options=InstructionOptions("contextual"))
-    for job, usage in (
-        (direct, known),
-        (contextual, known),
-        (replace(contextual, episode=1), partly),
-    ):
-        fill(tmp_path, make_record(job, "failure", "no", subgoals=THREE_SUBGOALS, usage=usage))
+    usage = {"calls": 1.0, "input_tokens": 8.0, "output_tokens": 2.0, "cost_usd": 0.5}
+    direct = record_with_usage(JOB, **usage)
+    contextual_job = JOB.with_options(setting="contextual")
+    whole = record_with_usage(contextual_job, **usage)
+    partly = record_with_usage(replace(contextual_job, episode=1), calls=1.0, input_tokens=4.0)
 
-    printed = printed_subgoals_table(tmp_path)
+    printed = printed_subgoals_table(fill(tmp_path, direct, whole, partly))
 
+    assert "| calls | tokens in | tokens out | US$ |" in printed
     assert "| 1 | 8 | 2 | 0.5 |" in printed
     assert "| 1 | 6 | unknown | unknown |" in printed
 
 
 class PointsAt:
-    """Names the same subgoal in each call, at the next of these points; holds still for 10 steps."""
+    """Names the same subgoal in each call, at the next of its points; holds still for 10 steps."""
 
     cameras = ("front",)
 

@@ -51,9 +51,8 @@ def parts(packed_kit, tmp_path):
 def install(parts):
     """Install parts to the folder `kit` next to them, as on a machine with this Python."""
     interpreter = parts.parent / "bin"
-    interpreter.mkdir(exist_ok=True)
-    if not (interpreter / "python3").exists():
-        (interpreter / "python3").symlink_to(sys.executable)
+    interpreter.mkdir()
+    (interpreter / "python3").symlink_to(sys.executable)
     return subprocess.run(
         ["bash", str(ROOT / "scripts/gpu/install"), str(parts), str(parts.parent / "kit")],
         env={"PATH": f"{interpreter}:/usr/bin:/bin", "HOME": str(parts.parent)},
