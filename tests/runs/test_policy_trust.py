@@ -369,17 +369,21 @@ def honest_policy_in_an_episode():
 @on_linux
 @pytest.mark.usefixtures("honest_policy_in_an_episode")
 def test_no_socket_of_the_run_accepts_connections():
-    """In /proc/net/unix flags that are not 0 mean that a socket listens."""
-    own_sockets = set()
-    for path in Path("/proc/self/fd").iterdir():
-        if path.is_socket():
-            own_sockets.add(str(path.readlink()))
-    assert own_sockets
+    """The fixture has a policy that plays. Through a socket to which anybody can connect, a policy
+    could reach the run. In /proc/net/unix sockets that listen have flags that are not 0; this
+    process has sockets, and none of them is among those."""
+    files = [path for path in Path("/proc/self/fd").iterdir() if path.is_socket()]
+    own_sockets = {str(path.readlink()) for path in files}
 
-    for line in Path("/proc/net/unix").read_text().splitlines()[1:]:
-        _slot, _count, _protocol, flags, _kind, _state, inode = line.split()[:7]
-        if f"socket:[{inode}]" in own_sockets:
-            assert int(flags, 16) == 0, f"{inode} listens"
+    listening = set()
+    _head, *lines = Path("/proc/net/unix").read_text().splitlines()
+    for line in lines:
+        _slot, _count, _protocol, flags, _kind, _state, inode, *_path = line.split()
+        if int(flags, 16) != 0:
+            listening.add(f"socket:[{inode}]")
+
+    assert own_sockets
+    assert own_sockets.isdisjoint(listening)
 
 
 def test_each_episode_begins_in_the_runs_folder_although_the_last_one_left_it(

@@ -84,6 +84,8 @@ def test_the_name_and_episodes_of_a_salt_never_change():
 
 
 def test_private_episodes_repeat_the_difficulties_and_their_scenes_follow_from_their_seeds():
+    """Episodes have four difficulties in turn, as in public splits (CYCLE). Each of eight episodes
+    has the scene and the goal that are made anew from its seed and difficulty."""
     split = use_salt(SALT)
     episodes = [get_episode("BinFill", split, index) for index in range(8)]
 
@@ -178,6 +180,12 @@ def private_run(tmp_path, monkeypatch):
 def test_results_of_a_private_split_are_shown_merged_and_packed_without_its_salt(
     private_run, tmp_path
 ):
+    """The fixture has a run of private episodes, made with SALT, which is set no longer.
+
+    All that needs no scene works: to merge and pack the run, its tables and its page. The page says
+    that the episodes are private, as it cannot draw them. No file that was written, or is packed in
+    one, has the salt in it.
+    """
     run, plan = private_run
 
     merge_runs([run], tmp_path / "merged")

@@ -310,7 +310,8 @@ def test_long_prompts_are_sent_or_refused_and_nothing_else():
 
 
 def test_of_a_tokenizer_that_is_a_pipe_the_policy_and_the_file_are_named(tmp_path):
-    """To open it would wait for ever."""
+    """The policy *mine* names a file with the tokenizer of its model. It is a pipe that nobody
+    writes to, so to open it would wait for ever."""
     os.mkfifo(tmp_path / "pipe.model")
     policy = f"mine=openpi://localhost:1?prompt_tokens=64&tokenizer={tmp_path}/pipe.model"
     jobs = make_plan([policy], tasks="PickXtimes", episodes="0,").jobs()

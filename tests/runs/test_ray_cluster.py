@@ -94,7 +94,7 @@ def test_a_run_ends_if_no_machine_of_the_cluster_can_render(cluster_with_one_cpu
 
 
 def test_a_users_policy_gets_the_same_records_on_a_cluster_as_in_one_process(
-    cluster_with_one_cpu, tmp_path, monkeypatch
+    cluster_with_one_cpu, tmp_path_factory, monkeypatch
 ):
     """The policy, `Dice`, draws its actions by chance, from the seed of the episode.
 
@@ -103,10 +103,8 @@ def test_a_users_policy_gets_the_same_records_on_a_cluster_as_in_one_process(
     monkeypatch.syspath_prepend(Path(hosting_fakes.__file__).parent)
     ray.init(address=cluster_with_one_cpu.address, log_to_driver=False)
     plan = fake_world_plan("Dice", 4)
-    local = tmp_path / "local"
-    remote = tmp_path / "remote"
-    local.mkdir()
-    remote.mkdir()
+    local = tmp_path_factory.mktemp("local")
+    remote = tmp_path_factory.mktemp("remote")
 
     run_plan(plan, local, fake_world_runner(plan, local), InProcess())
     run_plan(plan, remote, fake_world_runner(plan, remote), RayCluster())

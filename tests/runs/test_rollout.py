@@ -169,7 +169,8 @@ def test_an_episode_ends_within_a_chunk_of_actions(record_of_episode):
 
 
 def test_a_policys_reset_gets_the_instruction_and_the_video(record_of_episode):
-    """The video of the fake world has 3 frames."""
+    """The policy notes what its reset gets: the instruction, and how many frames the video before
+    its turn has, which are 3 in the fake world. The record has their number, too."""
     policy = FakePolicy()
 
     record = record_of_episode(FakeWorld(), policy)
@@ -266,7 +267,10 @@ def test_a_policy_that_raises_or_answers_nonsense_ends_its_episode_as_an_error_n
     ids=str,
 )
 def test_metadata_of_a_policy_are_stored_as_json(record_of_episode, value, stored):
-    """Large arrays by their shape alone."""
+    """`value` is a part of what a policy says of itself, `stored` the same as a record has it.
+
+    Large arrays are stored by their shape alone.
+    """
     policy = FakePolicy()
     policy.metadata = {"deep": {"value": value}}
 

@@ -270,7 +270,9 @@ def test_a_line_that_was_cut_off_is_reported_before_an_episode_is_played(tmp_pat
     ],
 )
 def test_a_run_warns_once_of_a_task_on_which_the_policy_was_not_trained(tmp_path, trained, warned):
-    """None: the policy does not say on which tasks it was trained."""
+    """The policy says that it was trained on the tasks `trained`; None says nothing. It plays two
+    episodes of PickXtimes. The reporter, which would print a warning, is replaced by one that notes
+    how it is called."""
     policy = dataclasses.replace(read_policy("random"), needs=PolicyNeeds(trained_tasks=trained))
     reporter = mock.Mock(spec=Reporter)
 

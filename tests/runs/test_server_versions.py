@@ -17,7 +17,7 @@ from roboirg.runs.run.runner import run_plan
 class PlaysWithServerVersions:
     """Plays jobs with a policy's server that reports these versions, one for each episode.
 
-    None stands for a server that does not tell its version.
+    A server that does not tell its version counts as *unknown*.
     """
 
     def __init__(self, *versions):
@@ -27,7 +27,7 @@ class PlaysWithServerVersions:
         version = self.versions.pop(0)
         if version == "refused":
             return make_record(job, cause="connection: refused", error="connection")
-        metadata = {"server": "localhost:1"} | ({} if version is None else {"version": version})
+        metadata = {"server": "localhost:1", "version": version}
         told = server_version(metadata)
         return make_record(job, "success", policy_metadata=metadata, server_version=told)
 
@@ -66,7 +66,7 @@ def test_a_stopped_run_goes_on_with_the_version_of_the_server_with_which_it_bega
     assert stored_server_versions(tmp_path) == ["a", "a"]
 
 
-@pytest.mark.parametrize(("version", "named"), [("b", "b"), (None, "none")])
+@pytest.mark.parametrize(("version", "named"), [("b", "b"), ("unknown", "none")])
 def test_a_stopped_run_does_not_go_on_with_another_or_an_unknown_version_of_the_server(
     tmp_path, version, named
 ):

@@ -122,7 +122,12 @@ def test_a_video_whose_caption_grows_can_be_finished(tmp_path):
 
 
 def test_a_frame_has_room_for_the_longest_caption_and_ink_for_its_own():
-    """Ink is dark pixels below the pictures, which are 256 pixels high."""
+    """A frame has its caption below the pictures, which are 256 pixels high. With a short caption
+    it is as high as with the longest one that will come, and higher than for the short one alone.
+
+    Ink is dark pixels: the short caption, a twentieth of the long one, has less than a tenth of its
+    ink, but some.
+    """
     pictures = [np.full((256, 256, 3), 200, np.uint8)] * 2
     short = "This one is red."
     long = short * 20

@@ -37,11 +37,11 @@ def numbers_printed_before_a_kill(folder, seconds):
     """Run the program that adds entries; kill it so many seconds after it has printed the first."""
     words = (sys.executable, "-c", ADDING, str(folder))
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, cwd=SCRIPTS) as process:
-        first = process.stdout.readline()
+        printed = [process.stdout.readline()]
         time.sleep(seconds)
         process.kill()
-        others = process.stdout.read()
-    return list(map(int, (first + others).split()))
+        printed += process.stdout
+    return list(map(int, printed))
 
 
 @pytest.mark.parametrize("seed", slow_but([0, 1], range(12)))
@@ -89,7 +89,11 @@ def join(first, second):
 
 
 def test_stores_are_joined_by_copying_their_packs(tmp_path):
-    """Both have one entry in common, and each has one more."""
+    """A store is a folder with compressed files, its packs, which other machines fill, too.
+
+    Two have one entry in common, and each has one more: three after those of one were copied to the
+    other.
+    """
     first = tmp_path / "first"
     second = tmp_path / "second"
     for folder in (first, second):
@@ -116,7 +120,7 @@ def test_entries_that_contradict_each_other_are_refused_with_both_files(tmp_path
 
 
 def test_a_damaged_pack_is_refused(tmp_path):
-    """The last nine bytes of the one file are cut off."""
+    """A store with one entry is written to one file; its last nine bytes are cut off."""
     add(tmp_path, "success 20")
     (pack,) = tmp_path.glob("*.xz")
     pack.write_bytes(pack.read_bytes()[:-9])
