@@ -29,12 +29,6 @@ def policy_of_version_7(spec):
     return dataclasses.replace(read_policy(spec, SHARED_NAME), version="7")
 
 
-@pytest.fixture(scope="module")
-def two_records():
-    first, second, *_ = map(FakePlay(), small_plan(2).jobs())
-    return first, second
-
-
 def refusal(action):
     try:
         action()
@@ -43,16 +37,17 @@ def refusal(action):
     return ""
 
 
-def what_is_said_where_they_meet(folder, two_records, before, now):
+def what_is_said_where_they_meet(folder, before, now):
     """Return what is said where results of two policies of one name meet.
 
     In a run that goes on, a merge, a file of records, the labels of tables, and a list of mixtures.
     """
-    first = replace(two_records[0], ref=before)
-    second = replace(two_records[1], ref=now)
+    plan = small_plan(2).model_copy(update={"policies": (now,)})
+    first_job, second_job, *_ = plan.jobs()
+    first = replace(FakePlay()(first_job), ref=before)
+    second = replace(FakePlay()(second_job), ref=now)
     fill(folder / "a", first)
     fill(folder / "b", second)
-    plan = small_plan(2).model_copy(update={"policies": (now,)})
     ways = {
         "resumed": lambda: check_run(plan, folder / "a"),
         "merged": lambda: merge_runs([folder / "b", folder / "a"], folder / "out"),
@@ -76,14 +71,16 @@ MME = "mme-vla://gpu:8000"
         ("planner:listener", f"planner:listener?hands={MME}"),
     ],
 )
-def test_another_policy_of_the_same_name_is_refused_or_kept_apart(
-    before, now, two_records, tmp_path, snapshot
-):
-    """In one sentence with both values; tables name the difference in their labels."""
-    found = what_is_said_where_they_meet(
-        tmp_path, two_records, policy_of_version_7(before), policy_of_version_7(now)
-    )
-    assert found == snapshot
+def test_another_policy_of_the_same_name_is_refused_or_kept_apart(before, now, tmp_path, snapshot):
+    """Two policies have the same name and version, but are not the same. A record of each exists.
+
+    A run that would go on, a merge and a file of records refuse them in one sentence with both
+    values; tables name the difference in their labels. The stored snapshot has all of these texts.
+    """
+    before = policy_of_version_7(before)
+    now = policy_of_version_7(now)
+
+    assert what_is_said_where_they_meet(tmp_path, before, now) == snapshot
 
 
 @pytest.mark.parametrize(
@@ -172,9 +169,7 @@ def test_a_policy_at_another_address_or_typed_in_another_way_is_the_same_policy(
     assert makeup_before == makeup_now != ()
 
 
-def test_a_policy_typed_in_another_way_goes_on_in_its_run_and_is_merged_without_a_word(
-    two_records, tmp_path
-):
+def test_a_policy_typed_in_another_way_goes_on_in_its_run_and_is_merged_without_a_word(tmp_path):
     """08 is 8, and how long to wait and whether to encrypt make no other policy.
 
     Each of two records is of one of these. A run with them goes on, is merged and stores without an
@@ -183,7 +178,7 @@ def test_a_policy_typed_in_another_way_goes_on_in_its_run_and_is_merged_without_
     before = policy_of_version_7("openpi://gpu:8000?execute=8")
     now = policy_of_version_7("openpi://gpu:8000?execute=08&timeout=9&tls=yes")
 
-    found = what_is_said_where_they_meet(tmp_path, two_records, before, now)
+    found = what_is_said_where_they_meet(tmp_path, before, now)
 
     assert found == {"resumed": "", "merged": "", "stored": "", "labels": ["random"], "mixed": []}
 

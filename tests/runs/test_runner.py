@@ -221,7 +221,6 @@ def test_what_a_repeated_run_with_fewer_episodes_leaves_out_is_kept_and_not_miss
             "random whose policy version is old, but now it is built-in",
         ),
     ],
-    ids=["seed", "episode", "environment", "language", "task", "words", "policy"],
 )
 def test_a_run_does_not_go_on_in_a_folder_with_results_of_other_scenes_words_or_versions(
     tmp_path, name, value, sentence
