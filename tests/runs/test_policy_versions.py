@@ -160,7 +160,8 @@ def test_a_policy_whose_reset_raises_is_opened_with_the_error_as_its_problem():
 
 
 def test_making_a_plan_opens_each_policy_once(write_policy_module, tmp_path):
-    """With a made-up instruction, to read its version; opening may take minutes."""
+    """To read its version, a policy is opened and reset with a made-up instruction; as this may
+    take minutes, it is done once. The policy writes each instruction that it gets to a file."""
     note = tmp_path / "opened"
     write_policy_module(reset=f"open({str(note)!r}, 'a').write(instruction)")
 

@@ -187,6 +187,8 @@ def test_events_before_the_policys_first_action_have_negative_steps(record_of_ep
 
 
 def test_a_plan_may_prescribe_the_frames_of_the_video(record_of_episode):
+    """The plan asks for four frames of the video before the policy's turn. The record has this
+    among the needs of the policy, with its cameras, of which it wants none."""
     job = replace(JOB, environment=EnvironmentOptions(demonstration_frames=4))
 
     needs = record_of_episode(FakeWorld(), FakePolicy(), job).needs
@@ -209,9 +211,15 @@ def test_a_policy_that_wants_other_actions_than_the_plan_prescribes_is_an_error(
 def test_only_a_policy_that_is_declared_privileged_gets_the_world(
     record_of_episode, spec, attached
 ):
-    """`oracle` is declared, `random` is not. Before reset with words and a video of 3 steps."""
+    """Of the policies of the benchmark `oracle` is declared as privileged, `random` is not.
+
+    The policy that plays under that name notes the type of the world that it is given, if any, and
+    after it what its reset gets: the instruction and a video, of which it notes the 3 frames.
+    """
     policy = PolicyWithAttach()
+
     record_of_episode(FakeWorld(), policy, replace(JOB, policy=spec, ref=read_policy(spec)))
+
     assert policy.heard == [*attached, instruct_job(JOB).text, 3]
 
 
@@ -225,7 +233,10 @@ def test_only_a_policy_that_is_declared_privileged_gets_the_world(
 def test_the_outcome_and_its_cause_are_those_of_the_world(
     record_of_episode, status, given, outcome, cause
 ):
+    """An episode may end as a failure with a cause that the world gives, or when its time is over,
+    which is a failure, too: 1,300 steps are the usual limit."""
     record = record_of_episode(FakeWorld(3, status, given), FakePolicy())
+
     assert (record.outcome, record.cause) == (outcome, cause)
 
 
@@ -324,11 +335,13 @@ def test_an_exception_in_the_world_ends_the_episode_as_an_error_of_the_environme
 
 @pytest.mark.parametrize("error", [RenderDeviceError("no"), MissingDependencyError("no")])
 def test_missing_graphics_or_packages_stop_the_run_instead_of_one_episode(record_of_episode, error):
+    """Every other episode would lack them, too, so the error is not written into a record."""
     with pytest.raises(type(error)):
         record_of_episode(FakeWorld(), FakePolicy(error))
 
 
 def test_ctrl_c_in_a_policy_stops_the_run_and_is_no_error_of_the_episode(record_of_episode):
+    """While the policy acts, Ctrl-C raises this in the process of the run."""
     with pytest.raises(KeyboardInterrupt):
         record_of_episode(FakeWorld(), FakePolicy(KeyboardInterrupt()))
 
@@ -458,7 +471,13 @@ class RepeatsItsSubgoal(FakePolicy):
 
 
 def test_a_repeated_subgoal_is_noted_again_only_if_its_last_try_had_failed(record_of_episode):
-    """A call every 3 steps; each reports how the last try ended. Done at step 12: no new note."""
+    """The policy is asked every 3 steps and names the subgoal "go" each time. Before each call but
+    the first, one more try at a subgoal has ended: those at "go" with a time-out, missed, blocked,
+    and done; the last one, at "sing", was refused.
+
+    After each failed try "go" is noted anew, at steps 0, 3, 6 and 9. The one from step 9 on is
+    done, so that no new note is made at step 12. At step 15 the refused one is noted, and "go".
+    """
     subgoals = record_of_episode(FakeWorld(length=30), RepeatsItsSubgoal()).subgoals
 
     assert [(subgoal.step, subgoal.text, subgoal.ended) for subgoal in subgoals] == [

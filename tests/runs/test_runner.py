@@ -188,7 +188,8 @@ def test_a_run_may_be_repeated_with_more_episodes_in_its_folder(tmp_path):
 
 
 def test_what_a_repeated_run_with_fewer_episodes_leaves_out_is_kept_and_not_missing(tmp_path):
-    """Four episodes are played in two settings each (8 records), then one is asked for (2)."""
+    """Four episodes are played in two settings each, which makes 8 records. Then one is asked for,
+    of which both records are there, so nothing is played. The stored plan is the last one."""
     fake_run(tmp_path, small_plan(episodes=4))
 
     fewer = fake_run(tmp_path, small_plan(episodes=1))
@@ -379,6 +380,7 @@ def test_a_machine_with_another_package_version_is_refused():
 
 
 def test_a_machine_with_another_version_of_a_policy_is_refused_by_its_name():
+    """Machines of a cluster compare what they have, here the policy `random` in two versions."""
     random = read_policy("random")
     here = MachineVersions((random,))
     there = MachineVersions((dataclasses.replace(random, version="old"),))
