@@ -162,7 +162,9 @@ def checkpoints(tmp_path_factory):
 def test_a_policy_at_another_address_or_typed_in_another_way_is_the_same_policy(
     before, now, checkpoints
 ):
-    """`first` and `second` are folders of checkpoints with the same content."""
+    """What is compared of a policy is its makeup. `before` and `now` differ in what makes no
+    difference: an address, a timeout, a value written in another way or the usual one, a folder
+    with the same files. `first` and `second` are folders of checkpoints with the same content."""
     makeup_before = read_policy(before.format(**checkpoints)).makeup
     makeup_now = read_policy(now.format(**checkpoints)).makeup
 

@@ -88,7 +88,9 @@ def hostile_run(tmp_path_factory):
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "cause"), hostile_policies.SPOILED.items())
 def test_a_policy_that_breaks_its_process_loses_its_own_episodes(hostile_run, name, cause):
-    """Each cheats or breaks something: sends rubbish, closes files, raises an interrupt, ..."""
+    """Each policy has two episodes in the run of the fixture, and breaks something of its process:
+    it sends rubbish, closes all files, raises an interrupt, ... Both end in an error that counts as
+    the policy's, with a cause that begins as given."""
     _, records = hostile_run
 
     spoiled = records[hostile_policies.SPEC(name)]
@@ -100,7 +102,9 @@ def test_a_policy_that_breaks_its_process_loses_its_own_episodes(hostile_run, na
 @pytest.mark.slow
 @pytest.mark.parametrize("name", hostile_policies.HARMLESS)
 def test_a_policy_that_cheats_in_vain_fails_as_any_policy(hostile_run, name):
-    """As one that searches memory for the goal, or declares itself the winner."""
+    """Each policy has two episodes in the run of the fixture, and tries to win them in another way
+    than by acting: it searches memory for the goal, or declares itself the winner in its own
+    process, ... It does not do the task, so both are failures."""
     _, records = hostile_run
 
     cheating = records[hostile_policies.SPEC(name)]
@@ -159,7 +163,8 @@ def test_a_policy_that_searches_the_worlds_process_finds_the_goal_there():
 
 @pytest.mark.slow
 def test_impossible_usage_that_a_policy_reports_is_left_out(hostile_run):
-    """It reports costs of −1e300 $, 1e308 calls and 5 tokens."""
+    """`Debtor` reports as its usage costs of −1e300 $, 1e308 calls and 5 tokens in each of its
+    episodes in the run of the fixture. Only the tokens can be true."""
     _, records = hostile_run
 
     for record in records[hostile_policies.SPEC("Debtor")]:
@@ -560,7 +565,9 @@ class CallsFailuresSuccess(FakeWorldRunner):
 
 
 def test_a_failure_that_was_turned_into_a_success_is_noticed_by_its_cause(tmp_path):
-    """A success has no cause; a policy that patches the outcome alone leaves one."""
+    """A failure has a cause, here "picked the wrong cube", and a success has none. What plays here
+    turns failures into successes, and leaves the cause, as a policy would do that patches the
+    outcome alone. Both records of the plan become errors of the policy."""
     run_plan(small_plan(1), tmp_path, CallsFailuresSuccess(tmp_path), InProcess())
 
     for record in read_records(tmp_path):
@@ -583,7 +590,8 @@ def test_a_stored_success_that_has_a_cause_is_refused(tmp_path):
 def test_in_the_background_sigterm_ends_the_run_and_an_interrupt_is_the_policys_error(
     monkeypatch, raised, becomes
 ):
-    """There Ctrl-C is ignored (SIG_IGN), so an interrupt can only come from a policy."""
+    """In a run in the background Ctrl-C is ignored (SIG_IGN), so an interrupt can only come from a
+    policy: it becomes the error of an episode. What SIGTERM raises stays what it is."""
     monkeypatch.setattr(signal, "getsignal", lambda _number: signal.SIG_IGN)
 
     with pytest.raises(becomes), attribute_errors("environment"):

@@ -177,7 +177,9 @@ def test_a_policy_whose_version_raises_is_refused_rather_than_taken_for_one_with
 
 
 def test_versions_that_differ_only_in_unprintable_characters_stay_different():
-    """They are escaped for records; would find two versions that are escaped alike."""
+    """Versions are escaped for records. The four are an *a* with a line break, with a backslash and
+    an n, with half a character (a lone surrogate), and with a question mark; would find two that
+    are escaped alike."""
     escaped = set()
     for value in (r"'a\n'", r"'a\\n'", r"'a\udc80'", "'a?'"):
         escaped.add(policy_opened_here(made=f"self.version = {value}").version)
@@ -292,7 +294,9 @@ def test_a_run_whose_policy_could_not_be_opened_goes_on_once_it_can(write_policy
 
 @pytest.mark.parametrize("checkpoint", ["7", "8"])
 def test_the_version_of_a_class_in_this_process_is_read_when_it_is_opened(monkeypatch, checkpoint):
-    """Would find the version of a checkpoint that was loaded for an earlier run."""
+    """An object of the class takes the value of CKPT, the name of a checkpoint, as its version. It
+    is set after the policy was made of the class; would find the version of a checkpoint that was
+    loaded for an earlier run."""
 
     class Batched:
         def __init__(self):
@@ -318,7 +322,9 @@ def class_of_a_notebook_cell(code, number):
 
 
 def test_a_policy_class_of_a_notebook_is_another_after_its_cell_was_changed():
-    """And the first one again if the change is undone: the version follows from the code."""
+    """A class without a version gets one from its code (a fingerprint). In a notebook that is the
+    code of a cell: it is executed, changed and executed, and changed back, which gives the first
+    fingerprint again."""
     code = "class It:\n    def act(self): return 1\n"
     changed = "class It:\n    def act(self): return 2\n"
 

@@ -77,7 +77,9 @@ def test_a_private_split_has_as_many_episodes_as_the_random_one():
 
 
 def test_the_name_and_episodes_of_a_salt_never_change():
-    """Stored values: whoever has a salt can verify a run that was made with it before."""
+    """A salt is a secret text from which the name and the seeds of a private split follow. These
+    are stored values of this one: whoever has a salt can verify a run that was made with it before.
+    """
     assert use_salt("pinned-salt-0123") == "random@9be1761e24b2"
     seeds = seeds_of(2, "PickXtimes", "random@9be1761e24b2")
     assert seeds == [343211101013922, 319322239144157]
@@ -96,7 +98,9 @@ def test_private_episodes_repeat_the_difficulties_and_their_scenes_follow_from_t
 
 
 def test_a_private_episode_takes_the_first_seed_for_which_a_scene_can_be_made():
-    """All seeds before it are rejected: of 30 episodes of this task some need a second try."""
+    """A private episode has a sequence of seeds, of which `private_seed` gives one for each try.
+    For all before the one that it has, its scene is rejected: there is no room for all things. Of
+    30 episodes of this task some need a second try, so that something is tested."""
     split = use_salt(SALT)
     task = "VideoPlaceOrder"
     rejected_seeds = 0
@@ -115,7 +119,9 @@ def test_a_private_episode_takes_the_first_seed_for_which_a_scene_can_be_made():
 
 @pytest.mark.parametrize("salt", ["", OTHER])
 def test_a_private_split_is_refused_without_its_salt_or_with_another(monkeypatch, salt):
-    """So are its episodes and a plan of them; the messages name the variable and the split."""
+    """A private split is made from one salt, SALT. Then none is set, or OTHER: neither an episode
+    nor a plan of the split can be made. The messages name the variable for the salt and the split.
+    """
     split = use_salt(SALT)
 
     monkeypatch.setenv(SALT_VARIABLE, salt)
@@ -127,6 +133,7 @@ def test_a_private_split_is_refused_without_its_salt_or_with_another(monkeypatch
 
 
 def test_a_short_salt_is_refused_without_being_printed():
+    """A salt of five letters could be guessed; it needs 12. It is not kept either."""
     with pytest.raises(InvalidValueError, match="at least 12") as caught:
         use_salt("short")
 

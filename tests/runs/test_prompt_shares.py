@@ -321,7 +321,9 @@ def test_of_a_tokenizer_that_is_a_pipe_the_policy_and_the_file_are_named(tmp_pat
 
 
 def test_a_dry_run_prints_the_share_of_cut_prompts_and_the_policies_without_a_limit(tmp_path):
-    """The one policy reads 64 tokens and all of its prompts are cut; the other tells no limit."""
+    """The model of *system:pi0.5* reads 64 tokens; 16 distractors, sentences without use, make all
+    of its prompts longer. The policy *far* does not say how many it reads. A dry run plays nothing.
+    """
     printed = call(
         "run", "--dry-run", "--out", tmp_path, "--tasks", "PickXtimes",
         "--policy", "system:pi0.5", "--policy", "far=openpi://localhost:1",

@@ -192,7 +192,8 @@ def test_a_client_with_the_key_reaches_the_policy_processes_of_a_machine(address
 
 
 def test_a_client_with_another_key_does_not_reach_the_policy_processes(address_of_policies):
-    """The connection is closed: nothing is received, not even one byte."""
+    """The address of the processes that have the policies of a machine has a secret key with it.
+    With another key, the connection is closed: nothing is received, not even one byte."""
     forged = address_of_policies._replace(key=b"x" * 32)
 
     with forged.connect() as line:
@@ -200,7 +201,8 @@ def test_a_client_with_another_key_does_not_reach_the_policy_processes(address_o
 
 
 def test_a_client_that_sends_no_key_is_disconnected_from_the_policy_processes(address_of_policies):
-    """It connects and says nothing. The connection is closed: not even one byte is received."""
+    """The address of the processes that have the policies of a machine has a secret key with it. A
+    client that connects and says nothing is disconnected: not even one byte is received."""
     with socket.socket(socket.AF_UNIX) as silent_client:
         silent_client.connect(address_of_policies.path)
 

@@ -255,7 +255,9 @@ def test_the_outcome_and_its_cause_are_those_of_the_world(
 def test_a_policy_that_raises_or_answers_nonsense_ends_its_episode_as_an_error_not_a_failure(
     record_of_episode, answer, cause
 ):
-    """An error counts in no rate. Its cause has no address of memory, which differs each time."""
+    """The policy raises `answer`, if that is an exception, or answers with it instead of numbers
+    for its joints. An error counts in no rate. Its cause has no address of memory, which differs
+    each time."""
     world = FakeWorld()
 
     record = record_of_episode(world, FakePolicy(answer))
@@ -303,7 +305,8 @@ def test_metadata_of_a_policy_are_stored_as_json(record_of_episode, value, store
 def test_metadata_that_json_cannot_hold_are_an_error_that_names_their_key(
     record_of_episode, value, sentence
 ):
-    """The value stands two levels deep in what the policy says of itself."""
+    """The value stands in what the policy says of itself, its metadata, under the keys *deep* and
+    *value*: no number, bytes, and a key that is no text."""
     policy = FakePolicy()
     policy.metadata = {"deep": {"value": value}}
 
@@ -323,7 +326,8 @@ def test_metadata_that_json_cannot_hold_are_an_error_that_names_their_key(
 def test_an_exception_in_the_world_ends_the_episode_as_an_error_of_the_environment(
     record_of_episode, trouble, cause
 ):
-    """The world raises `trouble`; the cause names it, with this file and the line."""
+    """The world raises `trouble` when it should act. The cause names it in one line, with this file
+    and the line where it was raised; actions that are not valid have a kind of their own."""
     world = FakeWorld()
     world.trouble = trouble
 

@@ -74,7 +74,9 @@ def records_of_an_uninterrupted_run(tmp_path_factory):
 def test_a_killed_run_goes_on_with_the_same_command_and_has_the_same_records_in_the_end(
     tmp_path, records_of_an_uninterrupted_run
 ):
-    """A run of 16 episodes is killed after at least three; the same command plays the rest."""
+    """A run of 16 episodes with two workers is killed after at least three; when the workers have
+    ended, too, the same command plays the rest. The records are those of a run that nobody killed.
+    """
     child = begun_run(tmp_path, workers=2)
     child.send_signal(signal.SIGKILL)
     child.wait()
@@ -89,7 +91,8 @@ def test_a_killed_run_goes_on_with_the_same_command_and_has_the_same_records_in_
 
 
 def test_a_line_that_a_kill_cut_off_is_set_aside_and_its_episode_played_again(tmp_path):
-    """As all of a record is written at once, this is the worst that a kill can leave behind."""
+    """A record is written as one line at once, so a line that is cut off is the worst that a kill
+    can leave behind. It is moved to another file, and both episodes of the plan are played."""
     torn_line = b'{"policy":"random","ta'
     (tmp_path / RECORDS_FILE).write_bytes(torn_line)
 
@@ -120,7 +123,8 @@ def test_ctrl_c_or_sigterm_ends_the_workers_and_keeps_the_records_of_ended_episo
 
 
 def test_an_episode_in_which_the_worker_dies_twice_is_one_error_and_the_rest_is_played(tmp_path):
-    """A dead process may be bad luck, so it is tried twice; then it is an error of its own kind."""
+    """Of four episodes the one with number 2 kills its worker process each time. That may be bad
+    luck, so it is tried twice; then it is an error of its own kind, which is not the policy's."""
     plan = changed(small_plan(4), settings="direct")
 
     summary = run_plan(plan, tmp_path, FakePlay(tmp_path, deadly=2), LocalProcesses(1))
@@ -179,7 +183,8 @@ def test_missing_graphics_stop_the_run_and_the_records_before_are_kept(tmp_path)
 
 
 def test_a_run_may_be_repeated_with_more_episodes_in_its_folder(tmp_path):
-    """Each episode is told in two settings: 2 are 4 results, 4 are 8, of which 4 are new."""
+    """Each episode is told in two settings. A run of 2 episodes has 4 results; then 4 are asked
+    for, which are 8 results, of which 4 are new."""
     fake_run(tmp_path, small_plan(episodes=2))
 
     more = fake_run(tmp_path, small_plan(episodes=4))
@@ -302,7 +307,9 @@ def test_a_negative_number_of_workers_is_refused():
     [("environment_version", 7, "environment"), ("words", OTHER_WORDS, "words")],
 )
 def test_a_record_that_a_worker_of_another_version_made_is_not_stored(tmp_path, field, value, what):
-    """The record differs in one field, as if a worker had another version of this package."""
+    """What plays returns a record that differs in one field, as if a worker on another machine had
+    another version of this package. The run ends with an error, and the file of records is empty.
+    """
 
     def play_elsewhere(job):
         return replace(FakePlay()(job), **{field: value})
@@ -355,7 +362,9 @@ def test_a_changed_file_changes_the_fingerprint_of_the_code_and_that_of_verdicts
 def test_an_episode_that_lost_its_process_is_repeated_at_once_and_one_with_an_error_last(
     tmp_path, error, place
 ):
-    """The first episode fails: it is played again as the second one (1), or as the last (-1)."""
+    """The first of eight episodes ends in an error. If its process was lost (infrastructure), it is
+    played again as the second one, at place 1; if the environment failed, after all others, at the
+    last place (-1)."""
     played = []
 
     def fail_the_first(job):

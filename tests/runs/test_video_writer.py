@@ -41,7 +41,8 @@ def frames_of(video):
 
 
 def test_a_video_appears_only_when_it_is_complete(tmp_path):
-    """A video is written elsewhere until it is finished; then it is there, with a picture."""
+    """A video is written elsewhere until it is finished; then the film (mp4) is there, with a
+    picture of it (jpg)."""
     video = unfinished_video_of_21_frames(tmp_path)
     assert not video.path.exists()
 
@@ -51,7 +52,8 @@ def test_a_video_appears_only_when_it_is_complete(tmp_path):
 
 
 def test_a_video_of_21_like_frames_has_less_than_20_kilobytes(tmp_path):
-    """Frames without compression in time would take more."""
+    """All pictures are grey and equal. Frames that were compressed each on its own, not as changes
+    of the one before, would take more."""
     video = unfinished_video_of_21_frames(tmp_path)
     video.finish()
 
@@ -160,7 +162,8 @@ assert writer.finish(), writer.error
 
 
 def test_equal_pictures_give_equal_files_whatever_was_in_memory(tmp_path):
-    """MALLOC_PERTURB_ fills new memory with a byte; would find bytes that nothing has set."""
+    """A program writes the same video twice. With MALLOC_PERTURB_ new memory is filled with a byte,
+    here 50 or 200; would find bytes of the file that nothing has set."""
     contents = set()
     for byte in ("50", "200"):
         file = tmp_path / f"{byte}.mp4"

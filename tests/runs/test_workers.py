@@ -35,7 +35,8 @@ def sleeps_for_an_hour(job):
 
 
 def test_an_episode_that_takes_too_long_is_ended_and_named(tmp_path):
-    """The process may not have got as far as the episode, so one of two phases is named."""
+    """The episode sleeps for an hour, and may take 0.5 s. The worker process may not have got as
+    far as the episode by then, so one of two phases is named."""
     plan = changed(small_plan(1), settings="direct")
 
     run_plan(plan, tmp_path, sleeps_for_an_hour, LocalProcesses(1, episode_timeout_s=0.5))
@@ -56,7 +57,8 @@ def crashes_in_native_code(job):
 
 
 def test_a_crash_in_native_code_of_the_simulator_is_an_error_of_the_environment(tmp_path):
-    """Not of the policy, which has a process of its own. It may pass, so it was tried again."""
+    """The process that plays reads from the address 0, which ends it with signal 11. This is no
+    error of the policy, which has a process of its own. It may pass, so it was tried again."""
     plan = changed(small_plan(1), settings="direct")
 
     run_plan(plan, tmp_path, crashes_in_native_code, LocalProcesses(1))
@@ -166,7 +168,8 @@ def test_waiting_in_a_queue_does_not_count_for_the_time_limit_of_a_call(clock):
 
 
 def test_waiting_for_a_reply_counts_for_the_time_limit_of_a_call(clock):
-    """The limit is 10 s; the clock, which the fixture replaces, goes on by 10.1 s."""
+    """A call may take 10 s, and waits for the reply of a server, not in a queue. The clock, which
+    the fixture replaces, goes on by 10.1 s: the call is overdue."""
     board = watchdog.Watchdog()
     board.write("policy's reset()", 10.0)
     board.write_wait(Wait("the reply of a server", is_queue=False, since=clock.now))
@@ -248,7 +251,8 @@ def test_a_record_has_the_time_in_a_queue_apart_from_the_time_of_the_call():
 
 
 def test_a_worker_whose_episode_takes_too_long_is_killed():
-    """It sleeps for an hour: within a limit of an hour it goes on, beyond one of 0 s it dies."""
+    """The episode of the worker sleeps for an hour. Within a limit of an hour (3600 s) it goes on;
+    beyond one of 0 s its process is ended by SIGKILL."""
     worker = Worker(sleeps_for_an_hour, small_plan(1).jobs()[0])
     assert worker.poll(episode_timeout_s=3600) is None
 
@@ -349,7 +353,9 @@ def test_a_worker_plays_all_episodes_of_its_scene_before_it_takes_another():
 @settings(max_examples=25)
 @given(episodes=st.integers(1, 4), seeds=st.integers(1, 3), workers=st.integers(1, 5))
 def test_all_episodes_of_a_policy_are_played_before_those_of_the_next(episodes, seeds, workers):
-    """So that only one model is in memory at a time."""
+    """So that only one model is in memory at a time. A plan lists its jobs policy by policy;
+    workers, however many, take them so that policies are played in the same order, and each job
+    once."""
     jobs = small_plan(episodes, ("random", "oracle"), seeds).jobs()
 
     played = order_for_workers(deque(jobs), workers)

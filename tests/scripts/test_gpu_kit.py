@@ -87,7 +87,9 @@ def test_the_installed_kit_has_the_source_with_culling_and_without(tmp_path, par
 
 
 def test_a_damaged_part_is_named_and_nothing_is_installed(tmp_path, parts):
-    """`parts` has the parts of a kit, with checksums. A bit of the second part is flipped."""
+    """`parts` has the parts of a kit, which are files with checksums. The last bit of the second
+    part is flipped, as on a bad disk. The installation stops before it makes the folder of the kit.
+    """
     part = parts / "part-01"
     content = bytearray(part.read_bytes())
     content[-1] ^= 1

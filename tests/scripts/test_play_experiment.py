@@ -120,7 +120,8 @@ def test_entries_that_contradict_each_other_are_refused_with_both_files(tmp_path
 
 
 def test_a_damaged_pack_is_refused(tmp_path):
-    """A store with one entry is written to one file; its last nine bytes are cut off."""
+    """A store with one entry is one compressed file, a pack. Its last nine bytes are cut off, so
+    that it cannot be unpacked."""
     add(tmp_path, "success 20")
     (pack,) = tmp_path.glob("*.xz")
     pack.write_bytes(pack.read_bytes()[:-9])
