@@ -78,6 +78,7 @@ def test_the_installed_kit_has_the_source_with_culling_and_without(tmp_path, par
     """Culling is not to draw what a camera cannot see. To compare, the kit has the source twice.
 
     `parts` has it once, as it is here, with culling; the other tree, `unculled`, is made from it.
+    SETTINGS is the path of the file that says whether culling is on.
     """
     install(parts)
 
