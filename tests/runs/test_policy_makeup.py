@@ -29,12 +29,6 @@ def policy_of_version_7(spec):
     return dataclasses.replace(read_policy(spec, SHARED_NAME), version="7")
 
 
-@pytest.fixture(scope="module")
-def two_records():
-    first, second, *_ = map(FakePlay(), small_plan(2).jobs())
-    return first, second
-
-
 def refusal(action):
     try:
         action()
@@ -43,16 +37,17 @@ def refusal(action):
     return ""
 
 
-def what_is_said_where_they_meet(folder, two_records, before, now):
+def what_is_said_where_they_meet(folder, before, now):
     """Return what is said where results of two policies of one name meet.
 
     In a run that goes on, a merge, a file of records, the labels of tables, and a list of mixtures.
     """
-    first = replace(two_records[0], ref=before)
-    second = replace(two_records[1], ref=now)
+    plan = small_plan(2).model_copy(update={"policies": (now,)})
+    first_job, second_job, *_ = plan.jobs()
+    first = replace(FakePlay()(first_job), ref=before)
+    second = replace(FakePlay()(second_job), ref=now)
     fill(folder / "a", first)
     fill(folder / "b", second)
-    plan = small_plan(2).model_copy(update={"policies": (now,)})
     ways = {
         "resumed": lambda: check_run(plan, folder / "a"),
         "merged": lambda: merge_runs([folder / "b", folder / "a"], folder / "out"),
@@ -76,14 +71,16 @@ MME = "mme-vla://gpu:8000"
         ("planner:listener", f"planner:listener?hands={MME}"),
     ],
 )
-def test_another_policy_of_the_same_name_is_refused_or_kept_apart(
-    before, now, two_records, tmp_path, snapshot
-):
-    """In one sentence with both values; tables name the difference in their labels."""
-    found = what_is_said_where_they_meet(
-        tmp_path, two_records, policy_of_version_7(before), policy_of_version_7(now)
-    )
-    assert found == snapshot
+def test_another_policy_of_the_same_name_is_refused_or_kept_apart(before, now, tmp_path, snapshot):
+    """Two policies have the same name and version, but are not the same. A record of each exists.
+
+    A run that would go on, a merge and a file of records refuse them in one sentence with both
+    values; tables name the difference in their labels. The stored snapshot has all of these texts.
+    """
+    before = policy_of_version_7(before)
+    now = policy_of_version_7(now)
+
+    assert what_is_said_where_they_meet(tmp_path, before, now) == snapshot
 
 
 @pytest.mark.parametrize(
@@ -113,8 +110,14 @@ def test_what_a_policy_is_tells_it_from_others(before, now, what):
     assert first.what == what
 
 
-def test_only_where_a_policy_is_and_how_it_is_reached_makes_no_other_policy():
-    """Would find a new option of policies behind an address that results could differ in."""
+def test_all_but_eleven_options_of_policies_behind_an_address_make_another_policy():
+    """Policies with other options are compared as different ones, unless an option only says where
+    the policy is, how it is reached, and how fast: addresses, keys, timeouts, batches, ... These
+    are marked as NOT_COMPARED.
+
+    The list is written out here so that whoever adds an option decides whether results could
+    differ in it. All kinds of policies behind an address (a URL) are looked at, such as openpi://.
+    """
     not_compared = set()
     for scheme in url_classes():
         options = make_policy(f"{scheme}://nowhere:1?version=1", 0).options
@@ -159,27 +162,32 @@ def checkpoints(tmp_path_factory):
 def test_a_policy_at_another_address_or_typed_in_another_way_is_the_same_policy(
     before, now, checkpoints
 ):
-    """`first` and `second` are folders of checkpoints with the same content."""
+    """What is compared of a policy is its makeup. `before` and `now` differ in what makes no
+    difference: an address, a timeout, a value written in another way or the usual one, a folder
+    with the same files. `first` and `second` are folders of checkpoints with the same content."""
     makeup_before = read_policy(before.format(**checkpoints)).makeup
     makeup_now = read_policy(now.format(**checkpoints)).makeup
 
     assert makeup_before == makeup_now != ()
 
 
-def test_a_policy_typed_in_another_way_goes_on_in_its_run_and_is_merged_without_a_word(
-    two_records, tmp_path
-):
-    """08 is 8, and how long to wait and whether to encrypt make no other policy."""
+def test_a_policy_typed_in_another_way_goes_on_in_its_run_and_is_merged_without_a_word(tmp_path):
+    """08 is 8, and how long to wait and whether to encrypt make no other policy.
+
+    Each of two records is of one of these. A run with them goes on, is merged and stores without an
+    error; tables call both by one name, as nothing is mixed.
+    """
     before = policy_of_version_7("openpi://gpu:8000?execute=8")
     now = policy_of_version_7("openpi://gpu:8000?execute=08&timeout=9&tls=yes")
 
-    found = what_is_said_where_they_meet(tmp_path, two_records, before, now)
+    found = what_is_said_where_they_meet(tmp_path, before, now)
 
     assert found == {"resumed": "", "merged": "", "stored": "", "labels": ["random"], "mixed": []}
 
 
 def test_a_checkpoint_folder_with_other_weights_is_another_policy(tmp_path):
-    """The configuration and the path stay the same."""
+    """What a policy is, its makeup, has a checksum of the files in its folder. The configuration
+    and the path stay the same here, the weights do not."""
     (tmp_path / "config.json").write_text("{}")
 
     (tmp_path / "model.safetensors").write_text("weights")
@@ -191,7 +199,9 @@ def test_a_checkpoint_folder_with_other_weights_is_another_policy(tmp_path):
 
 
 def test_a_machine_of_a_cluster_with_another_checkpoint_at_the_path_is_refused(tmp_path):
-    """`versions` are those of the machine that starts the run; the agent checks them on its own."""
+    """`versions` are those of the machine that starts a run. A program on each other machine, the
+    agent, compares them with what it finds there at the same path: at first the same checkpoint,
+    then one whose configuration has changed."""
     file = tmp_path / "config.json"
     file.write_text("{}")
     versions = MachineVersions((read_policy(f"lerobot://{tmp_path}"),))
@@ -206,6 +216,7 @@ def test_a_machine_of_a_cluster_with_another_checkpoint_at_the_path_is_refused(t
 
 
 def test_no_two_built_in_policies_count_as_the_same():
+    """Would find two of them with the same makeup, which is what is compared of a policy."""
     assert len({read_policy(spec).makeup for spec in BUILTIN}) == len(BUILTIN)
 
 
@@ -218,15 +229,18 @@ def kind_of_another_package(monkeypatch):
 
 @pytest.mark.usefixtures("kind_of_another_package")
 def test_of_a_policy_kind_of_another_package_every_typed_word_makes_another_policy():
+    """The kind `lab` is of a package that is not installed here, so nobody can tell which of its
+    options make a difference: all do."""
     specs = ["lab:walk", "lab:run", "lab:walk?fast=yes", "lab:walk?fast=no", "lab:walk?hands=left"]
-    assert len({read_policy(spec).makeup for spec in specs}) == len(specs)
+    assert len({read_policy(spec).makeup for spec in specs}) == 5
 
 
 @pytest.mark.usefixtures("kind_of_another_package")
 def test_the_order_of_options_and_the_place_of_a_file_make_no_other_policy(tmp_path):
-    """Of two files with the same content."""
-    for name in ("weights", "copy"):
-        (tmp_path / name).write_text("weights")
+    """Two files have the same content. The kind `lab` is of a package that is not installed here,
+    so nothing but the order of its options and the place of its file can be seen through."""
+    (tmp_path / "weights").write_text("weights")
+    (tmp_path / "copy").write_text("weights")
 
     one_way = read_policy(f"lab:{tmp_path}/weights?a=1&b=2").makeup
     other_way = read_policy(f"lab:{tmp_path}/copy?b=2&a=1").makeup
@@ -237,7 +251,8 @@ def test_the_order_of_options_and_the_place_of_a_file_make_no_other_policy(tmp_p
 def test_objects_of_two_classes_are_two_policies_even_if_they_declare_one_version():
     """Two objects of one class are the same policy, one of a subclass is another.
 
-    So is one that is wrapped to know the state of the simulator.
+    So is one that is wrapped to know the state of the simulator. What is compared of a policy is
+    its makeup.
     """
 
     class Mine(RandomPolicy):
@@ -246,10 +261,10 @@ def test_objects_of_two_classes_are_two_policies_even_if_they_declare_one_versio
     class Other(Mine):
         pass
 
-    mine, again, other, privileged = (
-        policy_of(policy, SHARED_NAME).makeup
-        for policy in (Mine(), Mine(), Other(), Privileged(Mine()))
-    )
+    mine = policy_of(Mine(), SHARED_NAME).makeup
+    again = policy_of(Mine(), SHARED_NAME).makeup
+    other = policy_of(Other(), SHARED_NAME).makeup
+    privileged = policy_of(Privileged(Mine()), SHARED_NAME).makeup
 
     assert mine == again
     assert len({mine, other, privileged}) == 3

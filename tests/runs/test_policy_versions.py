@@ -29,29 +29,31 @@ class It:
     def __init__(self): {made}
     def reset(self, instruction, demonstration): {reset}
     def act(self, observation): return np.ones((24, 8))
+{other_classes}
 """
 CHECKPOINT_VARIABLE = 'os.environ["CKPT"]'
-NUMBER_BEHIND_TEXT = {
-    "on_class": "version = 'base'",
-    "reset": f"self.version = float({CHECKPOINT_VARIABLE})",
-}
 
 
 @pytest.fixture
 def write_policy_module(tmp_path, monkeypatch):
+    """Return what writes the module `checkpointed`, with a class `It` that has some code in parts.
+
+    The parts are its class body, `__init__` and `reset`; other classes may follow it.
+    """
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "checkpointed", raising=False)
     monkeypatch.setenv("CKPT", "7")
 
     def write_policy(**parts):
         (tmp_path / "checkpointed.py").write_text(code(**parts))
-        return read_policy("checkpointed:It", "mine")
 
     return write_policy
 
 
 def code(**parts):
-    return CODE_OF_A_POLICY.format(**{"on_class": "", "made": "pass", "reset": "pass", **parts})
+    """Return the code of the class `It`, in which the parts that are not given do nothing."""
+    nothing = {"on_class": "", "made": "pass", "reset": "pass", "other_classes": ""}
+    return CODE_OF_A_POLICY.format(**{**nothing, **parts})
 
 
 def policy_opened_here(**parts):
@@ -61,8 +63,9 @@ def policy_opened_here(**parts):
     return open_policy(policy_of(namespace["It"]))
 
 
-def play_one_episode(folder):
-    plan = fake_world_plan("mine=checkpointed:It", 1)
+def play_one_episode(folder, **options):
+    """Play an episode of the policy that was written, under the name *mine*, if it is missing."""
+    plan = fake_world_plan("mine=checkpointed:It", 1, **options)
     plan = plan.model_copy(update={"policies": tuple(map(open_policy, plan.policies))})
     run_plan(plan, folder, fake_world_runner(plan, folder), InProcess())
 
@@ -74,13 +77,23 @@ def play_one_episode(folder):
         ({"on_class": f"version = property(lambda self: {CHECKPOINT_VARIABLE})"}, "7"),
         ({"made": f"self.version = np.int64({CHECKPOINT_VARIABLE})"}, "7"),
         ({"reset": f"self.version = pathlib.Path('ckpts', {CHECKPOINT_VARIABLE})"}, "ckpts/7"),
-        (NUMBER_BEHIND_TEXT, "7.0"),
+        (
+            {
+                "on_class": "version = 'base'",
+                "reset": f"self.version = float({CHECKPOINT_VARIABLE})",
+            },
+            "7.0",
+        ),
     ],
 )
 def test_a_policy_may_give_its_version_as_text_number_or_path_when_made_or_reset(
     parts, version, monkeypatch
 ):
-    """Here the version is that of a checkpoint, which the environment variable CKPT names."""
+    """Here the version is that of a checkpoint, which the environment variable CKPT names.
+
+    `parts` is code of a policy's class, in its body, its `__init__` (made) and its `reset`. What
+    `reset` sets counts more than the version of the class.
+    """
     monkeypatch.setenv("CKPT", "7")
     assert policy_opened_here(**parts).version == version
 
@@ -88,27 +101,33 @@ def test_a_policy_may_give_its_version_as_text_number_or_path_when_made_or_reset
 def test_a_run_does_not_go_on_with_another_checkpoint_of_its_policy(
     write_policy_module, tmp_path, monkeypatch
 ):
-    """Would find results of two checkpoints under one name."""
-    write_policy_module(**NUMBER_BEHIND_TEXT)
+    """A policy gives the value of the variable CKPT, the name of a checkpoint, as its version.
+
+    Its run has played the one episode of its plan with 7. The same command is refused with 8, as
+    results of two checkpoints would stand under one name, and the record stays.
+    """
+    write_policy_module(made='self.version = os.environ["CKPT"]')
+    monkeypatch.setenv("CKPT", "7")
     play_one_episode(tmp_path)
 
     monkeypatch.setenv("CKPT", "8")
 
-    with pytest.raises(StoreError, match=r"mine whose policy version is 7\.0, but now it is 8\.0"):
+    with pytest.raises(StoreError, match="mine whose policy version is 7, but now it is 8"):
         play_one_episode(tmp_path)
-    assert [record.policy_version for record in read_records(tmp_path)] == ["7.0"]
+    assert [record.policy_version for record in read_records(tmp_path)] == ["7"]
 
 
 def test_a_run_does_not_go_on_with_a_policy_whose_version_cannot_be_read(
     write_policy_module, tmp_path
 ):
-    """The policy played an episode with version 7.0; now it raises an error in its reset."""
-    write_policy_module(**NUMBER_BEHIND_TEXT)
+    """A run has played an episode of a policy with version *a*. Then its code was changed: it
+    raises an error in its `reset`, after which its version would be read, so it may be any."""
+    write_policy_module(made="self.version = 'a'")
     play_one_episode(tmp_path)
 
     write_policy_module(made="self.version = 'b'", reset="raise KeyError('front')")
 
-    with pytest.raises(StoreError, match=r"7.0, but the policy cannot be opened .*KeyError"):
+    with pytest.raises(StoreError, match=r" a, but the policy cannot be opened .*KeyError"):
         play_one_episode(tmp_path)
 
 
@@ -124,14 +143,15 @@ def test_a_version_that_is_neither_text_nor_number_is_refused(part, value):
 def test_a_policy_whose_version_differs_from_process_to_process_gets_no_verdict(
     write_policy_module, tmp_path
 ):
-    """The policy takes the number of its process for its version."""
+    """The policy takes the number of its process for its version. It is read in one process before
+    the run and in another one when it plays, so the episode ends in an error."""
     write_policy_module(made="self.version = os.getpid()")
+
     play_one_episode(tmp_path)
 
     (record,) = read_records(tmp_path)
-
     assert record.outcome == "error"
-    assert "must be the same in every process" in str(record.cause)
+    assert "must be the same in every process" in record.cause
 
 
 def test_a_policy_whose_reset_raises_is_opened_with_the_error_as_its_problem():
@@ -140,7 +160,8 @@ def test_a_policy_whose_reset_raises_is_opened_with_the_error_as_its_problem():
 
 
 def test_making_a_plan_opens_each_policy_once(write_policy_module, tmp_path):
-    """With a made-up instruction, to read its version; opening may take minutes."""
+    """To read its version, a policy is opened and reset with a made-up instruction; as this may
+    take minutes, it is done once. The policy writes each instruction that it gets to a file."""
     note = tmp_path / "opened"
     write_policy_module(reset=f"open({str(note)!r}, 'a').write(instruction)")
 
@@ -156,7 +177,9 @@ def test_a_policy_whose_version_raises_is_refused_rather_than_taken_for_one_with
 
 
 def test_versions_that_differ_only_in_unprintable_characters_stay_different():
-    """They are escaped for records; would find two versions that are escaped alike."""
+    """Versions are escaped for records. The four are an *a* with a line break, with a backslash and
+    an n, with half a character (a lone surrogate), and with a question mark; would find two that
+    are escaped alike."""
     escaped = set()
     for value in (r"'a\n'", r"'a\\n'", r"'a\udc80'", "'a?'"):
         escaped.add(policy_opened_here(made=f"self.version = {value}").version)
@@ -164,7 +187,7 @@ def test_versions_that_differ_only_in_unprintable_characters_stay_different():
     assert len(escaped) == 4
 
 
-CODE_OF_POLICIES_WITHOUT_A_VERSION = """
+THREE_CLASSES_WITHOUT_A_VERSION = """
 class Other(It): pass
 class Hands(It):
     def follow(self, subgoal): pass
@@ -172,65 +195,92 @@ class Slots:
     __slots__ = ("reports",)
     def reset(self, instruction, demonstration): pass
     def plan(self, observation, step): return None
-class Planner(Slots):
-    version = property(lambda self: self.late)
-    def reset(self, instruction, demonstration): self.late = "set late"
 """
-HANDS = "hands=checkpointed:Hands"
-
-
-def test_policies_without_a_version_differ_by_class_code_and_by_planner_or_hands(
-    write_policy_module, tmp_path
-):
-    """Three policies of a user's module declare no version: theirs follows from their code.
-
-    Each is opened before and after a line was added to the module, which gives six versions.
-    """
-    write_policy_module()
-    file = tmp_path / "checkpointed.py"
-    file.write_text(file.read_text() + CODE_OF_POLICIES_WITHOUT_A_VERSION)
-    specs = ("checkpointed:It", "checkpointed:Other", f"planner:checkpointed:Slots?{HANDS}")
-
-    before = {opened(read_policy(spec)).version for spec in specs}
-    file.write_text(file.read_text() + "\n")
-    after = {opened(read_policy(spec)).version for spec in specs}
-
-    assert len(before | after) == 6
-    assert "unknown" not in "".join(before | after)
 
 
 @pytest.mark.parametrize(
-    ("hands", "end"), [("", "scripted hands"), (f"?{HANDS}", "")], ids=["scripted", "of a user"]
+    "policy",
+    [
+        "checkpointed:It",
+        "checkpointed:Other",
+        "planner:checkpointed:Slots?hands=checkpointed:Hands",
+    ],
+)
+def test_a_policy_without_a_version_gets_another_one_when_its_module_changes(
+    write_policy_module, policy
+):
+    """No class of the module `checkpointed` declares a version, so it follows from their code.
+
+    The last policy is a planner, an object without attributes of its own, with what follows its
+    subgoals, its hands. Each is opened before and after a comment is added to the module.
+    """
+    write_policy_module(other_classes=THREE_CLASSES_WITHOUT_A_VERSION)
+    before = opened(read_policy(policy)).version
+
+    write_policy_module(other_classes=THREE_CLASSES_WITHOUT_A_VERSION + "# changed")
+    after = opened(read_policy(policy)).version
+
+    assert before != after
+    assert "unknown" not in before + after
+
+
+def test_two_classes_of_a_module_without_a_version_have_different_ones(write_policy_module):
+    """The version of both follows from the same file, and from the name of the class."""
+    write_policy_module(other_classes="class Other(It): pass")
+
+    it = opened(read_policy("checkpointed:It")).version
+    other = opened(read_policy("checkpointed:Other")).version
+
+    assert it != other
+
+
+@pytest.mark.parametrize(
+    ("policy", "version"),
+    [
+        ("planner:checkpointed:Planner", "set late + scripted hands"),
+        ("planner:checkpointed:Planner?hands=checkpointed:Hands", "set late + hands-2"),
+    ],
 )
 def test_a_hierarchical_policy_has_the_versions_of_planner_and_hands(
-    write_policy_module, tmp_path, hands, end
+    write_policy_module, policy, version
 ):
-    """The planner's is set in its reset."""
-    write_policy_module()
-    file = tmp_path / "checkpointed.py"
-    file.write_text(file.read_text() + CODE_OF_POLICIES_WITHOUT_A_VERSION)
+    """A planner names subgoals, and its hands act on them: those of a user, or scripted ones of the
+    benchmark. The planner here sets its version in its `reset` alone."""
+    write_policy_module(
+        other_classes="""
+class Planner:
+    def reset(self, instruction, demonstration): self.version = "set late"
+    def plan(self, observation, step): return None
+class Hands(It):
+    version = "hands-2"
+    def follow(self, subgoal): pass
+"""
+    )
 
-    version = open_policy(read_policy(f"planner:checkpointed:Planner{hands}")).version
-
-    assert version.startswith("set late + ")
-    assert version.endswith(end)
+    assert open_policy(read_policy(policy)).version == version
 
 
 def test_a_policy_whose_version_cannot_be_read_cannot_go_on_in_its_run(
     write_policy_module, tmp_path
 ):
-    """Two unreadable versions may be of two checkpoints."""
-    write_policy_module(reset="assert 'red cube on the target' not in instruction")
-    plan = fake_world_plan("mine=checkpointed:It", 1, policy_process="shared")
-    plan = plan.model_copy(update={"policies": tuple(map(opened, plan.policies))})
-    run_plan(plan, tmp_path, fake_world_runner(plan, tmp_path), InProcess())
+    """To read its version, a policy is opened with a made-up instruction, on which this one fails.
+
+    It plays an episode all the same, with the version *unknown*. The same command is refused then,
+    as two unknown versions may be of two checkpoints.
+    """
+    write_policy_module(reset="assert instruction != 'Put the red cube on the target.'")
+    play_one_episode(tmp_path, policy_process="shared")
 
     with pytest.raises(StoreError, match="cannot be opened to read its version"):
-        run_plan(plan, tmp_path, fake_world_runner(plan, tmp_path), InProcess())
+        play_one_episode(tmp_path, policy_process="shared")
 
 
 def test_a_run_whose_policy_could_not_be_opened_goes_on_once_it_can(write_policy_module, tmp_path):
-    """Its errors are of an unknown version, which is not another one."""
+    """A policy lacks its weights at first, so that its episode ends in an error.
+
+    Then it has them, and the same command plays the episode again. The error is of an unknown
+    version, which is not another one.
+    """
     write_policy_module(reset="raise OSError('no weights')")
     play_one_episode(tmp_path)
     write_policy_module()
@@ -244,7 +294,9 @@ def test_a_run_whose_policy_could_not_be_opened_goes_on_once_it_can(write_policy
 
 @pytest.mark.parametrize("checkpoint", ["7", "8"])
 def test_the_version_of_a_class_in_this_process_is_read_when_it_is_opened(monkeypatch, checkpoint):
-    """Would find the version of a checkpoint that was loaded for an earlier run."""
+    """An object of the class takes the value of CKPT, the name of a checkpoint, as its version. It
+    is set after the policy was made of the class; would find the version of a checkpoint that was
+    loaded for an earlier run."""
 
     class Batched:
         def __init__(self):
@@ -270,7 +322,9 @@ def class_of_a_notebook_cell(code, number):
 
 
 def test_a_policy_class_of_a_notebook_is_another_after_its_cell_was_changed():
-    """And the first one again if the change is undone: the version follows from the code."""
+    """A class without a version gets one from its code (a fingerprint). In a notebook that is the
+    code of a cell: it is executed, changed and executed, and changed back, which gives the first
+    fingerprint again."""
     code = "class It:\n    def act(self): return 1\n"
     changed = "class It:\n    def act(self): return 2\n"
 

@@ -72,17 +72,22 @@ def test_a_salt_draws_the_same_episodes_again_after_another_was_used():
 
 
 def test_a_private_split_has_as_many_episodes_as_the_random_one():
+    """A salt makes a private split of its own, a drawn one as *random* is."""
     assert split_size(use_salt(SALT)) == split_size("random")
 
 
 def test_the_name_and_episodes_of_a_salt_never_change():
-    """Stored values: whoever has a salt can verify a run that was made with it before."""
+    """A salt is a secret text from which the name and the seeds of a private split follow. These
+    are stored values of this one: whoever has a salt can verify a run that was made with it before.
+    """
     assert use_salt("pinned-salt-0123") == "random@9be1761e24b2"
     seeds = seeds_of(2, "PickXtimes", "random@9be1761e24b2")
     assert seeds == [343211101013922, 319322239144157]
 
 
 def test_private_episodes_repeat_the_difficulties_and_their_scenes_follow_from_their_seeds():
+    """Episodes have four difficulties in turn, as in public splits (CYCLE). Each of eight episodes
+    has the scene and the goal that are made anew from its seed and difficulty."""
     split = use_salt(SALT)
     episodes = [get_episode("BinFill", split, index) for index in range(8)]
 
@@ -93,7 +98,9 @@ def test_private_episodes_repeat_the_difficulties_and_their_scenes_follow_from_t
 
 
 def test_a_private_episode_takes_the_first_seed_for_which_a_scene_can_be_made():
-    """All seeds before it are rejected: of 30 episodes of this task some need a second try."""
+    """A private episode has a sequence of seeds, of which `private_seed` gives one for each try.
+    For all before the one that it has, its scene is rejected: there is no room for all things. Of
+    30 episodes of this task some need a second try, so that something is tested."""
     split = use_salt(SALT)
     task = "VideoPlaceOrder"
     rejected_seeds = 0
@@ -112,7 +119,9 @@ def test_a_private_episode_takes_the_first_seed_for_which_a_scene_can_be_made():
 
 @pytest.mark.parametrize("salt", ["", OTHER])
 def test_a_private_split_is_refused_without_its_salt_or_with_another(monkeypatch, salt):
-    """So are its episodes and a plan of them; the messages name the variable and the split."""
+    """A private split is made from one salt, SALT. Then none is set, or OTHER: neither an episode
+    nor a plan of the split can be made. The messages name the variable for the salt and the split.
+    """
     split = use_salt(SALT)
 
     monkeypatch.setenv(SALT_VARIABLE, salt)
@@ -124,6 +133,7 @@ def test_a_private_split_is_refused_without_its_salt_or_with_another(monkeypatch
 
 
 def test_a_short_salt_is_refused_without_being_printed():
+    """A salt of five letters could be guessed; it needs 12. It is not kept either."""
     with pytest.raises(InvalidValueError, match="at least 12") as caught:
         use_salt("short")
 
@@ -132,6 +142,8 @@ def test_a_short_salt_is_refused_without_being_printed():
 
 
 def test_a_known_salt_makes_the_random_split_private_and_no_other():
+    """Without a salt the split *random* is public. Once it is set, that name means its private
+    split; *test* stays what it is."""
     assert drawn_split("random") == "random"
 
     split = use_salt(SALT)
@@ -141,7 +153,10 @@ def test_a_known_salt_makes_the_random_split_private_and_no_other():
 
 
 def test_a_private_split_is_not_played_by_policies_that_share_the_worlds_process():
+    """In the process of the simulator a policy could read the salt. The message says that policies
+    must have processes of their own."""
     split = use_salt(SALT)
+
     with pytest.raises(InvalidValueError, match="own"):
         make_plan(["oracle"], split=split, episodes="1", policy_process="shared")
 
@@ -172,6 +187,12 @@ def private_run(tmp_path, monkeypatch):
 def test_results_of_a_private_split_are_shown_merged_and_packed_without_its_salt(
     private_run, tmp_path
 ):
+    """The fixture has a run of private episodes, made with SALT, which is set no longer.
+
+    All that needs no scene works: to merge and pack the run, its tables and its page. The page says
+    that the episodes are private, as it cannot draw them. No file that was written, or is packed in
+    one, has the salt in it.
+    """
     run, plan = private_run
 
     merge_runs([run], tmp_path / "merged")
@@ -187,46 +208,64 @@ def test_results_of_a_private_split_are_shown_merged_and_packed_without_its_salt
 def test_the_page_of_a_private_split_says_nothing_of_it_if_the_salt_is_known(
     private_run, monkeypatch
 ):
-    run, _ = private_run
+    """The fixture has a run of private episodes, and the salt with which they were made is set."""
+    run, _plan = private_run
     monkeypatch.setenv(SALT_VARIABLE, SALT)
 
     assert "are private" not in write_report(Source(run)).read_text()
 
 
 def test_verifying_a_run_of_a_private_split_needs_its_salt(private_run):
-    run, _ = private_run
+    """The fixture has a run of private episodes. The salt is set no longer, so none can be made."""
+    run, _plan = private_run
+
     with pytest.raises(MissingSaltError):
         call("leaderboard", "verify", run)
 
 
 def test_showing_a_private_episode_needs_its_salt(private_run):
-    _, plan = private_run
+    """The fixture has a plan of private episodes. The salt is set no longer, so none is made."""
+    _run, plan = private_run
+
     with pytest.raises(MissingSaltError):
         call("show", "PickXtimes", 0, "--split", plan.split)
 
 
 def test_a_command_neither_prints_nor_writes_the_salt(tmp_path, monkeypatch):
+    """The salt is set as a variable; the command plans an episode of its private split."""
     monkeypatch.setenv(SALT_VARIABLE, SALT)
     options = ["--policy", "random", "--split", "random", "--episodes", "1", "--dry-run"]
 
-    assert SALT not in call("run", "--out", tmp_path / "run", *options)
+    printed = call("run", "--out", tmp_path / "run", *options)
+
+    assert SALT not in printed
     assert SALT.encode() not in all_bytes_written_in(tmp_path)
 
 
-@pytest.mark.slow
-def test_workers_of_a_cluster_get_the_salt_and_write_it_into_no_log(tmp_path):
-    """The cluster was started without it."""
+@pytest.fixture
+def logs_of_a_cluster():
+    """A cluster of this machine was started; the folder with the logs of its processes."""
     ray = pytest.importorskip("ray")
     with tempfile.TemporaryDirectory(prefix="ray-") as logs:  # short: sockets are in it
         ray.init(num_cpus=1, log_to_driver=False, include_dashboard=False, _temp_dir=logs)
-        split = use_salt(SALT)
-        plan = make_plan(["oracle"], tasks="PickXtimes", split=split, episodes="1")
-        try:
-            run_plan(plan, tmp_path, FakePlay(), RayCluster(1))
-        finally:
-            ray.shutdown()
-        log = all_bytes_written_in(Path(logs))
+        yield Path(logs)
+        ray.shutdown()
 
+
+@pytest.mark.slow
+def test_workers_of_a_cluster_get_the_salt_and_write_it_into_no_log(logs_of_a_cluster, tmp_path):
+    """A salt is a secret text, SALT here, without which nobody can make the episodes of its split.
+
+    The cluster was started before the salt was set, so its workers get it from the run; otherwise
+    they could not play an episode. Their logs are there, with the name of one of Ray's programs,
+    the raylet, in them, but without the salt.
+    """
+    split = use_salt(SALT)
+    plan = make_plan(["oracle"], tasks="PickXtimes", split=split, episodes="1")
+
+    run_plan(plan, tmp_path, FakePlay(), RayCluster(1))
+
+    logs = all_bytes_written_in(logs_of_a_cluster)
     assert {record.split for record in read_records(tmp_path)} == {split}
-    assert b"raylet" in log
-    assert SALT.encode() not in log
+    assert b"raylet" in logs
+    assert SALT.encode() not in logs

@@ -38,28 +38,53 @@ LONG_INSTRUCTION = {"setting": "contextual", "distractors": 16}
 
 
 def job_with(**fields):
+    """Return a job: PickXtimes test/0 in *direct* by the policy `random`, with other fields."""
     usual = {"policy": "random", "task": "PickXtimes", "split": "test", "episode": 0}
     return job_of(**{**usual, "setting": "direct", **fields})
 
 
+def audited_record(tokens, heard_steps=(), **fields):
+    """Return the record of an episode of a policy whose model reads so many tokens of a prompt.
+
+    Args:
+        tokens: limit of the model.
+        heard_steps: control steps at which utterances were heard, if they are told in turns.
+        fields: of the job.
+    """
+    prepared = PreparedJob(job_with(**fields))
+    heard = utterances_at(prepared, heard_steps)
+    record = make_record(prepared.job, "failure", "because", instruction=heard)
+    audit_record(record, prepared, LIMIT_OF_64_TOKENS._replace(tokens=tokens))
+    return record
+
+
 def test_every_model_of_the_paper_reads_all_instructions_of_the_papers_plan_to_the_end():
-    """A model reads so many tokens of a prompt; the rest is cut."""
-    options = {**read_plan_file("paper"), "policy_seeds": "0", "episodes": "0,29"}
-    options.pop("policies", None)
-    plan = make_plan(ALL_SYSTEMS_OF_THE_PAPER, **options)
+    """A model reads so many tokens of a prompt, at least 64 for those of the paper's systems; the
+    rest is cut. Of the plan named *paper*, which has all tasks and settings, two of the 50 episodes
+    of each are counted. In no setting a prompt is cut, so there is no warning either."""
+    plan = make_plan(
+        ALL_SYSTEMS_OF_THE_PAPER,
+        **{**read_plan_file("paper"), "policy_seeds": "0", "episodes": "0,29"},
+    )
 
     shares = prompt_shares(plan.jobs())
 
     assert [share.policy for share in shares] == ALL_SYSTEMS_OF_THE_PAPER
     for share in shares:
         assert share.limit.tokens >= 64
-        assert set(share.settings) == {"explicit", "direct", "reasoning", "contextual", "spatial"}
-        assert {share_text(verdicts) for verdicts in share.settings.values()} == {"0 %"}
+        cut = {setting: share_text(verdicts) for setting, verdicts in share.settings.items()}
+        assert cut == dict.fromkeys(
+            ("explicit", "direct", "reasoning", "contextual", "spatial"), "0 %"
+        )
     assert not list(warning_lines(shares))
 
 
 def test_shares_of_cut_prompts_are_by_policy_and_setting():
-    """16 distractors make contextual ones too long for a's 64 tokens, but not for b's 1,000."""
+    """The policy a reads 64 tokens of a prompt, b reads 1,000, and `random` tells no limit.
+
+    16 distractors, which are sentences without use, make instructions in the setting *contextual*
+    too long for a, but not for b. Explicit ones get none.
+    """
     plan = make_plan(
         ["a=system:pi0.5", "b=openpi://localhost:1?prompt_tokens=1000", "random"],
         settings="explicit,contextual", tasks="PickXtimes", distractors=16,
@@ -96,9 +121,12 @@ def test_a_warning_names_the_settings_whose_instructions_are_not_read_to_the_end
 
 
 def test_each_episode_is_counted_by_its_own_words_and_its_policys_limit():
-    """The counts are made fast, for groups; here they are compared with one by one.
+    """Three policies read 40, 60 and 80 tokens of a prompt. To be fast, the verdict about a prompt,
+    whether it is cut, is kept for all jobs with the same words and limit.
 
-    Would find a group whose members differ in task, form, delivery, arm or limit.
+    Here each job is judged alone, and the counts must be the same. The plan has jobs that differ in
+    nothing but their task, setting, form, episode, arm, or in whether the utterances of an
+    instruction come in turns. Would find two of them that share a verdict by mistake.
     """
     plan = make_plan(
         [f"p{tokens}=openpi://localhost:1?prompt_tokens={tokens}" for tokens in (40, 60, 80)],
@@ -108,12 +136,13 @@ def test_each_episode_is_counted_by_its_own_words_and_its_policys_limit():
 
     shares = prompt_shares(plan.jobs())
 
-    one_by_one = {share.policy: {} for share in shares}
-    limits = {share.policy: share.limit for share in shares}
-    for job in plan.jobs():
-        _, verdict = audit_job(job, limits[job.policy])
-        one_by_one[job.policy].setdefault(job.setting, Counter())[verdict] += 1
-    assert one_by_one == {share.policy: share.settings for share in shares}
+    assert [share.limit.tokens for share in shares] == [40, 60, 80]
+    for share in shares:
+        counts = {"explicit": Counter(), "contextual": Counter()}
+        for job in plan.jobs():
+            if job.policy == share.policy:
+                counts[job.setting][audit_job(job, share.limit).verdict] += 1
+        assert share.settings == counts
 
 
 @pytest.mark.parametrize(
@@ -143,87 +172,97 @@ def test_utterances_of_the_same_step_are_sent_as_one_message(utterances, steps, 
 
 
 def test_an_instruction_too_long_as_one_prompt_fits_if_it_comes_in_turns():
-    """The model reads 64 tokens; the instruction has more, but each of its messages has fewer.
+    """The model reads 64 tokens. The instruction has more, as 16 sentences without use are in it
+    (distractors), but each of its utterances has fewer.
 
     *cut* is a prompt of which the model loses the end, *heard* one that it reads whole.
     """
-    _, at_once = audit_job(job_with(**LONG_INSTRUCTION), LIMIT_OF_64_TOKENS)
-    audit, in_turns = audit_job(job_with(**LONG_INSTRUCTION, delivery="turns"), LIMIT_OF_64_TOKENS)
+    long = job_with(setting="contextual", distractors=16)
+    long_in_turns = job_with(setting="contextual", distractors=16, delivery="turns")
 
-    assert (at_once, in_turns) == ("cut", "heard")
-    assert audit.needed[1] < 64
-
-
-@pytest.fixture
-def record_of_cut_prompt():
-    """The record of an episode whose instruction is longer than 64 tokens."""
-    record = make_record(job_with(**LONG_INSTRUCTION), "failure", "because")
-    audit_record(record, PreparedJob(job_with(**LONG_INSTRUCTION)), LIMIT_OF_64_TOKENS)
-    return record
+    assert audit_job(long, LIMIT_OF_64_TOKENS).verdict == "cut"
+    assert audit_job(long_in_turns, LIMIT_OF_64_TOKENS).verdict == "heard"
+    assert max(audit_job(long_in_turns, LIMIT_OF_64_TOKENS).audit.needed) < 64
 
 
-def test_a_record_notes_how_many_tokens_a_cut_prompt_needed(record_of_cut_prompt):
-    """The model reads 64 tokens; its tokenizer is known, so least and most needed are equal."""
-    audit = record_of_cut_prompt.prompt
+def test_a_record_notes_how_many_tokens_a_cut_prompt_needed():
+    """The model reads 64 tokens; 16 sentences without use (distractors) make the prompt longer.
 
-    assert record_of_cut_prompt.prompt_verdict == "cut"
-    assert audit.needed[0] == audit.needed[1] > 64
-    assert audit.tokenizer == "some.model"
-    assert read_record(encode(record_of_cut_prompt), Path(), 1) == record_of_cut_prompt
+    Its tokenizer is known, so the least and the most that may be needed are equal. The record is
+    the same after it was written and read.
+    """
+    record = audited_record(tokens=64, setting="contextual", distractors=16)
+
+    least, most = record.prompt.needed
+    assert (record.prompt_verdict, record.prompt.tokenizer) == ("cut", "some.model")
+    assert least == most > 64
+    assert read_record(encode(record), Path("records.jsonl"), 1) == record
 
 
-def test_a_record_notes_how_far_each_utterance_of_a_cut_prompt_was_read(record_of_cut_prompt):
-    """In characters: all of the first utterance, and none of the last."""
-    first, *_, last = record_of_cut_prompt.prompt.reached
+def test_a_record_notes_how_far_each_utterance_of_a_cut_prompt_was_read():
+    """The model reads 64 tokens; 16 sentences without use (distractors) make the prompt longer.
 
-    assert first == len(record_of_cut_prompt.instruction[0].text)
+    In characters: all of the first utterance, and none of the last.
+    """
+    record = audited_record(tokens=64, setting="contextual", distractors=16)
+
+    first, *_, last = record.prompt.reached
+    assert first == len(record.instruction[0].text)
     assert last == 0
 
 
-def test_a_record_notes_the_mentions_in_what_was_not_read(record_of_cut_prompt):
-    """The last mention is in the command, which stands at the end of the instruction."""
-    last = len(record_of_cut_prompt.mentions) - 1
+def test_a_record_notes_the_mentions_in_what_was_not_read():
+    """The model reads 64 tokens; 16 sentences without use (distractors) make the prompt longer.
 
-    assert record_of_cut_prompt.mentions[last].utterance == (
-        len(record_of_cut_prompt.instruction) - 1
-    )
-    assert last in record_of_cut_prompt.prompt.lost
+    Of three mentions, words that stand for a part of the goal, the first is in the first utterance,
+    which is read. Those with the indices 1 and 2 are in the command at the end, which is lost.
+    """
+    record = audited_record(tokens=64, setting="contextual", distractors=16)
+
+    last_utterance = len(record.instruction) - 1
+    assert [mention.utterance for mention in record.mentions] == [0, last_utterance, last_utterance]
+    assert record.prompt.lost == (1, 2)
 
 
 def test_episodes_are_the_same_although_their_prompts_were_cut_differently():
+    """What a model reads is no part of what tells one episode from another."""
     assert not {"prompt", "prompt_verdict"} & set(IDENTITY)
 
 
 def test_a_record_of_a_policy_without_a_declared_limit_is_unknown_not_heard():
+    """The policy `random` does not say how many tokens it reads, so a prompt may have been cut."""
     record = make_record(job_with(), "success")
+
     assert (record.prompt, record.prompt_verdict) == (None, "unknown")
 
 
 def test_utterances_that_were_never_sent_count_neither_as_read_nor_as_lost():
-    """The episode ended after the first of several turns. The limit is 3 tokens."""
-    job = job_with(setting="contextual", delivery="turns")
-    prepared = PreparedJob(job)
-    heard = utterances_at(prepared, heard_steps=[0])
-    record = make_record(job, "failure", "because", instruction=heard)
+    """The episode ended after the first of five utterances, heard at step 0; others come in turns.
 
-    audit_record(record, prepared, LIMIT_OF_64_TOKENS._replace(tokens=3))
+    The model reads 3 tokens, so it loses "green" at the end of that utterance, which is the mention
+    with the index 0. Two other mentions are in the command, which was never sent.
+    """
+    record = audited_record(tokens=3, heard_steps=[0], setting="contextual", delivery="turns")
 
-    assert len(record.prompt.reached) == 1 < len(record.instruction)
-    assert {record.mentions[index].utterance for index in record.prompt.lost} <= {0}
+    assert [mention.utterance for mention in record.mentions] == [0, 4, 4]
+    assert len(record.prompt.reached) == 1
+    assert record.prompt.lost == (0,)
 
 
 def test_all_utterances_count_in_an_episode_of_which_no_steps_are_known():
-    job = job_with(setting="contextual", delivery="turns")
-    prepared = PreparedJob(job)
-    heard = utterances_at(prepared, heard_steps=[])
-    record = make_record(job, "failure", "because", instruction=heard)
+    """Utterances come in turns, but the record does not say when any of them was heard.
 
-    audit_record(record, prepared, LIMIT_OF_64_TOKENS)
+    Then all count as sent. The model reads 64 tokens of each, which is enough: it reads as many
+    characters of each (`reached`) as it has.
+    """
+    record = audited_record(tokens=64, heard_steps=[], setting="contextual", delivery="turns")
 
-    assert len(record.prompt.reached) == len(record.instruction)
+    assert [utterance.step for utterance in record.instruction] == [None] * 5
+    assert record.prompt.reached == tuple(len(said.text) for said in record.instruction)
 
 
 SERVER_WITH_64_TOKENS = read_policy("openpi://localhost:1?prompt_tokens=64&connect=1")
+"""Nobody listens there."""
 """Nobody listens there."""
 
 
@@ -245,7 +284,9 @@ def test_long_prompts_refuse_ends_an_episode_before_it_costs_anything(tmp_path):
 
 
 def test_long_prompts_refuse_lets_an_instruction_begin_that_is_short_enough_in_turns(tmp_path):
-    """It gets as far as the server, to which it cannot connect."""
+    """The instruction has more than the 64 tokens that the model reads of a message, but it comes
+    in turns, and each utterance has fewer. The episode gets as far as to ask the server that has
+    the model: nobody listens there, so its error is not of the prompt, but of the connection."""
     job = job_with(**LONG_INSTRUCTION, ref=SERVER_WITH_64_TOKENS, delivery="turns")
 
     record = EpisodeRunner(tmp_path, refuse_long=True)(job)
@@ -255,6 +296,7 @@ def test_long_prompts_refuse_lets_an_instruction_begin_that_is_short_enough_in_t
 
 @pytest.mark.parametrize("verdict", ["heard", "unknown"])
 def test_a_prompt_that_may_or_may_not_be_cut_is_not_refused(verdict, monkeypatch):
+    """The audit of a prompt is replaced by one with this verdict; no error is raised."""
     job = job_with()
     audited = audit_job(job, LIMIT_OF_64_TOKENS)._replace(verdict=verdict)
     monkeypatch.setattr("roboirg.runs.play.prompt_shares.audit_job", lambda *_: audited)
@@ -268,7 +310,8 @@ def test_long_prompts_are_sent_or_refused_and_nothing_else():
 
 
 def test_of_a_tokenizer_that_is_a_pipe_the_policy_and_the_file_are_named(tmp_path):
-    """To open it would wait for ever."""
+    """The policy *mine* names a file with the tokenizer of its model. It is a pipe that nobody
+    writes to, so to open it would wait for ever."""
     os.mkfifo(tmp_path / "pipe.model")
     policy = f"mine=openpi://localhost:1?prompt_tokens=64&tokenizer={tmp_path}/pipe.model"
     jobs = make_plan([policy], tasks="PickXtimes", episodes="0,").jobs()
@@ -278,7 +321,9 @@ def test_of_a_tokenizer_that_is_a_pipe_the_policy_and_the_file_are_named(tmp_pat
 
 
 def test_a_dry_run_prints_the_share_of_cut_prompts_and_the_policies_without_a_limit(tmp_path):
-    """The one policy reads 64 tokens and all of its prompts are cut; the other tells no limit."""
+    """The model of *system:pi0.5* reads 64 tokens; 16 distractors, sentences without use, make all
+    of its prompts longer. The policy *far* does not say how many it reads. A dry run plays nothing.
+    """
     printed = call(
         "run", "--dry-run", "--out", tmp_path, "--tasks", "PickXtimes",
         "--policy", "system:pi0.5", "--policy", "far=openpi://localhost:1",

@@ -1,5 +1,6 @@
 """A policy behind a rewriter, played by a run: each part where it belongs."""
 
+import functools
 import os
 from pathlib import Path
 
@@ -16,8 +17,6 @@ from roboirg.runs.hosting.policy_opening import open_policy
 from roboirg.runs.play.rollout import EpisodeRunner
 from roboirg.tasks.splits.splits import get_episode
 
-SPEC = "resolve:listener?policy=test_resolving_run:KeepsWords"
-
 
 class KeepsWords:
     """Holds still, and reports where it is and what it has heard."""
@@ -33,33 +32,59 @@ class KeepsWords:
         return np.append(observation["joint_positions"], 1.0)
 
 
-@pytest.mark.sim
-def test_a_users_policy_behind_a_rewriter_has_a_process_of_its_own_and_hears_the_explicit_command():
-    """The job asks in the setting *direct*, but a rewriter states the explicit command instead.
-
-    The user's policy notes in its metadata what it heard and in which process. The version is
-    *built-in* for the rewriter and *v7* for the policy; only a rewriter that knows the declared
-    meaning makes the pair privileged.
-    """
+@functools.cache
+def record_of(policy):
+    """Play five steps of PickXtimes test/0, told in the setting *direct*; return the record."""
     job = Job(
-        policy=SPEC,
-        ref=open_policy(read_policy(SPEC)),
+        policy=policy,
+        ref=open_policy(read_policy(policy)),
         task="PickXtimes",
         split="test",
         episode=0,
         environment=EnvironmentOptions(max_steps=5),
         options=InstructionOptions("direct"),
     )
-
     with HostPool(HostSettings()) as pool, pool.connect() as line:
-        record = EpisodeRunner(Path(), hosts=line).play_once(job).record
+        return EpisodeRunner(Path(), hosts=line).play_once(job).record
 
+
+@pytest.mark.sim
+def test_a_users_policy_behind_a_rewriter_hears_the_explicit_command_in_a_process_of_its_own():
+    """The episode, PickXtimes test/0, is told in the setting *direct*, which leaves much unsaid.
+
+    A rewriter (`resolve:`) replaces its instruction with the explicit command for the same episode,
+    and counts this. `KeepsWords` stands for the policy of a user behind it: it holds still for all
+    five steps, so it fails, and reports as its metadata what it has heard and the id of its
+    process, which must not be the one of this test.
+    """
+    record = record_of("resolve:listener?policy=test_resolving_run:KeepsWords")
+
+    explicit_command = instruct(get_episode("PickXtimes", "test", 0), "explicit").text
+    reported = record.policy_metadata["policy"]
     assert record.outcome == "failure", record.details
-    explicit = instruct(get_episode("PickXtimes", "test", 0)).text
-    assert record.policy_metadata["policy"]["heard"] == explicit
-    assert record.policy_metadata["policy"]["process"] != os.getpid()
     assert record.usage["resolved"] == 1.0
-    # Known before the run, and the same in the record.
-    assert job.ref.version == record.policy_version == "built-in → v7"
-    assert job.ref.is_privileged, "its namer knows the declared meaning"
-    assert not read_policy(SPEC.replace("listener", "surface")).is_privileged
+    assert reported["heard"] == explicit_command
+    assert reported["process"] != os.getpid()
+
+
+@pytest.mark.sim
+def test_a_policy_behind_a_rewriter_has_both_their_versions_in_the_plan_and_in_the_record():
+    """The rewriter `listener` comes with the benchmark; `KeepsWords` declares the version *v7*.
+
+    A plan opens the policy before it is played, to read its version; the record has the same.
+    """
+    policy = "resolve:listener?policy=test_resolving_run:KeepsWords"
+
+    assert open_policy(read_policy(policy)).version == "built-in → v7"
+    assert record_of(policy).policy_version == "built-in → v7"
+
+
+@pytest.mark.parametrize(("rewriter", "is_privileged"), [("listener", True), ("surface", False)])
+def test_a_policy_behind_a_rewriter_is_privileged_if_the_rewriter_knows_the_declared_meaning(
+    rewriter, is_privileged
+):
+    """`listener` is given the meaning that the benchmark declares for the words; `surface` reads
+    the words alone. The policy behind them, `KeepsWords`, knows nothing but what it hears."""
+    policy = read_policy(f"resolve:{rewriter}?policy=test_resolving_run:KeepsWords")
+
+    assert policy.is_privileged == is_privileged

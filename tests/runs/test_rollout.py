@@ -61,21 +61,24 @@ class FakeWorld:
         return self
 
     def set_frame_hook(self, hook, every=1):
-        del every
         self.hook = hook
 
     def picture(self, camera):
         return np.full((256, 256, 3), 40 * self.steps + len(camera), np.uint8)
 
     def reset(self, seed=None):
-        del seed
         if self.hook:
             self.hook(self, True)
         first = {"step": 3, "kind": "still", "subject": "robot", "place": None, "holds": True}
         shown = {"joint_positions": np.zeros((3, 7))}
-        info = {"demonstration": shown, "elapsed_steps": 4, "events": [first]}
-        now = {"status": "ongoing", "heard": []}
-        return {}, {**info, **now, "demonstration_source": "planned"}
+        return {}, {
+            "demonstration": shown,
+            "demonstration_source": "planned",
+            "elapsed_steps": 4,
+            "events": [first],
+            "status": "ongoing",
+            "heard": self.heard_until(0),
+        }
 
     def step_chunk(self, actions):
         assert actions.shape[1:] == (8,)
@@ -93,11 +96,15 @@ class FakeWorld:
             "cause": self.cause if over else None,
             "steps": self.steps,
             "events": [{**event, "holds": True}] if over else [],
-            "heard": [],
+            "heard": self.heard_until(self.steps),
         }
         return {}, 0.0, over and self.status != "timeout", over and self.status == "timeout", info
 
     attempts = ()
+
+    def heard_until(self, step):
+        """Return the utterances that were told since the last call, none in this world."""
+        return []
 
     def end_state(self):
         return np.zeros(3), "paper"
@@ -117,7 +124,6 @@ class FakePolicy:
         self.heard += [instruction, len(demonstration["joint_positions"])]
 
     def act(self, observation):
-        del observation
         if isinstance(self.answer, BaseException):
             raise self.answer
         return self.answer
@@ -163,7 +169,8 @@ def test_an_episode_ends_within_a_chunk_of_actions(record_of_episode):
 
 
 def test_a_policys_reset_gets_the_instruction_and_the_video(record_of_episode):
-    """The video of the fake world has 3 frames."""
+    """The policy notes what its reset gets: the instruction, and how many frames the video before
+    its turn has, which are 3 in the fake world. The record has their number, too."""
     policy = FakePolicy()
 
     record = record_of_episode(FakeWorld(), policy)
@@ -180,6 +187,8 @@ def test_events_before_the_policys_first_action_have_negative_steps(record_of_ep
 
 
 def test_a_plan_may_prescribe_the_frames_of_the_video(record_of_episode):
+    """The plan asks for four frames of the video before the policy's turn. The record has this
+    among the needs of the policy, with its cameras, of which it wants none."""
     job = replace(JOB, environment=EnvironmentOptions(demonstration_frames=4))
 
     needs = record_of_episode(FakeWorld(), FakePolicy(), job).needs
@@ -202,9 +211,15 @@ def test_a_policy_that_wants_other_actions_than_the_plan_prescribes_is_an_error(
 def test_only_a_policy_that_is_declared_privileged_gets_the_world(
     record_of_episode, spec, attached
 ):
-    """`oracle` is declared, `random` is not. Before reset with words and a video of 3 steps."""
+    """Of the policies of the benchmark `oracle` is declared as privileged, `random` is not.
+
+    The policy that plays under that name notes the type of the world that it is given, if any, and
+    after it what its reset gets: the instruction and a video, of which it notes the 3 frames.
+    """
     policy = PolicyWithAttach()
+
     record_of_episode(FakeWorld(), policy, replace(JOB, policy=spec, ref=read_policy(spec)))
+
     assert policy.heard == [*attached, instruct_job(JOB).text, 3]
 
 
@@ -218,7 +233,10 @@ def test_only_a_policy_that_is_declared_privileged_gets_the_world(
 def test_the_outcome_and_its_cause_are_those_of_the_world(
     record_of_episode, status, given, outcome, cause
 ):
+    """An episode may end as a failure with a cause that the world gives, or when its time is over,
+    which is a failure, too: 1,300 steps are the usual limit."""
     record = record_of_episode(FakeWorld(3, status, given), FakePolicy())
+
     assert (record.outcome, record.cause) == (outcome, cause)
 
 
@@ -237,7 +255,9 @@ def test_the_outcome_and_its_cause_are_those_of_the_world(
 def test_a_policy_that_raises_or_answers_nonsense_ends_its_episode_as_an_error_not_a_failure(
     record_of_episode, answer, cause
 ):
-    """An error counts in no rate. Its cause has no address of memory, which differs each time."""
+    """The policy raises `answer`, if that is an exception, or answers with it instead of numbers
+    for its joints. An error counts in no rate. Its cause has no address of memory, which differs
+    each time."""
     world = FakeWorld()
 
     record = record_of_episode(world, FakePolicy(answer))
@@ -260,7 +280,10 @@ def test_a_policy_that_raises_or_answers_nonsense_ends_its_episode_as_an_error_n
     ids=str,
 )
 def test_metadata_of_a_policy_are_stored_as_json(record_of_episode, value, stored):
-    """Large arrays by their shape alone."""
+    """`value` is a part of what a policy says of itself, `stored` the same as a record has it.
+
+    Large arrays are stored by their shape alone.
+    """
     policy = FakePolicy()
     policy.metadata = {"deep": {"value": value}}
 
@@ -282,7 +305,8 @@ def test_metadata_of_a_policy_are_stored_as_json(record_of_episode, value, store
 def test_metadata_that_json_cannot_hold_are_an_error_that_names_their_key(
     record_of_episode, value, sentence
 ):
-    """The value stands two levels deep in what the policy says of itself."""
+    """The value stands in what the policy says of itself, its metadata, under the keys *deep* and
+    *value*: no number, bytes, and a key that is no text."""
     policy = FakePolicy()
     policy.metadata = {"deep": {"value": value}}
 
@@ -302,7 +326,8 @@ def test_metadata_that_json_cannot_hold_are_an_error_that_names_their_key(
 def test_an_exception_in_the_world_ends_the_episode_as_an_error_of_the_environment(
     record_of_episode, trouble, cause
 ):
-    """The world raises `trouble`; the cause names it, with this file and the line."""
+    """The world raises `trouble` when it should act. The cause names it in one line, with this file
+    and the line where it was raised; actions that are not valid have a kind of their own."""
     world = FakeWorld()
     world.trouble = trouble
 
@@ -314,11 +339,13 @@ def test_an_exception_in_the_world_ends_the_episode_as_an_error_of_the_environme
 
 @pytest.mark.parametrize("error", [RenderDeviceError("no"), MissingDependencyError("no")])
 def test_missing_graphics_or_packages_stop_the_run_instead_of_one_episode(record_of_episode, error):
+    """Every other episode would lack them, too, so the error is not written into a record."""
     with pytest.raises(type(error)):
         record_of_episode(FakeWorld(), FakePolicy(error))
 
 
 def test_ctrl_c_in_a_policy_stops_the_run_and_is_no_error_of_the_episode(record_of_episode):
+    """While the policy acts, Ctrl-C raises this in the process of the run."""
     with pytest.raises(KeyboardInterrupt):
         record_of_episode(FakeWorld(), FakePolicy(KeyboardInterrupt()))
 
@@ -381,6 +408,7 @@ def test_a_full_disk_costs_the_video_but_not_the_verdict(
 
 
 def test_a_record_has_the_reasoning_pattern_of_its_words_and_the_values_drawn_for_it():
+    """In the setting *reasoning* the goal must be inferred, in one of some ways (patterns)."""
     record = make_record(JOB.with_options(setting="reasoning"), "success")
 
     assert record.metadata["pattern"]
@@ -447,7 +475,13 @@ class RepeatsItsSubgoal(FakePolicy):
 
 
 def test_a_repeated_subgoal_is_noted_again_only_if_its_last_try_had_failed(record_of_episode):
-    """A call every 3 steps; each reports how the last try ended. Done at step 12: no new note."""
+    """The policy is asked every 3 steps and names the subgoal "go" each time. Before each call but
+    the first, one more try at a subgoal has ended: those at "go" with a time-out, missed, blocked,
+    and done; the last one, at "sing", was refused.
+
+    After each failed try "go" is noted anew, at steps 0, 3, 6 and 9. The one from step 9 on is
+    done, so that no new note is made at step 12. At step 15 the refused one is noted, and "go".
+    """
     subgoals = record_of_episode(FakeWorld(length=30), RepeatsItsSubgoal()).subgoals
 
     assert [(subgoal.step, subgoal.text, subgoal.ended) for subgoal in subgoals] == [
@@ -461,9 +495,11 @@ def test_a_repeated_subgoal_is_noted_again_only_if_its_last_try_had_failed(recor
 
 
 def test_a_subgoal_is_noted_with_why_its_try_failed_and_with_which_thing(record_of_episode):
+    """Of five tries at subgoals the first ended with "time-out!" and no thing, the last with "no"
+    and the cube; a subgoal whose try has not ended is noted after it."""
     subgoals = record_of_episode(FakeWorld(length=30), RepeatsItsSubgoal()).subgoals
 
-    timed_out, *_, refused, _ = subgoals
+    timed_out, *_, refused, _under_way = subgoals
     assert (timed_out.why, timed_out.thing) == ("time-out!", None)
     assert (refused.why, refused.thing) == ("no", "cube")
 
@@ -477,29 +513,21 @@ class SpeakingWorld(FakeWorld):
         self.instruction = instruct_job(job)
         self.told = list(zip(self.instruction.turns, steps, strict=False))
 
-    def reset(self, seed=None):
-        observation, info = super().reset(seed)
-        return observation, {**info, "heard": self._fresh(0)}
-
-    def step_chunk(self, actions):
-        *others, info = super().step_chunk(actions)
-        return *others, {**info, "heard": self._fresh(self.steps)}
-
-    def _fresh(self, step):
+    def heard_until(self, step):
         fresh = [{"text": text, "step": at} for text, at in self.told if at <= step]
         del self.told[: len(fresh)]
         return fresh
 
 
 class NotesWhatItHears(FakePolicy):
-    """Writes down what it hears; its metadata are what it has heard."""
+    """Writes down what it hears; its metadata are how many notes it has."""
 
     def hear(self, text, step):
-        self.heard += [text, step]
+        self.heard.append((text, step))
 
     @property
     def metadata(self):
-        return {"heard": len(self.heard)}
+        return {"notes": len(self.heard)}
 
 
 JOB_IN_TURNS = JOB.with_options(setting="contextual", delivery="turns")
@@ -524,23 +552,28 @@ def test_a_record_has_the_step_at_which_each_utterance_was_heard(policy_class, r
 def test_a_policy_hears_the_first_utterance_in_its_reset_and_the_others_with_their_steps(
     record_of_episode,
 ):
-    """The policy notes what it gets: the first utterance and the length of the video, 3 steps.
+    """Utterances are due at steps 0, 3, 6 and 6 of an episode of ten steps.
 
-    Then each later utterance and its step, 3, 6 and 6; the fifth never comes. Its metadata are the
-    number of notes, 8.
+    The policy notes what it gets: in its reset the first utterance and a demonstration, of which it
+    notes the number of frames, 3; then each later utterance with its step. Its metadata are written
+    after the last one: 2 + 3 notes.
     """
     world = SpeakingWorld((0, 3, 6, 6), length=10)
     policy = NotesWhatItHears()
 
     record = record_of_episode(world, policy, JOB_IN_TURNS)
 
-    turns = world.instruction.turns
-    assert policy.heard == [turns[0], 3, turns[1], 3, turns[2], 6, turns[3], 6]
-    assert record.policy_metadata == {"heard": 8}
+    first, second, third, fourth, _never = world.instruction.turns
+    assert policy.heard == [first, 3, (second, 3), (third, 6), (fourth, 6)]
+    assert record.policy_metadata == {"notes": 2 + 3}
 
 
 def test_a_policy_without_a_method_hear_gets_the_first_utterance_alone(record_of_episode):
-    """It notes that and the length of the video, 3 steps; others come at steps 3 and 6."""
+    """Utterances are due at steps 0, 3, 6 and 6 of an episode of ten steps.
+
+    The policy notes what it gets in its reset: the first utterance and a demonstration, of which it
+    notes the number of frames, 3. There is no way to tell it the others.
+    """
     world = SpeakingWorld((0, 3, 6, 6), length=10)
     policy = FakePolicy()
 
@@ -550,22 +583,24 @@ def test_a_policy_without_a_method_hear_gets_the_first_utterance_alone(record_of
 
 
 def test_the_caption_of_a_video_grows_with_each_utterance(give_world_and_policy, tmp_path):
-    """Utterances at steps 0, 3, 6, 6 and 9; frames of the video, the first and after each step.
+    """Utterances are due at steps 0, 3, 6, 6 and 9 of an episode of 11 steps, and the policy acts
+    for 3 steps at a time. The caption of a frame is all that was said before its step.
 
-    Actions come in chunks of 3, and what is heard at step 3 stands in the frames after it.
+    The video begins with a frame of the demonstration; it has one before the first step and one
+    after each step. So 1 + 1 + 3 frames show one utterance, 3 (after steps 4 to 6) show two, 3 show
+    four, as two came at step 6, and the 2 after step 9 show all five. Room is kept for these.
     """
     world = SpeakingWorld((0, 3, 6, 6, 9), length=11)
     captions = []
 
     class NotesCaptions(VideoWriter):
         def add_frame(self, source, is_demonstration=False):
-            del source, is_demonstration
             captions.append(self.caption)
 
     give_world_and_policy(world, FakePolicy())
     writer = NotesCaptions(tmp_path / "x.mp4")
     EpisodeRunner(tmp_path).play_once(JOB_IN_TURNS, writer)
 
-    utterances_shown = [1, 1, 1, 1, 1, 2, 2, 2, 4, 4, 4, 5, 5]
+    utterances_shown = 5 * [1] + 3 * [2] + 3 * [4] + 2 * [5]
     assert captions == [" ".join(world.instruction.turns[:count]) for count in utterances_shown]
     assert writer.longest_caption == world.instruction.text

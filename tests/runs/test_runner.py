@@ -9,7 +9,6 @@ from unittest import mock
 
 import pytest
 import run_fakes
-from flat_jobs import with_version
 from made_records import fill
 from msgspec.structs import replace
 from run_fakes import (
@@ -75,7 +74,9 @@ def records_of_an_uninterrupted_run(tmp_path_factory):
 def test_a_killed_run_goes_on_with_the_same_command_and_has_the_same_records_in_the_end(
     tmp_path, records_of_an_uninterrupted_run
 ):
-    """A run of 16 episodes is killed after at least three; the same command plays the rest."""
+    """A run of 16 episodes with two workers is killed after at least three; when the workers have
+    ended, too, the same command plays the rest. The records are those of a run that nobody killed.
+    """
     child = begun_run(tmp_path, workers=2)
     child.send_signal(signal.SIGKILL)
     child.wait()
@@ -90,7 +91,8 @@ def test_a_killed_run_goes_on_with_the_same_command_and_has_the_same_records_in_
 
 
 def test_a_line_that_a_kill_cut_off_is_set_aside_and_its_episode_played_again(tmp_path):
-    """As all of a record is written at once, this is the worst that a kill can leave behind."""
+    """A record is written as one line at once, so a line that is cut off is the worst that a kill
+    can leave behind. It is moved to another file, and both episodes of the plan are played."""
     torn_line = b'{"policy":"random","ta'
     (tmp_path / RECORDS_FILE).write_bytes(torn_line)
 
@@ -121,7 +123,8 @@ def test_ctrl_c_or_sigterm_ends_the_workers_and_keeps_the_records_of_ended_episo
 
 
 def test_an_episode_in_which_the_worker_dies_twice_is_one_error_and_the_rest_is_played(tmp_path):
-    """A dead process may be bad luck, so it is tried twice; then it is an error of its own kind."""
+    """Of four episodes the one with number 2 kills its worker process each time. That may be bad
+    luck, so it is tried twice; then it is an error of its own kind, which is not the policy's."""
     plan = changed(small_plan(4), settings="direct")
 
     summary = run_plan(plan, tmp_path, FakePlay(tmp_path, deadly=2), LocalProcesses(1))
@@ -147,16 +150,23 @@ def run_with_one_error(folder):
 
 
 def test_the_same_command_plays_errors_again(tmp_path):
-    """A third attempt succeeds, and nothing is left to play."""
+    """A run has played four episodes, of which one ended in an error in each of two attempts.
+
+    The same plan plays this one again: the third attempt is no error, so that nothing is left to
+    play the next time. The folder has no earlier plan, as it was the same one each time.
+    """
     plan = run_with_one_error(tmp_path)
 
-    assert fake_run(tmp_path, plan).played == 1
-    assert max(record.attempt for record in read_records(tmp_path)) == 3
-    assert fake_run(tmp_path, plan).played == 0
-    assert not earlier_plans(tmp_path)  # it was the same one each time
+    second_run = fake_run(tmp_path, plan)
+    third_run = fake_run(tmp_path, plan)
+
+    assert (second_run.played, third_run.played) == (1, 0)
+    assert sorted(record.attempt for record in read_records(tmp_path)) == [1, 1, 1, 3]
+    assert not earlier_plans(tmp_path)
 
 
 def test_errors_are_not_played_again_if_asked_not_to(tmp_path):
+    """A run has played four episodes, of which one ended in an error."""
     plan = run_with_one_error(tmp_path)
 
     summary = fake_run(tmp_path, plan, retry_errors=False)
@@ -165,13 +175,16 @@ def test_errors_are_not_played_again_if_asked_not_to(tmp_path):
 
 
 def test_missing_graphics_stop_the_run_and_the_records_before_are_kept(tmp_path):
+    """Of four episodes, numbers 0 to 3, the third finds no graphics, which no other one would."""
     with pytest.raises(RenderDeviceError, match="No Vulkan device can render; install one"):
-        run_plan(small_plan(), tmp_path, FakePlay(fatal=2), LocalProcesses(1))
+        run_plan(small_plan(4), tmp_path, FakePlay(fatal=2), LocalProcesses(1))
+
     assert {record.episode for record in read_records(tmp_path)} == {0, 1}
 
 
 def test_a_run_may_be_repeated_with_more_episodes_in_its_folder(tmp_path):
-    """Each episode is told in two settings: 2 are 4 results, 4 are 8, of which 4 are new."""
+    """Each episode is told in two settings. A run of 2 episodes has 4 results; then 4 are asked
+    for, which are 8 results, of which 4 are new."""
     fake_run(tmp_path, small_plan(episodes=2))
 
     more = fake_run(tmp_path, small_plan(episodes=4))
@@ -180,7 +193,8 @@ def test_a_run_may_be_repeated_with_more_episodes_in_its_folder(tmp_path):
 
 
 def test_what_a_repeated_run_with_fewer_episodes_leaves_out_is_kept_and_not_missing(tmp_path):
-    """Four episodes are played in two settings each (8 records), then one is asked for (2)."""
+    """Four episodes are played in two settings each, which makes 8 records. Then one is asked for,
+    of which both records are there, so nothing is played. The stored plan is the last one."""
     fake_run(tmp_path, small_plan(episodes=4))
 
     fewer = fake_run(tmp_path, small_plan(episodes=1))
@@ -207,22 +221,25 @@ def test_what_a_repeated_run_with_fewer_episodes_leaves_out_is_kept_and_not_miss
         ("language_version", "99.0", r"language version is 99\.0, but in this roboirg it is \d"),
         ("task", "Gone", "whose words version is .*, but in this roboirg it is Gone/test@none;"),
         ("words", OTHER_WORDS, f"version is {OTHER_WORDS}, but in this roboirg it is Pick"),
-        ("policy_version", "old", r"random whose policy version is old, but now it is built-in"),
+        (
+            "ref",
+            dataclasses.replace(read_policy("random"), version="old"),
+            "random whose policy version is old, but now it is built-in",
+        ),
     ],
 )
 def test_a_run_does_not_go_on_in_a_folder_with_results_of_other_scenes_words_or_versions(
     tmp_path, name, value, sentence
 ):
-    """The folder holds two records; in the second one field differs from what would be played now.
+    """The folder holds two records. In the second one a field differs from what would be played
+    now: a seed or a task that is not there, a version, or what the policy is (its `ref`).
 
-    The first fits and ended in an error, so that all have to be compared. Nothing is played, and no
-    plan is written.
+    The first fits, and ended in an error, which would be played again: all records have to be
+    compared before. Nothing is played, and no plan is written.
     """
-    played, fine = map(FakePlay(), small_plan(1).jobs())
-    is_policy = name == "policy_version"
-    record = with_version(played, "old") if is_policy else replace(played, **{name: value})
-    lost = replace(fine, outcome="error", error="connection", cause="connection: x")
-    fill(tmp_path, lost, record)  # the first record fits: all have to be compared
+    played, other = map(FakePlay(), small_plan(1).jobs())
+    fitting_error = replace(other, outcome="error", error="connection", cause="connection: x")
+    fill(tmp_path, fitting_error, replace(played, **{name: value}))
 
     with pytest.raises(StoreError, match=sentence):
         fake_run(tmp_path, small_plan(2))
@@ -232,7 +249,10 @@ def test_a_run_does_not_go_on_in_a_folder_with_results_of_other_scenes_words_or_
 
 
 def test_a_line_that_was_cut_off_is_reported_before_an_episode_is_played(tmp_path):
-    """The cut line has 22 bytes. One warning comes first, then the progress of two episodes."""
+    """The cut line has 22 bytes. One warning comes first, then the progress of two episodes.
+
+    The reporter, which would print both, is replaced by one that notes how it is called.
+    """
     (tmp_path / RECORDS_FILE).write_bytes(b'{"policy":"random","ta')
     reporter = mock.Mock(spec=Reporter)
 
@@ -240,8 +260,7 @@ def test_a_line_that_was_cut_off_is_reported_before_an_episode_is_played(tmp_pat
 
     calls = [name for name, *_ in reporter.method_calls if name in ("warn", "advance")]
     assert calls == ["warn", "advance", "advance"]
-    ((notice,), _) = reporter.warn.call_args
-    assert "(22 bytes) to" in notice
+    assert "(22 bytes) to" in reporter.warn.call_args.args[0]
 
 
 @pytest.mark.parametrize(
@@ -256,7 +275,9 @@ def test_a_line_that_was_cut_off_is_reported_before_an_episode_is_played(tmp_pat
     ],
 )
 def test_a_run_warns_once_of_a_task_on_which_the_policy_was_not_trained(tmp_path, trained, warned):
-    """None: the policy does not say on which tasks it was trained."""
+    """The policy says that it was trained on the tasks `trained`; None says nothing. It plays two
+    episodes of PickXtimes. The reporter, which would print a warning, is replaced by one that notes
+    how it is called."""
     policy = dataclasses.replace(read_policy("random"), needs=PolicyNeeds(trained_tasks=trained))
     reporter = mock.Mock(spec=Reporter)
 
@@ -286,7 +307,9 @@ def test_a_negative_number_of_workers_is_refused():
     [("environment_version", 7, "environment"), ("words", OTHER_WORDS, "words")],
 )
 def test_a_record_that_a_worker_of_another_version_made_is_not_stored(tmp_path, field, value, what):
-    """The record differs in one field, as if a worker had another version of this package."""
+    """What plays returns a record that differs in one field, as if a worker on another machine had
+    another version of this package. The run ends with an error, and the file of records is empty.
+    """
 
     def play_elsewhere(job):
         return replace(FakePlay()(job), **{field: value})
@@ -295,6 +318,14 @@ def test_a_record_that_a_worker_of_another_version_made_is_not_stored(tmp_path, 
         run_plan(small_plan(1).checked(), tmp_path, play_elsewhere, InProcess())
 
     assert (tmp_path / RECORDS_FILE).read_bytes() == b""
+
+
+@pytest.fixture
+def fingerprints_of_package(tmp_path, monkeypatch):
+    """Return what computes the fingerprints of the package that is in this folder."""
+    module = tmp_path / "roboirg" / "runs" / "play" / "episode_record.py"
+    monkeypatch.setattr(episode_record, "__file__", str(module))
+    return episode_record.code_fingerprints.__wrapped__  # which keeps no values
 
 
 @pytest.mark.parametrize(
@@ -307,19 +338,21 @@ def test_a_record_that_a_worker_of_another_version_made_is_not_stored(tmp_path, 
     ],
 )
 def test_a_changed_file_changes_the_fingerprint_of_the_code_and_that_of_verdicts_if_it_matters(
-    tmp_path, monkeypatch, name, is_code, decides_verdicts
+    tmp_path, fingerprints_of_package, name, is_code, decides_verdicts
 ):
-    """A record has both. Commands cannot change a verdict, words can; caches are no code."""
-    monkeypatch.setattr(
-        episode_record, "__file__", str(tmp_path / "roboirg" / "a" / "b" / "module.py")
-    )
-    path = tmp_path / "roboirg" / name
-    path.parent.mkdir(parents=True)
+    """A record has two checksums of the code that made it: of all, and of what decides verdicts.
 
-    path.write_text("before")
-    code, verdict_code = episode_record.code_fingerprints.__wrapped__()
-    path.write_text("after")
-    new_code, new_verdict_code = episode_record.code_fingerprints.__wrapped__()
+    The package has one file, which is changed. Commands (cli) and the number of the release cannot
+    change a verdict, words can; caches of the interpreter are no code. `fingerprints_of_package`
+    computes both for the package that is in the folder of the test.
+    """
+    file = tmp_path / "roboirg" / name
+    file.parent.mkdir(parents=True)
+
+    file.write_text("before")
+    code, verdict_code = fingerprints_of_package()
+    file.write_text("after")
+    new_code, new_verdict_code = fingerprints_of_package()
 
     assert (new_code != code) == is_code
     assert (new_verdict_code != verdict_code) == decides_verdicts
@@ -329,7 +362,9 @@ def test_a_changed_file_changes_the_fingerprint_of_the_code_and_that_of_verdicts
 def test_an_episode_that_lost_its_process_is_repeated_at_once_and_one_with_an_error_last(
     tmp_path, error, place
 ):
-    """The first episode fails: it is played again as the second one (1), or as the last (-1)."""
+    """The first of eight episodes ends in an error. If its process was lost (infrastructure), it is
+    played again as the second one, at place 1; if the environment failed, after all others, at the
+    last place (-1)."""
     played = []
 
     def fail_the_first(job):
@@ -345,6 +380,7 @@ def test_an_episode_that_lost_its_process_is_repeated_at_once_and_one_with_an_er
 
 
 def test_a_machine_with_another_package_version_is_refused():
+    """Machines of a cluster compare what they have; this one has the same but for version 9."""
     here = MachineVersions((read_policy("random"),))
     there = dataclasses.replace(here, installed=here.installed._replace(package_version="9"))
 
@@ -353,6 +389,7 @@ def test_a_machine_with_another_package_version_is_refused():
 
 
 def test_a_machine_with_another_version_of_a_policy_is_refused_by_its_name():
+    """Machines of a cluster compare what they have, here the policy `random` in two versions."""
     random = read_policy("random")
     here = MachineVersions((random,))
     there = MachineVersions((dataclasses.replace(random, version="old"),))
@@ -361,6 +398,7 @@ def test_a_machine_with_another_version_of_a_policy_is_refused_by_its_name():
 
 
 def test_policies_of_an_unknown_version_are_not_compared_between_machines():
+    """The first policy of a plan is of an unknown version here, the second one is the same."""
     random = read_policy("random")
     here = MachineVersions((unknown_policy("x"), random))
     there = MachineVersions((read_policy("oracle"), random))

@@ -14,13 +14,11 @@ from roboirg.runs.run.executor import InProcess
 from roboirg.runs.run.runner import run_plan
 
 
-def plan_of_episodes(episodes, **options):
-    few = {"tasks": "PickXtimes", "settings": "explicit", "episodes": episodes}
-    return make_plan("random", **few, **options)
-
-
 class PlaysWithServerVersions:
-    """Plays jobs with a server that tells these versions, one for each episode."""
+    """Plays jobs with a policy's server that reports these versions, one for each episode.
+
+    A server that does not tell its version counts as *unknown*.
+    """
 
     def __init__(self, *versions):
         self.versions = list(versions)
@@ -29,9 +27,15 @@ class PlaysWithServerVersions:
         version = self.versions.pop(0)
         if version == "refused":
             return make_record(job, cause="connection: refused", error="connection")
-        metadata = {"server": "localhost:1"} | ({} if version is None else {"version": version})
+        metadata = {"server": "localhost:1", "version": version}
         told = server_version(metadata)
         return make_record(job, "success", policy_metadata=metadata, server_version=told)
+
+
+def run_with_server_versions(count, folder, *versions):
+    """Run a plan of some episodes, each tried once, with a server that reports these versions."""
+    few = {"tasks": "PickXtimes", "settings": "explicit", "episodes": count, "tries": 1}
+    run_plan(make_plan("random", **few), folder, PlaysWithServerVersions(*versions), InProcess())
 
 
 def stored_server_versions(folder):
@@ -39,47 +43,68 @@ def stored_server_versions(folder):
 
 
 def test_a_run_stops_when_its_policys_server_reports_another_version(tmp_path):
-    """The third of four episodes is answered by version b instead of a; it is not stored."""
-    plan = plan_of_episodes(4)
+    """The third of four episodes is answered by version b of the server instead of a.
 
+    Results of two versions must not be mixed, so the third one is not stored.
+    """
     with pytest.raises(StoreError, match=r"whose server version is a, but in random-.* it is b"):
-        run_plan(plan, tmp_path, PlaysWithServerVersions("a", "a", "b", "a"), InProcess())
+        run_with_server_versions(4, tmp_path, "a", "a", "b", "a")
 
     assert stored_server_versions(tmp_path) == ["a", "a"]
 
 
-@pytest.mark.parametrize(("other", "words"), [("b", "b"), (None, "none")])
-def test_a_run_goes_on_with_the_same_version_of_the_server_alone(tmp_path, other, words):
-    """Neither with version b instead of a, nor with a server that does not tell its version."""
-    plan = plan_of_episodes(2)
+def test_a_stopped_run_goes_on_with_the_version_of_the_server_with_which_it_began(tmp_path):
+    """Two episodes are to be played. The first is stored, with version a of the server.
+
+    The run stopped in the second one, as the server had changed to version b. Now it is a again.
+    """
     with pytest.raises(StoreError):
-        run_plan(plan, tmp_path, PlaysWithServerVersions("a", "b"), InProcess())
+        run_with_server_versions(2, tmp_path, "a", "b")
 
-    with pytest.raises(
-        StoreError, match=f"server version is a, but in .* it is {words}; choose another"
-    ):
-        run_plan(plan, tmp_path, PlaysWithServerVersions(other), InProcess())
+    run_with_server_versions(2, tmp_path, "a")
 
-    run_plan(plan, tmp_path, PlaysWithServerVersions("a"), InProcess())
     assert stored_server_versions(tmp_path) == ["a", "a"]
+
+
+@pytest.mark.parametrize(("version", "named"), [("b", "b"), ("unknown", "none")])
+def test_a_stopped_run_does_not_go_on_with_another_or_an_unknown_version_of_the_server(
+    tmp_path, version, named
+):
+    """Two episodes are to be played. The first is stored, with version a of the server.
+
+    The run stopped in the second one, as the server had changed to version b. Now the server
+    reports version b again, or none at all; the second episode is not stored.
+    """
+    with pytest.raises(StoreError):
+        run_with_server_versions(2, tmp_path, "a", "b")
+
+    with pytest.raises(StoreError, match=f"server version is a, but in .* it is {named}; choose"):
+        run_with_server_versions(2, tmp_path, version)
+
+    assert stored_server_versions(tmp_path) == ["a"]
 
 
 def test_a_server_version_with_terminal_codes_is_stored_escaped(tmp_path):
-    """ "\\x1b[2J" would clear the terminal of whoever prints the record."""
-    run_plan(
-        plan_of_episodes(2),
-        tmp_path,
-        PlaysWithServerVersions(*["\x1b[2J\u202e" + "9" * 5000] * 2),
-        InProcess(),
-    )
-    assert {version[:12] for version in map(str, stored_server_versions(tmp_path))} == {
-        r"\x1b[2J\u202e"[:12]
-    }
+    r"""A server reports a version that begins with the codes to clear a terminal (ESC [ 2 J).
+
+    Printed as it is, it would do so to whoever reads the record; the file has a backslash and "x1b"
+    instead. U+202E, which turns the direction of writing, is escaped likewise.
+    """
+    version = "\x1b[2J\u202e" + "9" * 5000
+
+    run_with_server_versions(1, tmp_path, version)
+
+    (stored,) = stored_server_versions(tmp_path)
+    assert stored.startswith(r"\x1b[2J\u202e")
 
 
 def test_an_episode_without_a_connection_has_no_server_version_that_could_differ(tmp_path):
-    plan = plan_of_episodes(3, tries=1)
-    run_plan(plan, tmp_path, PlaysWithServerVersions("refused", "a", "refused"), InProcess())
+    """Of three episodes the first and the last find no server; each is tried once.
+
+    They have the version of the episode that was played, so all three may lie in one folder.
+    """
+    run_with_server_versions(3, tmp_path, "refused", "a", "refused")
+
     assert stored_server_versions(tmp_path) == ["a"] * 3
 
 
@@ -93,18 +118,32 @@ class PlannerWithVersion:
         pass
 
 
-def test_the_server_version_is_that_of_the_server_and_not_of_its_client_or_planner():
-    """The server says "phase-1"; the client was given version "mine", and the planner has "7"."""
+@pytest.fixture
+def client_of_server_phase_1():
+    """A policy that asks a server, which is called version "mine" here; the server is "phase-1"."""
     with ChallengeServer() as server:
         client = make_policy(f"challenge://{server.place}?version=mine", 0)
         client.reset("go", {})
-        client.follow = print
-        system = HierarchicalPolicy(PlannerWithVersion(), client)
-
-        versions = [server_version(client.metadata), server_version(system.metadata)]
-
+        yield client
         client.close()
-    assert versions == ["phase-1", "phase-1"]
+
+
+def test_the_server_version_is_that_which_the_server_reports_and_not_that_given_to_its_client(
+    client_of_server_phase_1,
+):
+    """The server reports version "phase-1"; the user who connects to it called it "mine"."""
+    assert server_version(client_of_server_phase_1.metadata) == "phase-1"
+
+
+def test_the_server_version_of_a_hierarchical_policy_is_not_the_version_of_its_planner(
+    client_of_server_phase_1,
+):
+    """A planner with version "7" names subgoals; the policy that follows them asks a server, which
+    reports version "phase-1"."""
+    client_of_server_phase_1.follow = print  # what can follow subgoals has this method
+    policy = HierarchicalPolicy(PlannerWithVersion(), client_of_server_phase_1)
+
+    assert server_version(policy.metadata) == "phase-1"
 
 
 @pytest.mark.parametrize(
@@ -113,4 +152,5 @@ def test_the_server_version_is_that_of_the_server_and_not_of_its_client_or_plann
     ids=["nothing", "a version without a server", "no version", "an unknown version"],
 )
 def test_metadata_without_a_server_and_its_version_give_no_server_version(metadata):
+    """What a policy reports of itself (its metadata) must have both, and the version be known."""
     assert server_version(metadata) is None

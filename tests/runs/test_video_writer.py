@@ -7,7 +7,6 @@ import pytest
 
 from roboirg.records.film import FRAME_STEPS
 from roboirg.runs.play.video_writer import (
-    DEMONSTRATION_COLOR,
     GAP,
     VideoWriter,
     compose_frame,
@@ -18,31 +17,43 @@ av = pytest.importorskip("av")
 
 
 class GreyPictures:
+    """Pictures of 256 by 256 pixels: grey 90 of the front camera, grey 200 of the wrist camera."""
+
     def picture(self, camera):
         return np.full((256, 256, 3), 200 if camera == "wrist" else 90, np.uint8)
 
 
-def unfinished_video_of_21_frames(folder):
+def unfinished_video_of_21_frames(folder, point=(40, 200)):
     """Write a video of one frame of a demonstration, and then 20 with a ring at a point."""
     video = VideoWriter(folder / "videos" / "x.mp4")
     video.add_frame(GreyPictures(), True)
-    video.point = (40, 200)
+    video.point = point
     for _ in range(20):
         video.add_frame(GreyPictures())
     return video
 
 
+def frames_of(video):
+    """Finish a video and return its frames, arrays of rows, columns and colors."""
+    video.finish()
+    with av.open(str(video.path)) as container:
+        return [frame.to_ndarray(format="rgb24").astype(int) for frame in container.decode(video=0)]
+
+
 def test_a_video_appears_only_when_it_is_complete(tmp_path):
-    """A video is written elsewhere until it is finished; then it is there, with a picture."""
+    """A video is written elsewhere until it is finished; then the film (mp4) is there, with a
+    picture of it (jpg)."""
     video = unfinished_video_of_21_frames(tmp_path)
     assert not video.path.exists()
 
     assert video.finish()
+
     assert sorted(path.name for path in video.path.parent.iterdir()) == ["x.jpg", "x.mp4"]
 
 
 def test_a_video_of_21_like_frames_has_less_than_20_kilobytes(tmp_path):
-    """Frames without compression in time would take more."""
+    """All pictures are grey and equal. Frames that were compressed each on its own, not as changes
+    of the one before, would take more."""
     video = unfinished_video_of_21_frames(tmp_path)
     video.finish()
 
@@ -66,32 +77,42 @@ def test_a_video_is_h264_of_ten_frames_a_second_at_fourfold_speed(tmp_path):
         assert len(list(container.decode(stream))) == 21 + 8
 
 
-def test_a_video_shows_both_cameras_a_frame_around_the_demonstration_and_the_pointed_place(
-    tmp_path,
-):
-    """The front camera is grey 90 at the left, the wrist camera 200 at the right.
+def test_a_video_shows_the_front_camera_at_the_left_and_the_wrist_camera_at_the_right(tmp_path):
+    """The pictures of the front camera are grey 90, those of the wrist camera 200. Each has 256
+    columns, so column 128 is in the first and 384 in the second one.
 
-    Only the first frame is of a demonstration: each of its four edges, of the left picture and the
-    whole, has the color for it. In the last frame a ring is drawn around the point (row 40, column
-    200). The margins allow for the losses of the compression.
+    Compression changes colors a little, here by less than 7 of 256 levels.
     """
-    video = unfinished_video_of_21_frames(tmp_path)
-    video.finish()
+    last_frame = frames_of(unfinished_video_of_21_frames(tmp_path))[-1]
 
-    with av.open(str(video.path)) as container:
-        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert last_frame[128, 128] == pytest.approx([90, 90, 90], abs=7)
+    assert last_frame[128, 384] == pytest.approx([200, 200, 200], abs=7)
 
-    demonstration = frames[0].astype(int)
-    for row, column in ((1, 100), (-2, 100), (100, 1), (100, -2)):
-        assert np.abs(demonstration[row, column] - DEMONSTRATION_COLOR).max() < 40
-    red = frames[-1][..., 0]
-    assert red[128, 128] == pytest.approx(90, abs=7), "front"
-    assert red[128, 384] == pytest.approx(200, abs=7), "wrist"
-    assert red[46, 200] == pytest.approx(240, abs=49), "ring, 6 rows below its point"
+
+@pytest.mark.parametrize(("row", "column"), [(1, 100), (-2, 100), (100, 1), (100, -2)])
+def test_a_frame_of_the_demonstration_has_a_colored_border(tmp_path, row, column):
+    """The first frame of the video is of a demonstration. The border around it is orange: red 255,
+    green 176, blue 32. A pixel at each edge is looked at, the second from there.
+
+    Compression changes colors, most of all of thin lines: here by less than 40 of 256 levels.
+    """
+    first_frame = frames_of(unfinished_video_of_21_frames(tmp_path))[0]
+
+    assert first_frame[row, column] == pytest.approx([255, 176, 32], abs=40)
+
+
+def test_a_ring_is_drawn_around_the_place_to_which_the_policy_points(tmp_path):
+    """The policy points at row 40 and column 200 of the front picture, which is grey 90. The ring
+    has a radius of 6 pixels, so it passes through the pixel 6 rows below. It is yellow: red is 255,
+    of which compression leaves about 240, and not 90."""
+    last_frame = frames_of(unfinished_video_of_21_frames(tmp_path, point=(40, 200)))[-1]
+
+    red, _green, _blue = last_frame[40 + 6, 200]
+    assert red == pytest.approx(240, abs=49)
 
 
 def test_a_video_whose_caption_grows_can_be_finished(tmp_path):
-    """All frames of a video have one size."""
+    """All frames of a video have one size, so the first one needs room for the longest caption."""
     video = VideoWriter(tmp_path / "x.mp4")
     video.caption = "This one is red."
     video.longest_caption = "This one is red. " * 20
@@ -103,7 +124,12 @@ def test_a_video_whose_caption_grows_can_be_finished(tmp_path):
 
 
 def test_a_frame_has_room_for_the_longest_caption_and_ink_for_its_own():
-    """Ink is dark pixels below the pictures, which are 256 pixels high."""
+    """A frame has its caption below the pictures, which are 256 pixels high. With a short caption
+    it is as high as with the longest one that will come, and higher than for the short one alone.
+
+    Ink is dark pixels: the short caption, a twentieth of the long one, has less than a tenth of its
+    ink, but some.
+    """
     pictures = [np.full((256, 256, 3), 200, np.uint8)] * 2
     short = "This one is red."
     long = short * 20
@@ -136,7 +162,8 @@ assert writer.finish(), writer.error
 
 
 def test_equal_pictures_give_equal_files_whatever_was_in_memory(tmp_path):
-    """MALLOC_PERTURB_ fills new memory with a byte; would find bytes that nothing has set."""
+    """A program writes the same video twice. With MALLOC_PERTURB_ new memory is filled with a byte,
+    here 50 or 200; would find bytes of the file that nothing has set."""
     contents = set()
     for byte in ("50", "200"):
         file = tmp_path / f"{byte}.mp4"

@@ -12,38 +12,61 @@ from roboirg.tasks.splits.splits import TaskSplits, shipped_splits
 
 
 def test_the_file_of_splits_is_read_back_and_has_a_line_for_each_task():
-    """Two tasks with a checksum each, and with the numbers of seeds that were passed over; two more
-    lines are the braces."""
+    """The file holds, for two tasks, a checksum of the episodes and the numbers of seeds that were
+    passed over; each task is one line, and two more lines are the braces of the JSON object."""
     splits = {"A": TaskSplits("0f", {"train/3": 2}), "B": TaskSplits("ff", {})}
+
     text = seed_selection.splits_text(splits)
 
-    assert len(text.splitlines()) == 4
+    assert len(text.splitlines()) == 2 + 2
     assert {task: TaskSplits(**entry) for task, entry in json.loads(text).items()} == splits
 
 
-def test_splits_are_built_anew_for_what_is_named(tmp_path, monkeypatch, capsys):
-    """`find` stands in for the search in several processes, and gives seeds in the wrong order.
-    Three tasks have 150 episodes in the split; only the 52 that RoboMME has not published need a
-    seed. What is built must be the shipped file, printed or written."""
+@pytest.fixture
+def search_that_ends_with_the_first_episode(monkeypatch):
+    """Search in this process instead of several, and yield the seeds of the last episode first."""
 
-    def find(slots, workers):
+    def find_seeds(slots, workers):
         assert workers == 0
-        # Backwards: no order of ending may matter.
-        return (
-            seed_selection.find_seed(slot, seed_selection.check_words) for slot in reversed(slots)
-        )
+        for slot in reversed(slots):
+            yield seed_selection.find_seed(slot, seed_selection.check_words)
 
-    monkeypatch.setattr(seed_selection, "find_seeds", find)
-    chosen = {"tasks": "VideoPlaceOrder,PickXtimes,PutInBox", "split": "val", "workers": 0}
-    build_splits.build_splits(**chosen)
-    printed = capsys.readouterr()
+    monkeypatch.setattr(seed_selection, "find_seeds", find_seeds)
 
-    assert printed.out == seed_selection.splits_text(shipped_splits())
-    assert re.search(r"VideoPlaceOrder/val/\d+: seed \d+ is rejected, no room", printed.err)
-    assert "episodes 52/52" in printed.err  # the other 98 are published
 
-    build_splits.build_splits(**chosen, out=str(tmp_path / "splits.json"))
-    assert (tmp_path / "splits.json").read_text() == printed.out
+def test_splits_that_are_built_anew_are_printed_as_they_are_shipped(
+    search_that_ends_with_the_first_episode, capsys
+):
+    """The program that made the shipped file of seeds selects them again for the val split of two
+    tasks, and keeps those of the others. As nothing has changed since, the result is that file, in
+    whatever order the searches for single episodes end (here: backwards)."""
+    build_splits.build_splits(tasks="VideoPlaceOrder,PickXtimes", split="val", workers=0)
+
+    assert capsys.readouterr().out == seed_selection.splits_text(shipped_splits())
+
+
+def test_building_splits_reports_each_rejected_seed_and_its_progress(
+    search_that_ends_with_the_first_episode, capsys
+):
+    """Of the 50 val episodes of VideoPlaceOrder RoboMME has published 48, whose seeds are known.
+    Seeds are searched for the other two, and the scenes of some seeds have no room for all things.
+    """
+    build_splits.build_splits(tasks="VideoPlaceOrder", split="val", workers=0)
+
+    reported = capsys.readouterr().err
+    assert re.search(r"VideoPlaceOrder/val/\d+: seed \d+ is rejected, no room", reported)
+    assert "episodes 2/2" in reported
+
+
+def test_splits_are_written_to_the_file_that_is_named(
+    search_that_ends_with_the_first_episode, tmp_path
+):
+    """The seeds of one split are selected again; the file is the one that is shipped, unchanged."""
+    file = tmp_path / "splits.json"
+
+    build_splits.build_splits(tasks="VideoPlaceOrder", split="val", workers=0, out=str(file))
+
+    assert file.read_text() == seed_selection.splits_text(shipped_splits())
 
 
 @pytest.mark.parametrize(
@@ -56,5 +79,7 @@ def test_splits_are_built_anew_for_what_is_named(tmp_path, monkeypatch, capsys):
     ],
 )
 def test_what_is_wrong_is_refused(chosen, sentence):
+    """An unknown task, an unknown split, a negative number of processes and a folder that is not
+    there are refused in a sentence that names the value."""
     with pytest.raises(RoboIRGError, match=re.escape(sentence)):
         build_splits.build_splits(**chosen)

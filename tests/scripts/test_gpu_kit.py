@@ -17,8 +17,11 @@ SETTINGS = "src/roboirg/simulation/rendering/render_settings.py"
 
 
 @pytest.fixture
-def parts(tmp_path):
-    """The parts of a kit of one wheel and one tree, with `python` as on this machine."""
+def packed_kit(tmp_path):
+    """The folder of a kit, not yet cut into parts: a wheel, a source tree and some numbers.
+
+    The wheel has the module `thing`, the tree a file with settings of the simulator.
+    """
     kit = tmp_path / "packed"
     (kit / "wheels").mkdir(parents=True)
     with zipfile.ZipFile(kit / "wheels" / "thing-1.0-py3-none-any.whl", "w") as wheel:
@@ -34,16 +37,22 @@ def parts(tmp_path):
     settings.write_bytes((ROOT / SETTINGS).read_bytes())
     (kit / "python").write_text("{}.{}".format(*sys.version_info))
     (kit / "expected.npz").write_bytes(np.random.default_rng(0).bytes(5000))
+    return kit
+
+
+@pytest.fixture
+def parts(packed_kit, tmp_path):
+    """The folder with the parts of the kit, which are of 2,000 bytes, and their checksums."""
     out = tmp_path / "parts"
-    assert len(write_parts(kit, out, 2000)) >= 3
+    assert len(write_parts(packed_kit, out, 2000)) >= 3
     return out
 
 
 def install(parts):
+    """Install parts to the folder `kit` next to them, as on a machine with this Python."""
     interpreter = parts.parent / "bin"
-    interpreter.mkdir(exist_ok=True)
-    if not (interpreter / "python3").exists():
-        (interpreter / "python3").symlink_to(sys.executable)
+    interpreter.mkdir()
+    (interpreter / "python3").symlink_to(sys.executable)
     return subprocess.run(
         ["bash", str(ROOT / "scripts/gpu/install"), str(parts), str(parts.parent / "kit")],
         env={"PATH": f"{interpreter}:/usr/bin:/bin", "HOME": str(parts.parent)},
@@ -53,18 +62,35 @@ def install(parts):
     )
 
 
-def test_parts_install_on_a_machine_that_reaches_nothing(parts):
+def test_parts_install_on_a_machine_that_reaches_nothing(tmp_path, parts):
+    """A machine with a GPU may have no network, so all that it needs comes in files, the parts.
+
+    `parts` has a wheel with the module thing.py, and this Python's version. The wheel is installed
+    without an index of packages.
+    """
     done = install(parts)
-    kit = parts.parent / "kit"
 
     assert done.returncode == 0, done.stderr
-    assert (kit / "site" / "thing.py").read_text() == "name = 'thing'\n"
-    assert "culling: bool = True" in (kit / "trees" / "after" / SETTINGS).read_text()
-    assert "culling: bool = False" in (kit / "trees" / "unculled" / SETTINGS).read_text()
+    assert (tmp_path / "kit" / "site" / "thing.py").read_text() == "name = 'thing'\n"
 
 
-def test_a_damaged_part_is_named_and_nothing_is_installed(parts):
-    """`parts` has the parts of a kit, with checksums. A bit of the second part is flipped."""
+def test_the_installed_kit_has_the_source_with_culling_and_without(tmp_path, parts):
+    """Culling is not to draw what a camera cannot see. To compare, the kit has the source twice.
+
+    `parts` has it once, as it is here, with culling; the other tree, `unculled`, is made from it.
+    SETTINGS is the path of the file that says whether culling is on.
+    """
+    install(parts)
+
+    trees = tmp_path / "kit" / "trees"
+    assert "culling: bool = True" in (trees / "after" / SETTINGS).read_text()
+    assert "culling: bool = False" in (trees / "unculled" / SETTINGS).read_text()
+
+
+def test_a_damaged_part_is_named_and_nothing_is_installed(tmp_path, parts):
+    """`parts` has the parts of a kit, which are files with checksums. The last bit of the second
+    part is flipped, as on a bad disk. The installation stops before it makes the folder of the kit.
+    """
     part = parts / "part-01"
     content = bytearray(part.read_bytes())
     content[-1] ^= 1
@@ -74,17 +100,16 @@ def test_a_damaged_part_is_named_and_nothing_is_installed(parts):
 
     assert done.returncode != 0
     assert "part-01" in done.stdout + done.stderr
-    assert not (parts.parent / "kit").exists()
+    assert not (tmp_path / "kit").exists()
 
 
-def test_another_python_is_refused_with_what_would_be_right(tmp_path, parts):
-    """The kit is packed anew for Python 3.1, which is not this one."""
-    kit = tmp_path / "packed"
-    other = tmp_path / "others"
-    (kit / "python").write_text("3.1")
-    write_parts(kit, other, 10**6)
+def test_another_python_is_refused_with_what_would_be_right(tmp_path, packed_kit):
+    """A kit has packages for one version of Python. This one says that it is for Python 3.1, which
+    the `python3` of the machine, a symbolic link to the Python of this test, is not."""
+    (packed_kit / "python").write_text("3.1")
+    write_parts(packed_kit, tmp_path / "parts", 10**6)
 
-    done = install(other)
+    done = install(tmp_path / "parts")
 
     assert done.returncode == 1
     assert re.search(r"python3 is 3\.\d+ here; the parts are for 3\.1 \(", done.stderr), done.stderr
@@ -116,7 +141,9 @@ def test_differences_are_counted_by_pixel_and_motion_by_bit():
 
 
 def test_the_container_shows_the_driver_to_vulkan_and_to_egl():
-    """Both files are JSON and name libraries of NVIDIA's driver, which the host brings."""
+    """The Dockerfile writes two files with `printf` that tell where the graphics driver is, one for
+    Vulkan and one for EGL. Both are JSON and name libraries of NVIDIA's driver, which the host
+    brings."""
     text = (ROOT / "Dockerfile").read_text(encoding="utf-8")
     files = {
         path: json.loads(content.removesuffix(r"\n"))

@@ -33,29 +33,38 @@ with store.Store(Path(sys.argv[1])) as added:
 """Adds entries until it is killed, and prints each that is stored; packs have some ten entries."""
 
 
+def numbers_printed_before_a_kill(folder, seconds):
+    """Run the program that adds entries; kill it so many seconds after it has printed the first."""
+    words = (sys.executable, "-c", ADDING, str(folder))
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, cwd=SCRIPTS) as process:
+        printed = [process.stdout.readline()]
+        time.sleep(seconds)
+        process.kill()
+        printed += process.stdout
+    return list(map(int, printed))
+
+
 @pytest.mark.parametrize("seed", slow_but([0, 1], range(12)))
 def test_a_kill_at_any_moment_loses_no_entry_that_was_stored(seed, tmp_path):
-    """A program adds entries and prints the number of each that is stored; it is killed within 0.1
-    s, three times. The next one goes on where entries end, so its first number says how many
-    there were: as many as were printed, or one more that was stored and not printed yet."""
+    """A program stores entries number 0, 1, 2, …, and prints the number of each that is stored.
+
+    It is killed at a random moment within 0.1 s after the first one, three times. As numbers begin
+    with 0, one more than the last printed number are stored, or two more if it was killed between
+    storing and printing. The next program goes on with the number after these.
+    """
     rng = np.random.default_rng(seed)
+
     stored = 0
     for _ in range(3):
-        words = (sys.executable, "-c", ADDING, str(tmp_path))
-        process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, cwd=SCRIPTS)
-        first = process.stdout.readline()
-        time.sleep(rng.uniform(0, 0.1))
-        process.kill()
-        process.wait()
-        printed = process.stdout.read()
-
-        assert int(first) in (stored, stored + 1)
-        stored = int(first) + 1 + printed.count("\n")
-    with Store(tmp_path) as store:
-        assert len(store) in (stored, stored + 1)
+        printed = numbers_printed_before_a_kill(tmp_path, seconds=rng.uniform(0, 0.1))
+        assert printed[0] == stored
+        with Store(tmp_path) as store:
+            stored = len(store)
+        assert stored in (printed[-1] + 1, printed[-1] + 2)
 
 
 def add(folder, verdict, **key):
+    """Store an entry, under KEY with some of its values changed."""
     with Store(folder) as store:
         store.add(Entry({**KEY, **key}, verdict))
 
@@ -65,7 +74,9 @@ def test_an_unfinished_line_is_moved_aside(tmp_path):
     is added afterwards: two can be read."""
     add(tmp_path, "success 20")
     (tmp_path / "open.jsonl").write_bytes(b'{"key":{"body":"c3')
+
     add(tmp_path, "failure 30", body="c3d4")
+
     with Store(tmp_path) as store:
         assert len(store) == 2
         assert store.get(KEY).verdict == "success 20"
@@ -78,7 +89,11 @@ def join(first, second):
 
 
 def test_stores_are_joined_by_copying_their_packs(tmp_path):
-    """Both have one entry in common, and each has one more."""
+    """A store is a folder with compressed files, its packs, which other machines fill, too.
+
+    Two have one entry in common, and each has one more: three after those of one were copied to the
+    other.
+    """
     first = tmp_path / "first"
     second = tmp_path / "second"
     for folder in (first, second):
@@ -105,7 +120,8 @@ def test_entries_that_contradict_each_other_are_refused_with_both_files(tmp_path
 
 
 def test_a_damaged_pack_is_refused(tmp_path):
-    """The last nine bytes of the one file are cut off."""
+    """A store with one entry is one compressed file, a pack. Its last nine bytes are cut off, so
+    that it cannot be unpacked."""
     add(tmp_path, "success 20")
     (pack,) = tmp_path.glob("*.xz")
     pack.write_bytes(pack.read_bytes()[:-9])
@@ -118,6 +134,7 @@ def test_entries_of_earlier_code_count_only_if_it_is_named(tmp_path):
     """An entry was made by code "old". A store for the code of today does not find it, unless "old"
     is among the versions that it is told to accept."""
     add(tmp_path, "success 20", code="old")
+
     with Store(tmp_path) as store:
         assert store.get(KEY) is None
     with Store(tmp_path, ["older", "old"]) as store:
@@ -192,22 +209,24 @@ def test_the_key_of_a_play_does_not_change_with_words_or_the_name_of_a_file(play
 @pytest.mark.sim
 @pytest.mark.slow
 @pytest.mark.parametrize("memory", ["recurrent", "subgoal"])
-def test_a_hearing_and_a_play_are_what_a_run_with_words_records(memory, study, capsys):
-    """Would find motion that depends on words in another way than through the goal."""
+def test_a_goal_that_is_heard_and_then_played_gives_what_a_run_with_words_records(
+    memory, study, capsys
+):
+    """The experiment does in two steps what a run does in one: it finds which goal a policy hears
+    in the words of an episode, and it plays the policy for that goal. Many words share a play.
+
+    `study` is an experiment with one episode and one policy, here with random weights. The proof
+    plays the episode in the ordinary way, with its words, and must find the same record. This would
+    find motion that depends on words in another way than through the goal. The table of results
+    has the outcome and the steps of the play.
+    """
     import pandas as pd
     from experiment.frame import found_plays, prove, write_frame
     from experiment.hearing import hear_missing
     from experiment.playing import play_missing
-    from untrained import save_policy
-
-    from roboirg_learn.policy.policy_files import PolicyFiles
-    from roboirg_learn.policy.sight import ObjectClasses
 
     study.memories = [memory]
-    (row,) = study.rows()
-    row.body.parent.mkdir(parents=True)
-    objects = ObjectClasses(("button", "cube red", "target"), np.array([0.01, 0.02, 0.005]))
-    save_policy(PolicyFiles(row.body, row.reader), memory, objects)
+    save_random_policy(study, memory)
 
     hear_missing(study)
     play_missing(study)
@@ -215,6 +234,19 @@ def test_a_hearing_and_a_play_are_what_a_run_with_words_records(memory, study, c
     write_frame(study)
 
     assert "proof: 1 trials were played in the ordinary way, 0 differ" in capsys.readouterr().out
-    ((_, play),) = found_plays(study)
+    ((_trial, play),) = found_plays(study)
     (line,) = pd.read_csv(study.results / "small.csv.xz").to_dict("records")
     assert f"{line['outcome']} {line['steps']} " in play.verdict
+
+
+def save_random_policy(study, memory):
+    """Save the policy of the only row of a study, with random weights and a kind of memory."""
+    from untrained import save_policy
+
+    from roboirg_learn.policy.policy_files import PolicyFiles
+    from roboirg_learn.policy.sight import ObjectClasses
+
+    (row,) = study.rows()
+    row.body.parent.mkdir(parents=True)
+    objects = ObjectClasses(("button", "cube red", "target"), np.array([0.01, 0.02, 0.005]))
+    save_policy(PolicyFiles(row.body, row.reader), memory, objects)
