@@ -21,7 +21,6 @@ from roboirg.analysis.published import (
     TRIALS,
     PublishedRow,
     RateTable,
-    published_gap_interval,
     published_rows,
     published_tasks,
     unpaired_rates,
@@ -111,8 +110,10 @@ def compare(first: PublishedRow, second: PublishedRow, tasks: Collection[str]) -
 
     Single trials are not published, so that every trial counts as an episode of its own.
     """
-    change = published_gap_interval(second.rates, first.rates, tasks, CELL)
-    kept_interval = ratio_interval(unpaired_rates(second.rates, first.rates, tasks, CELL))
+    rates = unpaired_rates(second.rates, first.rates, tasks, CELL)
+    part = 1 / len(tasks)  # of the mean over tasks
+    change = mean_interval([task.combined(part, -part) for task in rates])
+    kept_interval = ratio_interval(rates)
     if change is None or kept_interval is None:
         raise ValueError("a cell has too few trials for an interval")
     first_mean = average(first, tasks)

@@ -15,7 +15,7 @@ import numpy as np
 
 from roboirg.analysis.results.option_labels import staged_options
 from roboirg.core.instruction_options import InstructionOptions, options_label
-from roboirg.stats.intervals import Interval, TaskRates, mean_interval
+from roboirg.stats.intervals import TaskRates
 from roboirg.stats.rates import DIGITS, mean_percent
 
 RateTable = Literal["main", "planner", "context", "real", "harder", "other"]
@@ -165,25 +165,6 @@ def unpaired_rates(
             rows[:, 2 * number + 1] = 1
             found.append(TaskRates.of(rows))
     return found
-
-
-def published_gap_interval(
-    first: Mapping[str, Decimal | None],
-    second: Mapping[str, Decimal | None],
-    tasks: Collection[str],
-    trials: int,
-) -> Interval | None:
-    """Return the 95 % interval of the first row's mean over tasks less the second's, -1 to 1.
-
-    Args:
-        first: percent by task.
-        second: percent by task.
-        tasks: which tasks; both rows have a rate in each.
-        trials: behind each rate.
-    """
-    part = 1 / len(tasks)
-    rates = unpaired_rates(first, second, tasks, trials)
-    return mean_interval([task.combined(part, -part) for task in rates])
 
 
 def published_tasks(table: str) -> tuple[str, ...]:
