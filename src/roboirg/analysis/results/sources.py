@@ -125,7 +125,12 @@ class Source:
         """What the frame of the run is made of."""
         stopping = self.stopping
         if stopping is None:
-            return FrameParts(self.results, self.planned, None)
+            spared = None
+            if self._plan is not None and self._plan.stop is not None:
+                spared = Spared(
+                    ("what was found cannot be told without the salt of its scenes.",), ()
+                )
+            return FrameParts(self.results, self.planned, spared)
         results = [result for result in self.results if stopping.needs(result)]
         planned = [job for job in self.planned if stopping.needs(job)]
         unneeded = [job for job in self.planned if not stopping.needs(job)]

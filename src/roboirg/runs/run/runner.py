@@ -106,13 +106,12 @@ def run_plan(
         _report_torn_line(store, reporter)
         _check_versions(plan, store.stored.values(), folder)
         _warn_of_untrained(plan, reporter)
-        write_plan(plan, folder)
-
         todo = _jobs_to_play(jobs, store, retry_errors=retry_errors)
         watch = None
         if plan.stop is not None:
             watch = StopWatch(plan, jobs, store, reporter)
             todo = watch.in_order(todo)
+        write_plan(plan, folder)
         reporter.start(len(jobs), len(jobs) - len(todo), getattr(executor, "workers", None))
         loop = _RunLoop(plan, store, reporter, watch)
         loop.play(todo, play, executor)
@@ -232,6 +231,7 @@ class _RunLoop:
             remaining = [queued for queued in queue if queued.policy != record.policy]
             if self._watch is not None:
                 remaining = []  # without one side nothing can be compared
+                self._watch.give_up()
             queue.clear()
             queue.extend(remaining)
             return
