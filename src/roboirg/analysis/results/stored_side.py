@@ -10,11 +10,18 @@ import msgspec
 from roboirg.analysis.results.sources import opened_sources
 from roboirg.core.errors import InvalidValueError
 from roboirg.records.record_codec import encode, identity_key
+from roboirg.records.run_files import (
+    MOST_PLAN_BYTES,
+    keep_earlier_plan,
+    plan_names,
+    run_file,
+)
 from roboirg.records.store import RecordStore, check_same
 from roboirg.runs.job_instruction import other_versions
 from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_sections import StopRule
 from roboirg.runs.plan.stopping import key_without_policy
+from roboirg.util.regular_file import read_regular
 
 
 def against_stored(plan: Plan, given: str, folder: Path) -> Plan:
@@ -74,5 +81,9 @@ def against_stored(plan: Plan, given: str, folder: Path) -> Plan:
             for record in source.stored.records(missing):
                 copies.append(encode(msgspec.structs.replace(record, video=None, action_log=None)))
             store.extend(copies)
+        # Records name the plan that they were played for.
+        for plan_name in plan_names(source.folder):
+            content = read_regular(run_file(source.folder, plan_name), MOST_PLAN_BYTES)
+            keep_earlier_plan(content, folder)
     rule = plan.stop or StopRule()
     return plan.model_copy(update={"stop": replace(rule, against=name)})

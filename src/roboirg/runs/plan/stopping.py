@@ -295,15 +295,14 @@ class Stopping:
         verdicts = []
         for job in jobs:
             result = self.results.get(identity_key(job))
-            if result is None or self._is_tried_again(result):
+            if result is None:
+                return None
+            # The errors of a stored policy stay, as this run does not play it.
+            if self.attempts.has_left(result) and result.policy != self.rule.against:
                 return None
             is_error = result.outcome == "error"
             verdicts.append(np.nan if is_error else float(result.outcome == "success"))
         return float(np.mean(verdicts))
-
-    def _is_tried_again(self, result: Summary) -> bool:
-        attempts = self.attempts
-        return result.error in attempts.retry_on and result.attempt < attempts.tries
 
 
 def find_stopping(

@@ -26,6 +26,9 @@ class StopWatch:
         store: with the results so far.
         reporter: gets what was found after every look.
 
+    Attributes:
+        unneeded: jobs that are not in the queue now.
+
     Raises:
         InvalidValueError: the plan has nothing to compare.
     """
@@ -38,7 +41,7 @@ class StopWatch:
         self._store = store
         self._reporter = reporter
         self._found = find_stopping(plan.stop, plan.attempts, jobs, store.stored.values())
-        self._unneeded: list[Job] = []
+        self.unneeded: list[Job] = []
         reporter.compare(self._found)
 
     def in_order(self, jobs: Iterable[Job]) -> list[Job]:
@@ -50,17 +53,17 @@ class StopWatch:
         places = self._found.places
         needed = []
         unneeded = []
-        for job in (*jobs, *self._unneeded):
+        for job in (*jobs, *self.unneeded):
             if self._found.needs(job):
                 needed.append(job)
             else:
                 unneeded.append(job)
-        self._unneeded = unneeded
+        self.unneeded = unneeded
         return sorted(needed, key=lambda job: places[scene_of(job)])
 
     def give_up(self) -> None:
         """Play nothing more that is not queued, as a side cannot be reached."""
-        self._unneeded = []
+        self.unneeded = []
 
     def look(self, queue: deque[Job], job: Job) -> None:
         """Look at the results after one more job, and leave what is needed now in the queue.
