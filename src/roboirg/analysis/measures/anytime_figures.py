@@ -62,7 +62,7 @@ def anytime_figures(
     """
     is_until_decided = first.is_until_decided or second.is_until_decided
     p_values = []
-    intervals = []
+    intervals: list[Interval | None] = []
     every = []
     for group in groups:
         pairs = paired_scenes(group.cells, group.others, first.conditions.split)

@@ -42,9 +42,9 @@ def against_stored(plan: Plan, given: str, folder: Path) -> Plan:
         StoreError: the results are of other versions of language or environment.
     """
     if len(plan.policies) > 1:
-        names = ", ".join(policy.name for policy in plan.policies)
+        several = ", ".join(policy.name for policy in plan.policies)
         raise InvalidValueError(
-            f"--against compares one policy with a stored one, but this plan has several: {names}."
+            f"--against compares one policy with a stored one, but this plan has several: {several}."
         )
     planned = {key_without_policy(job) for job in plan.jobs()}
     with opened_sources([given]) as (source,):
