@@ -44,7 +44,7 @@ def against_stored(plan: Plan, given: str, folder: Path) -> Plan:
     if len(plan.policies) > 1:
         several = ", ".join(policy.name for policy in plan.policies)
         raise InvalidValueError(
-            f"--against compares one policy with a stored one, but this plan has several: {several}."
+            f"--against compares one policy with a stored one; this plan has several: {several}."
         )
     planned = {key_without_policy(job) for job in plan.jobs()}
     with opened_sources([given]) as (source,):
