@@ -72,7 +72,7 @@ def test_a_comparison_without_a_winner_says_how_many_episodes_would_show_such_a_
             "of this size needs about 92."
         ),
         KIND_OF_TEST,
-        "However often one looked: explicit p = 0.834.",
+        "However often one looked: explicit p = 0.874.",
     ]
 
 

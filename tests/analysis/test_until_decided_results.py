@@ -1,6 +1,7 @@
 """What tables, comparisons and the page make of a run that stopped when it was decided."""
 
 import pytest
+from made_records import make_record
 from run_fakes import FakePlay, changed, small_plan
 
 from roboirg.analysis.measures.breakdowns import BREAKDOWNS, break_down
@@ -13,7 +14,9 @@ from roboirg.analysis.results.sources import Source
 from roboirg.analysis.results.stored_side import against_stored
 from roboirg.analysis.run_results import Results
 from roboirg.core.errors import InvalidValueError
+from roboirg.records.merging import merge_runs
 from roboirg.runs.plan.plan_sections import StopRule
+from roboirg.runs.plan.stored_plans import write_plan
 from roboirg.runs.run.executor import InProcess
 from roboirg.runs.run.runner import run_plan
 
@@ -149,4 +152,76 @@ def test_stored_results_under_other_conditions_are_refused(tmp_path):
     plan = small_plan(2, policies=("oracle",))
 
     with pytest.raises(InvalidValueError, match="no result of an episode of this plan"):
+        against_stored(plan, str(tmp_path / "stored"), tmp_path / "new")
+
+
+def test_results_that_an_earlier_plan_left_in_the_folder_are_no_trials(tmp_path):
+    """The stored policy has seeds 0 and 1 there, and silent controls; the plan has seed 0 alone."""
+    earlier = changed(small_plan(8, seeds=2), settings="direct", arms="told,silent")
+    run_plan(earlier, tmp_path, FakePlay(), InProcess())
+    plan = changed(
+        small_plan(8, policies=("oracle",)), settings="direct", stop=StopRule(against="random")
+    )
+
+    run_plan(plan, tmp_path, FakePlay(), InProcess())
+
+    source = Source(tmp_path)
+    counts = {len(jobs) for scenes in source.stopping.trials.values() for jobs in scenes.values()}
+    assert counts == {1}
+    assert set(source.frame["arm"]) == {"told"}
+
+
+def test_only_scenes_that_the_stored_policy_has_are_played(tmp_path):
+    """It has played 4 of the 8 scenes, and one of these ended in an error that it had tries for."""
+    stored = changed(small_plan(4), settings="direct")
+
+    def play(job):
+        if job.episode == 0:
+            return make_record(job, "error", "lost", error="connection")
+        return FakePlay()(job)
+
+    run_plan(stored, tmp_path / "stored", play, InProcess())
+    again = changed(stored, tries=9)
+    plan = changed(small_plan(8, policies=("oracle",)), settings="direct", stop=StopRule(), tries=9)
+    folder = tmp_path / "new"
+    run_plan(again, folder, play, InProcess())
+    plan = against_stored(plan, str(tmp_path / "stored"), folder)
+
+    summary = run_plan(plan, folder, FakePlay(), InProcess())
+
+    assert (summary.played, summary.spared) == (4, 4)
+    (compared,) = Source(folder).stopping.compared
+    assert not compared.is_open
+    assert compared.decision.scenes == 3
+
+
+def test_a_merged_run_is_still_marked(stopped_run, tmp_path):
+    """A merged folder has the plans of its parts, but none of its own."""
+    merge_runs([stopped_run], tmp_path / "merged")
+
+    rows = summarize(cells_of(Source(tmp_path / "merged").frame))
+
+    assert len(rows) > 0
+    for row in rows.values():
+        assert row.key.policy_run.is_until_decided
+        assert row.interval is None
+
+
+def test_results_of_a_run_that_played_task_by_task_have_no_bounds(tmp_path):
+    """The first 8 of 16 scenes are no random half, so they do not say where the rest lies."""
+    plan = small_plan(16)
+    run_plan(small_plan(8), tmp_path, FakePlay(), InProcess())
+    write_plan(plan, tmp_path)
+
+    (figures,) = compare_settings(Source(tmp_path).frame).anytime
+
+    assert (figures.scenes, figures.planned, figures.interval) == (8, 16, None)
+    assert figures.text.endswith("after 8 of 16 scenes")
+
+
+def test_a_stored_side_is_refused_for_a_plan_of_two_policies(tmp_path):
+    run_plan(small_plan(2), tmp_path / "stored", FakePlay(), InProcess())
+    plan = small_plan(2, policies=("oracle", "listener"))
+
+    with pytest.raises(InvalidValueError, match="this plan has several: oracle, listener"):
         against_stored(plan, str(tmp_path / "stored"), tmp_path / "new")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import run_fakes
-from made_records import make_record
+from made_records import fill, make_record
 from run_fakes import changed, line_count, small_plan
 
 from roboirg.core.errors import InvalidValueError
@@ -19,6 +19,7 @@ from roboirg.records.store import read_results
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.plan.plan_sections import StopRule
 from roboirg.runs.plan.stopping import PlanScene, find_stopping, scene_of, scene_order
+from roboirg.runs.plan.stored_plans import read_plan
 from roboirg.runs.run.executor import InProcess, LocalProcesses
 from roboirg.runs.run.runner import run_plan
 
@@ -144,6 +145,56 @@ def test_an_error_that_stays_leaves_its_scene_out(tmp_path):
     (decision,) = found_in(tmp_path, plan)
     assert decision.finding == "first"
     assert decision.scenes == decision.places - 1
+
+
+def test_an_error_with_tries_left_is_played_again_even_if_others_are_not(tmp_path):
+    """Else all looks would wait for its scene, and the whole plan would be played for nothing."""
+    plan = two_policies()
+    first_scene = scene_order({scene_of(job) for job in plan.jobs()}, "test")[0]
+    (job,) = (job for job in plan.jobs() if scene_of(job) == first_scene and job.policy == "oracle")
+    fill(tmp_path, make_record(job, "error", "lost", error="connection", attempt=1))
+
+    summary = run_plan(plan, tmp_path, Lucky(), InProcess(), retry_errors=False)
+
+    (decision,) = found_in(tmp_path, plan)
+    assert decision.finding == "first"
+    assert decision.scenes == decision.places
+    assert summary.spared > 0
+
+
+def test_a_decision_that_an_error_played_again_opens_is_played_on(tmp_path):
+    """The policy that is better loses the scenes that had ended in its errors, when resumed."""
+    plan = two_policies()
+    order = scene_order({scene_of(job) for job in plan.jobs()}, "test")
+
+    def broken(job):
+        if job.policy == "random" and scene_of(job) in order[:4]:
+            return make_record(job, "error", "broken", error="policy")
+        return Lucky()(job)
+
+    def mended(job):
+        if job.policy == "random" and scene_of(job) in order[:4]:
+            return make_record(job, "failure", "picked the wrong cube")
+        return Lucky()(job)
+
+    run_plan(plan, tmp_path / "once", mended, InProcess())
+    earlier = run_plan(plan, tmp_path / "resumed", broken, InProcess())
+    resumed = run_plan(plan, tmp_path / "resumed", mended, InProcess())
+
+    assert resumed.spared < earlier.spared
+    assert resumed.missing == 0
+    assert found_in(tmp_path / "resumed", plan) == found_in(tmp_path / "once", plan)
+
+
+def test_a_plan_that_cannot_stop_is_not_written(tmp_path):
+    """Else the tables of what the folder holds already could not be made any more."""
+    full = small_plan(4, policies=("random", "oracle", "listener"))
+    run_plan(full, tmp_path, Lucky(), InProcess())
+
+    with pytest.raises(InvalidValueError, match="this plan has 3"):
+        run_plan(changed(full, stop=StopRule()), tmp_path, Lucky(), InProcess())
+
+    assert read_plan(tmp_path) == full
 
 
 def test_settings_of_one_policy_are_compared_with_explicit(tmp_path):

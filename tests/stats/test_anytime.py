@@ -12,6 +12,7 @@ from roboirg.stats.anytime import (
     PairedScenes,
     decide,
     mean_bounds,
+    p_in_any_order,
     p_path,
     sign_winnings,
     winnings_above,
@@ -43,6 +44,17 @@ def test_winnings_on_signs_are_those_of_a_beta_mixture_of_sign_tests():
 def test_ties_change_no_evidence():
     """A scene in which both fail, or both succeed, says nothing of who is better."""
     assert p_path(np.array([1.0, 1.0, 1.0]))[-1] == p_path(np.array([1.0, 0.0, 1.0, 0.0, 1.0]))[-1]
+
+
+def test_a_p_value_of_any_order_is_that_of_all_scenes_and_not_of_the_best_moment():
+    """After 6 wins and 6 losses nothing is won; after the wins alone the p-value was 0.19."""
+    wins_first = np.array([1.0] * 6 + [-1.0] * 6)
+
+    assert p_path(wins_first)[-1] < 0.2
+    assert p_in_any_order(wins_first) == 1.0
+    assert p_in_any_order(np.array([])) == 1.0
+    shuffled = np.array([1.0, -1.0, 1.0, 1.0, 1.0])
+    assert p_in_any_order(shuffled) == pytest.approx(p_in_any_order(np.sort(shuffled)))
 
 
 @given(SIGNS)

@@ -106,10 +106,10 @@ def run(
 
     add_working_directory(last=True)
     # The plan that is shown needs no policy, so it gets one as an example.
-    typed = context.obj
-    if until_decided or against is not None:
-        typed = {**typed, "stop": StopRule()}
-    made = _plan(plan, typed, usual=("oracle",) if show_plan else ())
+    usual = ("oracle",) if show_plan else ()
+    made = _plan(plan, context.obj, usual)
+    if made.stop is None and (until_decided or against is not None):
+        made = _plan(plan, {**context.obj, "stop": StopRule()}, usual)
     if show_plan:
         typer.echo(plan_text(made), nl=False)
         return

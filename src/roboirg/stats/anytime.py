@@ -154,6 +154,20 @@ def p_path(differences: Numbers) -> Numbers:
     return np.asarray(1 / np.maximum(most, 1.0))
 
 
+def p_in_any_order(differences: Numbers) -> float:
+    """Return the p-value of scenes that became known in another order, such as task by task.
+
+    The winnings are the same in every order, but how high they once were is not. So this is
+    1 / (the winnings now): it may rise again, and holds however often one looked.
+
+    Args:
+        differences: (n,) from -1 to 1.
+    """
+    if not len(differences):
+        return 1.0
+    return float(1 / max(sign_winnings(differences)[-1], 1.0))
+
+
 def sign_winnings(differences: Numbers) -> Numbers:
     """Return the winnings after each scene of bets on the sign of its difference.
 

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from roboirg.analysis.measures.measure import Measured
+from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.core.plain_text import counted
 from roboirg.runs.plan.stopping import PlanScene, scene_order
-from roboirg.stats.anytime import PairedScenes, mean_bounds, p_path
+from roboirg.stats.anytime import PairedScenes, mean_bounds, p_in_any_order, p_path
 from roboirg.stats.cells import ByTask, Cell
 from roboirg.stats.intervals import Interval
 from roboirg.stats.paired_tests import holm
@@ -22,19 +23,20 @@ class AnytimeFigures(NamedTuple):
 
     Attributes:
         p_holm: p-value, corrected over all that are tested together.
-        interval: 95 %, of the mean difference over all planned scenes.
+        interval: 95 %, of the mean difference over all planned scenes; None if those that were
+            played are no random part of these, as in a run that plays task by task.
         scenes: how many have results of both sides.
         planned: how many both sides are planned to have.
     """
 
     p_holm: float
-    interval: Interval
+    interval: Interval | None
     scenes: int
     planned: int
 
     @property
     def text(self) -> str:
-        """The p-value, and of an unfinished plan where its difference will lie.
+        """The p-value, and of an unfinished plan where its difference will lie, if known.
 
         For example ``p = 0.21 after 84 of 550 scenes (over all of them between −2.0 and +30.1
         points, 95 %)``.
@@ -42,28 +44,45 @@ class AnytimeFigures(NamedTuple):
         words = p_text(self.p_holm)
         if self.scenes == self.planned:
             return words
-        bounds = bounds_text(self.interval)
-        scenes = f"{self.scenes} of {counted(self.planned, 'scene')}"
-        return f"{words} after {scenes} (over all of them {bounds}, 95 %)"
+        words += f" after {self.scenes} of {counted(self.planned, 'scene')}"
+        if self.interval is None:
+            return words
+        return f"{words} (over all of them {bounds_text(self.interval)}, 95 %)"
 
 
-def anytime_figures(groups: Sequence[Measured[Any]], split: str) -> list[AnytimeFigures]:
+def anytime_figures(
+    groups: Sequence[Measured[Any]], first: PolicyRun, second: PolicyRun
+) -> list[AnytimeFigures]:
     """Return what each group shows against its reference at any time, corrected over all groups.
 
     Args:
         groups: that are tested together.
-        split: of their scenes.
+        first: that the groups are of.
+        second: that their references are of; the same one if these are another setting of it.
     """
-    every = [paired_scenes(group.cells, group.others, split) for group in groups]
+    is_until_decided = first.is_until_decided or second.is_until_decided
     p_values = []
-    for pairs in every:
-        path = p_path(pairs.differences)
-        p_values.append(float(path[-1]) if len(path) else 1.0)
+    intervals: list[Interval | None] = []
+    every = []
+    for group in groups:
+        pairs = paired_scenes(group.cells, group.others, first.conditions.split)
+        every.append(pairs)
+        in_order = _is_in_order(group.cells, first) and _is_in_order(group.others, second)
+        if is_until_decided and in_order:
+            p_values.append(float(p_path(pairs.differences).min(initial=1.0)))
+            intervals.append(mean_bounds(pairs))
+        else:
+            p_values.append(p_in_any_order(pairs.differences))
+            intervals.append(None)
     figures = []
-    for pairs, p_holm in zip(every, holm(p_values), strict=True):
-        scenes = len(pairs.differences)
-        figures.append(AnytimeFigures(p_holm, mean_bounds(pairs), scenes, pairs.planned))
+    for pairs, interval, p_holm in zip(every, intervals, holm(p_values), strict=True):
+        figures.append(AnytimeFigures(p_holm, interval, len(pairs.differences), pairs.planned))
     return figures
+
+
+def _is_in_order(cells: ByTask, policy_run: PolicyRun) -> bool:
+    """Return whether results are those of the first scenes of the random order, or of all."""
+    return policy_run.is_until_decided or not any(cell.missing for cell in cells.values())
 
 
 def paired_scenes(cells: ByTask, others: ByTask, split: str) -> PairedScenes:

@@ -110,7 +110,7 @@ def compare(first: Frame, second: Frame, breakdowns: Sequence[Breakdown] = ()) -
         # Labels stay in their order within each set of options.
         part.sort(key=lambda result: options_sort_key(result.key.options))
         parts[breakdown.title] = part
-    anytime = anytime_figures(averages, first_run.conditions.split)
+    anytime = anytime_figures(averages, first_run, second_run)
     return Comparison(first_run, second_run, averages, cells, anytime, parts)
 
 
@@ -140,7 +140,7 @@ def compare_settings(frame: Frame) -> Comparison:
             "episodes; name a second run to compare it with another policy."
         )
     cells_alone = [result for result in found if result.key.task is not None]
-    anytime = anytime_figures(averages, policy_run.conditions.split)
+    anytime = anytime_figures(averages, policy_run, policy_run)
     return Comparison(policy_run, policy_run, averages, cells_alone, anytime, {})
 
 

@@ -97,6 +97,8 @@ def _until_decided(comparison: Comparison, first: str, second: str) -> Iterator[
         "p-values and intervals hold however often one looked, after Holm's correction over these "
         "averages; p-values for a fixed number of episodes would not."
     )
+    if comparison.parts:
+        yield "Breakdowns are left out: theirs are for a fixed number of episodes."
     yield from _left_out(comparison.averages)
 
 

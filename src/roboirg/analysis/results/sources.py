@@ -18,7 +18,7 @@ from roboirg.records.run_files import run_folder
 from roboirg.records.store import StoredRun, iterate_records
 from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.stopping import Stopping, find_stopping
-from roboirg.runs.plan.stored_plans import read_plan
+from roboirg.runs.plan.stored_plans import read_plan, read_plans
 from roboirg.util.freed_memory import paused_collection
 
 
@@ -41,6 +41,11 @@ class FrameParts(NamedTuple):
 
 
 AnyJob = TypeVar("AnyJob", bound=Job)
+
+_UNKNOWN_FINDING = (
+    "what was found cannot be told here: the run was merged with others, or its scenes are private "
+    "and their salt is not known."
+)
 
 
 @dataclass(frozen=True)
@@ -125,7 +130,10 @@ class Source:
         """What the frame of the run is made of."""
         stopping = self.stopping
         if stopping is None:
-            return FrameParts(self.results, self.planned, None)
+            spared = None
+            if any(plan.stop is not None for plan in read_plans(self.folder)):
+                spared = Spared((_UNKNOWN_FINDING,), ())
+            return FrameParts(self.results, self.planned, spared)
         results = [result for result in self.results if stopping.needs(result)]
         planned = [job for job in self.planned if stopping.needs(job)]
         unneeded = [job for job in self.planned if not stopping.needs(job)]

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field
 from roboirg.core.errors import check_names
 from roboirg.core.field_types import MOST_COUNT, Label, described
 from roboirg.policies.contract.option_checking import Seconds
-from roboirg.records.record import ERROR_KINDS, ErrorKind
+from roboirg.records.record import ERROR_KINDS, ErrorKind, Summary
 from roboirg.runs.hosting.host_pool import DEFAULT_BATCH, HostSettings
 from roboirg.runs.plan.option_parsing import Names, parse_names
 from roboirg.stats.intervals import ALPHA
@@ -109,6 +109,10 @@ class Attempts:
         default=RETRYABLE,
         metadata=described("Kinds of errors after which an episode is played again; or none."),
     )
+
+    def has_left(self, result: Summary) -> bool:
+        """Return whether an episode with this result is to be played again."""
+        return result.error in self.retry_on and result.attempt < self.tries
 
 
 @dataclass(frozen=True, slots=True)

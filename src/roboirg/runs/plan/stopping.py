@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from roboirg.core.arms import TOLD
@@ -236,14 +237,18 @@ class Stopping:
         return all(decision.finding != "open" for decision in self.decisions)
 
     @cached_property
-    def _needed_places(self) -> Mapping[Side, int]:
-        """Of each side, how many scenes of the order are needed: all while a contrast is open."""
-        needed: dict[Side, int] = defaultdict(int)
+    def _needed(self) -> frozenset[RecordKey]:
+        """The jobs of the scenes that both sides of a contrast have, up to its decision."""
+        needed: set[RecordKey] = set()
         for contrast, decision in zip(self.contrasts, self.decisions, strict=True):
             places = len(self.order) if decision.finding == "open" else decision.places
-            for side in contrast:
-                needed[side] = max(needed[side], places)
-        return needed
+            first = self.trials[contrast.first]
+            second = self.trials[contrast.second]
+            for scene in self.order[:places]:
+                if scene in first and scene in second:
+                    needed.update(identity_key(job) for job in first[scene])
+                    needed.update(identity_key(job) for job in second[scene])
+        return frozenset(needed)
 
     def needs(self, job: Job) -> bool:
         """Return whether a job belongs to what is compared, up to where it was decided.
@@ -251,8 +256,7 @@ class Stopping:
         The results of others count nowhere, even if they were played: which episodes were, and how
         many, would depend on which ended first.
         """
-        place = self.places.get(scene_of(job))
-        return place is not None and place < self._needed_places.get(side_of(job), 0)
+        return identity_key(job) in self._needed
 
     def _paired(self, contrast: Contrast) -> PairedScenes:
         """Return the differences of two sides in the order of scenes, up to the first unknown."""
@@ -291,15 +295,14 @@ class Stopping:
         verdicts = []
         for job in jobs:
             result = self.results.get(identity_key(job))
-            if result is None or self._is_tried_again(result):
+            if result is None:
+                return None
+            # The errors of a stored policy stay, as this run does not play it.
+            if self.attempts.has_left(result) and result.policy != self.rule.against:
                 return None
             is_error = result.outcome == "error"
             verdicts.append(np.nan if is_error else float(result.outcome == "success"))
         return float(np.mean(verdicts))
-
-    def _is_tried_again(self, result: Summary) -> bool:
-        attempts = self.attempts
-        return result.error in attempts.retry_on and result.attempt < attempts.tries
 
 
 def find_stopping(
@@ -316,7 +319,11 @@ def find_stopping(
     """
     newest = {identity_key(result): result for result in results}
     compared: list[Job] = [*jobs]
-    compared += [result for result in newest.values() if result.policy == rule.against]
+    planned = {key_without_policy(job) for job in compared}
+    for result in newest.values():
+        # The folder may hold results of an earlier plan, too, of another split or seed.
+        if result.policy == rule.against and key_without_policy(result) in planned:
+            compared.append(result)
     trials: defaultdict[Side, defaultdict[PlanScene, list[Job]]] = defaultdict(
         lambda: defaultdict(list)
     )
@@ -324,6 +331,11 @@ def find_stopping(
         if job.arm == TOLD:
             trials[side_of(job)][scene_of(job)].append(job)
     return Stopping(rule, attempts, trials, newest)
+
+
+def key_without_policy(job: Job) -> RecordKey:
+    """Return what identifies a job but its policy: its episode, words, conditions and seed."""
+    return identity_key(msgspec.structs.replace(job, policy=""))
 
 
 def side_of(job: Job) -> Side:

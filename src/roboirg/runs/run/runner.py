@@ -106,27 +106,34 @@ def run_plan(
         _report_torn_line(store, reporter)
         _check_versions(plan, store.stored.values(), folder)
         _warn_of_untrained(plan, reporter)
-        write_plan(plan, folder)
-
-        todo = _jobs_to_play(jobs, store, retry_errors=retry_errors)
+        todo = _jobs_to_play(plan, jobs, store, retry_errors=retry_errors)
         watch = None
         if plan.stop is not None:
             watch = StopWatch(plan, jobs, store, reporter)
             todo = watch.in_order(todo)
+        write_plan(plan, folder)
         reporter.start(len(jobs), len(jobs) - len(todo), getattr(executor, "workers", None))
         loop = _RunLoop(plan, store, reporter, watch)
         loop.play(todo, play, executor)
         return loop.summary(jobs)
 
 
-def _jobs_to_play(jobs: Iterable[Job], store: RecordStore, *, retry_errors: bool) -> list[Job]:
-    """Return the jobs without a record, and with `retry_errors` those whose record is an error."""
+def _jobs_to_play(
+    plan: Plan, jobs: Iterable[Job], store: RecordStore, *, retry_errors: bool
+) -> list[Job]:
+    """Return the jobs without a record, and with `retry_errors` those whose record is an error.
+
+    If the plan stops when it is decided, its looks wait for errors with tries left in any case.
+    """
     todo = []
     for job in jobs:
         stored = store.stored.get(identity_key(job))
-        is_retried = retry_errors and stored is not None and stored.outcome == "error"
-        if stored is None or is_retried:
+        if stored is None:
             todo.append(job)
+        elif stored.outcome == "error":
+            is_awaited = plan.stop is not None and plan.attempts.has_left(stored)
+            if retry_errors or is_awaited:
+                todo.append(job)
     return todo
 
 
@@ -214,7 +221,8 @@ class _RunLoop:
             executor: where jobs are played.
         """
         queue = deque(todo)
-        jobs = {identity_key(job): job for job in todo}
+        unneeded = [] if self._watch is None else self._watch.unneeded  # until it is opened again
+        jobs = {identity_key(job): job for job in (*todo, *unneeded)}
         with contextlib.closing(executor.run(queue, play, self._reporter.warn)) as records:
             for record in records:
                 job = jobs[identity_key(record)]
@@ -232,6 +240,7 @@ class _RunLoop:
             remaining = [queued for queued in queue if queued.policy != record.policy]
             if self._watch is not None:
                 remaining = []  # without one side nothing can be compared
+                self._watch.give_up()
             queue.clear()
             queue.extend(remaining)
             return

@@ -18,13 +18,16 @@ from roboirg.runs.run.progress import Reporter
 class StopWatch:
     """Looks at the results of a run after every scene, and drops the jobs that need no playing.
 
-    It keeps nothing: what it finds depends on the plan and the stored results alone.
+    What it finds depends on the plan and the stored results alone.
 
     Args:
         plan: with a stop rule.
         jobs: of the plan.
         store: with the results so far.
         reporter: gets what was found after every look.
+
+    Attributes:
+        unneeded: jobs that are not in the queue now.
 
     Raises:
         InvalidValueError: the plan has nothing to compare.
@@ -38,16 +41,32 @@ class StopWatch:
         self._store = store
         self._reporter = reporter
         self._found = find_stopping(plan.stop, plan.attempts, jobs, store.stored.values())
+        self.unneeded: list[Job] = []
         reporter.compare(self._found)
 
     def in_order(self, jobs: Iterable[Job]) -> list[Job]:
-        """Return the jobs that are needed, scene by scene in the order of looks."""
+        """Return the jobs that are needed, scene by scene in the order of looks; keep the others.
+
+        They are needed after all if an episode is played again that had ended in an error, and its
+        result opens a comparison once more.
+        """
         places = self._found.places
-        needed = [job for job in jobs if self._found.needs(job)]
+        needed = []
+        unneeded = []
+        for job in (*jobs, *self.unneeded):
+            if self._found.needs(job):
+                needed.append(job)
+            else:
+                unneeded.append(job)
+        self.unneeded = unneeded
         return sorted(needed, key=lambda job: places[scene_of(job)])
 
+    def give_up(self) -> None:
+        """Play nothing more that is not queued, as a side cannot be reached."""
+        self.unneeded = []
+
     def look(self, queue: deque[Job], job: Job) -> None:
-        """Look at the results after one more job; drop the queued jobs that are not needed now.
+        """Look at the results after one more job, and leave what is needed now in the queue.
 
         Args:
             queue: changed in place, as the executor takes its next job from it.
@@ -57,15 +76,16 @@ class StopWatch:
             decision.places for decision in self._found.decisions if decision.finding == "open"
         ]
         # A result of any later scene changes nothing before the next scene is complete.
-        if self._found.places[scene_of(job)] != min(open_places, default=None):
+        place = self._found.places[scene_of(job)]
+        if place > min(open_places, default=place):
             return
         found = replace(self._found, results=dict(self._store.stored))
         if found.decisions == self._found.decisions:
             return
         self._found = found
-        remaining = [queued for queued in queue if found.needs(queued)]
+        needed = self.in_order(queue)
         queue.clear()
-        queue.extend(remaining)
+        queue.extend(needed)
         self._reporter.compare(found)
 
     def spared(self, jobs: Sequence[Job]) -> int:
