@@ -129,6 +129,15 @@ def test_a_task_of_few_scenes_counts_as_much_as_one_of_many():
     assert high == pytest.approx(0, abs=1e-5)
 
 
+def test_scenes_of_tasks_of_different_sizes_do_not_count_alike():
+    """The p-value is then of the sum over scenes, and the difference of the mean over tasks."""
+    same = PairedScenes(np.zeros(2), np.array([1.0, 1.0, 1.0, 1.0]))
+    different = PairedScenes(np.zeros(2), np.array([2.0, 2 / 3, 2 / 3, 2 / 3]))
+
+    assert same.is_even
+    assert not different.is_even
+
+
 def test_a_clear_difference_is_decided_long_before_the_last_scene():
     """20 wins in a row would come up once in half a million games of two equal sides."""
     (decision,) = decide([scenes_of(20 * [1.0], planned=550)])

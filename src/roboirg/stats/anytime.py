@@ -59,6 +59,12 @@ class PairedScenes(NamedTuple):
         """The number of scenes in which both sides are planned."""
         return int(np.count_nonzero(self.weights))
 
+    @property
+    def is_even(self) -> bool:
+        """Whether all planned scenes count alike, as tasks have equally many."""
+        planned = self.weights[self.weights > 0]
+        return not len(planned) or bool(np.allclose(planned, planned[0]))
+
     def first(self, places: int) -> PairedScenes:
         """Return what was known after so many places of the order."""
         return PairedScenes(self.differences[:places], self.weights)

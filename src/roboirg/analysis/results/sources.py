@@ -134,9 +134,12 @@ class Source:
             if any(plan.stop is not None for plan in read_plans(self.folder)):
                 spared = Spared((_UNKNOWN_FINDING,), ())
             return FrameParts(self.results, self.planned, spared)
-        results = [result for result in self.results if stopping.needs(result)]
-        planned = [job for job in self.planned if stopping.needs(job)]
-        unneeded = [job for job in self.planned if not stopping.needs(job)]
+        results = list(filter(stopping.needs, self.results))
+        planned = []
+        unneeded = []
+        for job in self.planned:
+            jobs = planned if stopping.needs(job) else unneeded
+            jobs.append(job)
         findings = tuple(compared.sentence for compared in stopping.compared)
         return FrameParts(results, planned, Spared(findings, unneeded))
 

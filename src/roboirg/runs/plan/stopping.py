@@ -119,6 +119,8 @@ class ComparedSides(NamedTuple):
         finding = findings[self.decision.finding]
         gap = points(mean_difference(seen), 1)
         words = f"{self.name}: {finding}, {gap} points, {p_text(self.decision.p_holm)}"
+        if not self.pairs.is_even:
+            words += " of the sum over scenes, as tasks differ in size"
         scenes = self.decision.scenes
         if scenes == self.planned:
             return f"{words}, all {counted(scenes, 'scene')}."
