@@ -21,7 +21,7 @@ ALL_SOURCE_FILES = [
 """The benchmark's files and those of the packages next to it."""
 
 MOST_ROOMS = 21
-MOST_ARROWS = 100
+MOST_ARROWS = 101
 
 MAY_IMPORT = {"reader": {"core", "tasks"}, "records": {"core", "util"}, "stats": {"core"}}
 """The reader is evidence; records are read without tasks or words; statistics need numbers."""

@@ -2,12 +2,8 @@
 
 import pytest
 
-from roboirg.analysis.results.option_labels import (
-    has_default_options,
-    options_label,
-    options_sort_key,
-)
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.analysis.results.option_labels import has_default_options, options_sort_key
+from roboirg.core.instruction_options import InstructionOptions, options_label
 from roboirg.language.settings import plain_settings, setting_names
 
 

@@ -11,7 +11,7 @@ from roboirg.main import app
 
 MOST_ENTRIES = 19
 MOST_COMMANDS = 30
-MOST_PARAMETERS = 150
+MOST_PARAMETERS = 151
 """What a reader can find their way in: entries of ``roboirg --help``, commands in all, options and
 arguments in all."""
 

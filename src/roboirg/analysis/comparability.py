@@ -187,3 +187,5 @@ def _explicit_differences(policy_run: PolicyRun, cell: Cell) -> Iterator[str]:
         yield counted(cell.errors, "error")
     if cell.missing:
         yield f"{counted(cell.missing, 'trial')} still to be played"
+    if cell.spared:
+        yield f"{counted(cell.spared, 'trial')} not played, as it was decided"

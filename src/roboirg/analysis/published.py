@@ -13,8 +13,8 @@ from typing import Literal, NamedTuple, cast
 
 import numpy as np
 
-from roboirg.analysis.results.option_labels import options_label, staged_options
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.analysis.results.option_labels import staged_options
+from roboirg.core.instruction_options import InstructionOptions, options_label
 from roboirg.stats.intervals import TaskRates
 from roboirg.stats.rates import DIGITS, mean_percent
 

@@ -15,7 +15,6 @@ from roboirg.analysis.measures.comparison_text import sentences
 from roboirg.analysis.measures.measure import ALL_TASKS
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.frame import COLUMNS, MISSING
-from roboirg.analysis.results.option_labels import options_label
 from roboirg.analysis.results.reading import read_frame, record_columns
 from roboirg.analysis.results.sources import Source, opened_sources
 from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
@@ -23,6 +22,7 @@ from roboirg.analysis.tables.rendering import get_format
 from roboirg.analysis.tables.table_notes import with_mixtures
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.extras import extra_needed
+from roboirg.core.instruction_options import options_label
 from roboirg.core.plain_text import counted
 from roboirg.records.record import Record, Summary
 from roboirg.records.run_files import run_folder
@@ -59,7 +59,7 @@ def results(*paths: str | Path) -> pd.DataFrame:
         import pandas as pd
     with opened_sources(paths) as sources:
         frame = read_frame(sources, words=True)
-    played = frame.take(frame["outcome"] != MISSING)
+    played = frame.take(frame.is_played)
     series = {}
     for column in (*COLUMNS.values(), *record_columns().values()):
         values = pd.Series(played[column.name])

@@ -229,8 +229,13 @@ def compare(
         str, typer.Argument(help="A run's folder, a pack, or RUN:policy.", metavar="A")
     ],
     second: Annotated[
-        str, typer.Argument(help="Another one, or another policy of the same run.", metavar="B")
-    ],
+        str | None,
+        typer.Argument(
+            help="Another one, or another policy of the same run. Without it the settings of A are "
+            "compared with explicit.",
+            metavar="B",
+        ),
+    ] = None,
     by: By = None,
 ) -> None:
     """Compare two policies on the same episodes and say where one is clearly better.
@@ -248,6 +253,9 @@ def compare(
 
     breakdowns = _breakdowns(by)
     needs_words = bool(breakdowns)
+    if second is None:
+        _print_settings(first, by)
+        return
     with opened_sources([first]) as sources, opened_sources([second]) as other_sources:
         frame = read_frame(sources, words=needs_words)
         other_frame = read_frame(other_sources, words=needs_words)
@@ -262,6 +270,36 @@ def compare(
     console = Console()
     widen(console)
     for line in _comparison_lines(comparison, (frame, other_frame), (name, other_name)):
+        console.print(Text(line), highlight=False)
+
+
+def _print_settings(run: str, by: str | None) -> None:
+    """Print how the settings of a policy differ from explicit.
+
+    Args:
+        run: as typed, of one policy.
+        by: as typed; breakdowns are of two policies.
+    """
+    from rich.console import Console
+    from rich.text import Text
+
+    from roboirg.analysis.measures.comparison import compare_settings
+    from roboirg.analysis.measures.comparison_text import sentences
+    from roboirg.analysis.results.reading import read_frame
+    from roboirg.analysis.results.sources import opened_sources
+    from roboirg.cli.run_commands import warn_of_mixtures
+    from roboirg.util.console_width import widen
+
+    if by is not None:
+        raise InvalidValueError("--by compares two policies; name the second, too.")
+    with opened_sources([run]) as sources:
+        frame = read_frame(sources)
+    comparison = compare_settings(frame)
+    warn_of_mixtures(frame)
+    console = Console()
+    widen(console)
+    policy = comparison.first.marked_policy
+    for line in sentences(comparison, policy, policy):
         console.print(Text(line), highlight=False)
 
 

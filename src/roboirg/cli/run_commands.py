@@ -49,7 +49,7 @@ Folder = Annotated[str, typer.Argument(help="Output folder of a run.")]
 RetryErrors = Annotated[
     bool,
     typer.Option(
-        help="Play episodes again if their newest record is an error.",
+        help="Replay episodes that ended in an error.",
     ),
 ]
 
@@ -69,6 +69,17 @@ def run(
         str, typer.Option(help="Where to play: local, or ray (cluster address in RAY_ADDRESS).")
     ] = "local",
     retry_errors: RetryErrors = True,
+    until_decided: Annotated[
+        bool,
+        typer.Option(
+            "--until-decided",
+            help="Stop once it is clear how policies or settings differ.",
+        ),
+    ] = False,
+    against: Annotated[
+        str | None,
+        typer.Option(help="Likewise, against RUN:POLICY.", show_default=False),
+    ] = None,
     dry_run: Annotated[
         bool,
         typer.Option("--dry-run", help="Only check, and count episodes and calls of models."),
@@ -85,15 +96,20 @@ def run(
     Example: roboirg run --policy oracle --tasks PickXtimes --out runs/first
     """
     from roboirg.analysis.results.sources import Source
+    from roboirg.analysis.results.stored_side import against_stored
     from roboirg.records.run_files import run_folder
     from roboirg.runs.plan.plan_file import plan_text
+    from roboirg.runs.plan.plan_sections import StopRule
     from roboirg.runs.play.prompt_shares import prompt_shares, warning_lines
     from roboirg.runs.play.video_writer import check_video_support
     from roboirg.runs.run.runner import check_run
 
     add_working_directory(last=True)
     # The plan that is shown needs no policy, so it gets one as an example.
-    made = _plan(plan, context.obj, usual=("oracle",) if show_plan else ())
+    usual = ("oracle",) if show_plan else ()
+    made = _plan(plan, context.obj, usual)
+    if made.stop is None and (until_decided or against is not None):
+        made = _plan(plan, {**context.obj, "stop": StopRule()}, usual)
     if show_plan:
         typer.echo(plan_text(made), nl=False)
         return
@@ -111,6 +127,11 @@ def run(
     if dry_run:
         _print_counts(made, folder)
         return
+    if against is not None:
+        made = against_stored(made, against, folder)
+    if made.stop is not None and len(made.policies) > 1:
+        names = " and ".join(policy.name for policy in made.policies)
+        typer.echo(f"Scene by scene, so {names} stay loaded at the same time.", err=True)
     for line in warning_lines(prompt_shares(made.jobs())):
         typer.echo(line, err=True)
     summary = play(made, folder, chosen, retry=retry_errors)

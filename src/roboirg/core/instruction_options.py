@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypedDict
 
 from roboirg.core.field_types import Label, Stages, Whole, described
+from roboirg.core.plain_text import counted
 
 ALL_STAGES = (1, 2, 3, 4, 5)
 DEFAULT_DISTRACTOR = "neutral"
@@ -106,3 +107,33 @@ def as_fields(given: Mapping[str, Any]) -> dict[str, Any]:
         stages = values["stages"]
         values["stages"] = tuple(stages) if isinstance(stages, Iterable) else (stages,)
     return values
+
+
+_DEFAULTS = InstructionOptions()
+_PHRASES: dict[str, Callable[[Any], str]] = {
+    "form": str,
+    "stages": lambda stages: "stages " + ",".join(map(str, stages)),
+    "distractor": "{} distractor".format,
+    "distractors": lambda count: counted(count, "distractor"),
+    "frame": "{} frame".format,
+    "delivery": "in {}".format,
+}
+"""How labels name the value of an option; of any other option, by its name."""
+
+
+def options_label(options: InstructionOptions) -> str:
+    """Return how instruction options are printed: ``relational (resolved, 2 distractors)``.
+
+    In brackets behind the setting are the options that differ from their defaults.
+    """
+    phrases = []
+    for name, value in asdict(options).items():
+        is_default = value == getattr(_DEFAULTS, name)
+        if is_default or name in ("setting", "wordings"):
+            continue
+        phrase_of = _PHRASES.get(name, f"{name} {{}}".format)
+        phrases.append(phrase_of(value))
+
+    if not phrases:
+        return options.setting
+    return f"{options.setting} ({', '.join(phrases)})"

@@ -30,6 +30,7 @@ class Counts(NamedTuple):
         episodes: episodes with a verdict.
         errors: trials that ended in an error and are in no rate.
         missing: planned trials without a result.
+        spared: planned trials that need no result, as what the run compares was decided before.
     """
 
     successes: int = 0
@@ -37,11 +38,12 @@ class Counts(NamedTuple):
     episodes: int = 0
     errors: int = 0
     missing: int = 0
+    spared: int = 0
 
     @property
     def is_complete(self) -> bool:
         """Whether every planned trial has a verdict."""
-        return self.trials > 0 and not self.errors and not self.missing
+        return self.trials > 0 and not (self.errors or self.missing or self.spared)
 
 
 @dataclass(slots=True, eq=False)
@@ -52,18 +54,21 @@ class Cell:
         verdicts: for each trial with a verdict, whether it succeeded.
         errors: number of trials that ended in an error.
         missing: number of planned trials without a result.
+        spared: number of those that need none.
     """
 
     verdicts: dict[Trial, bool] = field(default_factory=dict)
     errors: int = 0
     missing: int = 0
+    spared: int = 0
 
     def add(self, trial: Trial, outcome: str) -> None:
         """Count a trial by its outcome; success and failure are verdicts, of which rates are made.
 
         Args:
             trial: the episode and the policy seed.
-            outcome: ``success``, ``failure``, ``error``, or ``missing`` if it was not played.
+            outcome: ``success``, ``failure``, ``error``, ``missing`` if it was not played, or
+                ``spared`` if it need not be.
 
         Raises:
             InvalidValueError: the outcome is none of these.
@@ -74,10 +79,12 @@ class Cell:
             self.errors += 1
         elif outcome == "missing":
             self.missing += 1
+        elif outcome == "spared":
+            self.spared += 1
         else:
             raise InvalidValueError(
-                f"The column 'outcome' has {outcome!r}; it must be success, failure, error or "
-                "missing."
+                f"The column 'outcome' has {outcome!r}; it must be success, failure, error, "
+                "missing or spared."
             )
 
     @property
@@ -89,6 +96,7 @@ class Cell:
             episodes=len({trial.episode for trial in self.verdicts}),
             errors=self.errors,
             missing=self.missing,
+            spared=self.spared,
         )
 
     @property

@@ -73,6 +73,11 @@ def interval_note(interval: Interval | None) -> str:
     return f" (95 % interval {low} to {high})"
 
 
+def bounds_text(interval: Interval) -> str:
+    """Return where a difference lies over a whole plan: ``between −8.1 and +2.0 points``."""
+    return f"between {points(interval.low, 1)} and {points(interval.high, 1)} points"
+
+
 def p_text(p_value: float) -> str:
     """Return a p-value with its sign, rounded half up: ``p = 0.012``, ``p < 0.001``."""
     return f"p < {_SMALLEST_P}" if p_value < _SMALLEST_P else f"p = {half_up(p_value, 3)}"

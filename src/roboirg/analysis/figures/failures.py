@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from roboirg.analysis.figures.figure_style import paper
 from roboirg.analysis.figures.panels import Panel, RowLabel, panels
 from roboirg.analysis.measures.run_data import RunData
-from roboirg.analysis.results.option_labels import options_label, options_sort_key
+from roboirg.analysis.results.option_labels import options_sort_key
 from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.analysis.tables.diagnostic_tables import (
     FAILURE_KINDS,
@@ -18,7 +18,7 @@ from roboirg.analysis.tables.diagnostic_tables import (
     occurring_failures,
 )
 from roboirg.analysis.tables.table_notes import where_played
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions, options_label
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

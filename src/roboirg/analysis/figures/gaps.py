@@ -23,12 +23,11 @@ from roboirg.analysis.measures.measure import mean_rate, pair
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.published import TRIALS, PublishedRow, RateTable, published_rows
 from roboirg.analysis.results.frame import RunNames
-from roboirg.analysis.results.option_labels import options_label
 from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.analysis.results.run_cells import CellKey, Cells
 from roboirg.analysis.tables.table_kinds import PAPER_TABLES, row_order, stages_text
 from roboirg.analysis.tables.table_notes import where_played
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions, options_label
 from roboirg.stats.cells import NOTHING, ByTask, Cell, rate_interval
 from roboirg.stats.paired_tests import measure_gap
 
@@ -157,7 +156,10 @@ class _Columns:
                     cells = {task: by_task[task] for task in names}
                     # The reference is not compared with itself.
                     others = NOTHING if options == self.reference else at_reference
-                    rates[self.title(options)] = _rate(cells, others)
+                    rate = _rate(cells, others)
+                    if policy_run.is_until_decided:
+                        rate = rate._replace(interval=None)
+                    rates[self.title(options)] = rate
             if rates:
                 rates_of_runs[policy_run] = rates
         return rates_of_runs

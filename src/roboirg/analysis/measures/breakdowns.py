@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from roboirg.analysis.measures.measure import Measured, measure_groups
+from roboirg.analysis.measures.measure import Measured, measure_groups, only_what_holds
 from roboirg.analysis.results.frame import Frame
 from roboirg.analysis.results.option_labels import (
     REFERENCE_OPTIONS,
@@ -111,7 +111,8 @@ def break_down(frame: Frame, breakdown: Breakdown) -> tuple[Measured[LabelKey], 
 
     keys = sorted(map(LabelKey._make, by_label), key=sort_key)
     groups = {key: by_label[key] for key in keys}
-    return measure_groups(groups, explicit, family=lambda key: key.run)
+    measured = measure_groups(groups, explicit, family=lambda key: key.run)
+    return tuple(only_what_holds(row, row.key.run) for row in measured)
 
 
 def natural(text: str) -> list[tuple[bool, int, str]]:

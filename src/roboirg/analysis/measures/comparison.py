@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from roboirg.analysis.measures.anytime_figures import AnytimeFigures, anytime_figures
 from roboirg.analysis.measures.breakdowns import Breakdown, labeled, natural
 from roboirg.analysis.measures.measure import Measured, measure_groups
-from roboirg.analysis.results.frame import MISSING, Frame
+from roboirg.analysis.results.frame import Frame
 from roboirg.analysis.results.option_labels import (
     REFERENCE_OPTIONS,
     SortKey,
@@ -17,7 +18,7 @@ from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.records.mixing import FAIRNESS, differing
-from roboirg.stats.cells import ByTask, Key, gather
+from roboirg.stats.cells import NOTHING, ByTask, Key, gather
 
 
 class ComparisonKey(NamedTuple):
@@ -54,6 +55,7 @@ class Comparison(NamedTuple):
         second: the other.
         averages: for each set of options, the unweighted mean over the tasks that both played.
         cells: for each task and set of options.
+        anytime: of each average, what holds however often one looked.
         parts: by the title of a breakdown, the averages over the instructions of each label.
     """
 
@@ -61,7 +63,18 @@ class Comparison(NamedTuple):
     second: PolicyRun
     averages: Sequence[Compared]
     cells: Sequence[Compared]
+    anytime: Sequence[AnytimeFigures]
     parts: Mapping[str, Sequence[Compared]]
+
+    @property
+    def is_of_settings(self) -> bool:
+        """Whether settings of one policy are compared with explicit."""
+        return self.first is self.second
+
+    @property
+    def is_until_decided(self) -> bool:
+        """Whether the run of a policy stopped when it was decided."""
+        return self.first.is_until_decided or self.second.is_until_decided
 
 
 def compare(first: Frame, second: Frame, breakdowns: Sequence[Breakdown] = ()) -> Comparison:
@@ -97,7 +110,38 @@ def compare(first: Frame, second: Frame, breakdowns: Sequence[Breakdown] = ()) -
         # Labels stay in their order within each set of options.
         part.sort(key=lambda result: options_sort_key(result.key.options))
         parts[breakdown.title] = part
-    return Comparison(first_run, second_run, averages, cells, parts)
+    anytime = anytime_figures(averages, first_run, second_run)
+    return Comparison(first_run, second_run, averages, cells, anytime, parts)
+
+
+def compare_settings(frame: Frame) -> Comparison:
+    """Compare every setting that a policy played with explicit, which names the goal.
+
+    Both sides of the comparison are the same policy run.
+
+    Raises:
+        InvalidValueError: there are several policies or versions, or explicit or anything else was
+            not played.
+    """
+    frame = frame.without_control_arms()
+    policy_run = _only_policy_run(frame)
+    groups = dict(_groups(frame, ()))
+    settings = {}
+    explicit = {}
+    for key, cells in groups.items():
+        if key.options != REFERENCE_OPTIONS:
+            settings[key] = cells
+            explicit[key] = groups.get(key._replace(options=REFERENCE_OPTIONS), NOTHING)
+    found = _measure(settings, explicit)
+    averages = [result for result in found if result.key.is_average]
+    if not averages:
+        raise InvalidValueError(
+            f"{policy_run.policy} has not played explicit and another setting in the same "
+            "episodes; name a second run to compare it with another policy."
+        )
+    cells_alone = [result for result in found if result.key.task is not None]
+    anytime = anytime_figures(averages, policy_run, policy_run)
+    return Comparison(policy_run, policy_run, averages, cells_alone, anytime, {})
 
 
 def _measure(
@@ -187,7 +231,7 @@ def _check_fair(first: Frame, second: Frame) -> None:
         InvalidValueError: one has no results, or they were played under different conditions.
     """
     for frame in (first, second):
-        if set(frame["outcome"]) <= {MISSING}:
+        if not frame.is_played.any():
             raise InvalidValueError("One of the two policies has no results yet.")
     differences = list(differing([*first.played, *second.played], FAIRNESS))
     if differences:

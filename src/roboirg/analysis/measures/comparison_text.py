@@ -5,11 +5,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import Self, cast
 
 from roboirg.analysis.measures.comparison import Compared, Comparison
-from roboirg.analysis.results.option_labels import options_label
+from roboirg.core.instruction_options import options_label
 from roboirg.core.plain_text import counted, verb_for
+from roboirg.language.settings import EXPLICIT
 from roboirg.stats.intervals import ALPHA
 from roboirg.stats.paired_tests import Gap
 from roboirg.stats.power import (
@@ -32,14 +33,20 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
         first: label of the first policy.
         second: label of the second policy.
     """
-    averages = [_Result(average, first, second) for average in comparison.averages]
-    cells = [_Result(cell, first, second) for cell in comparison.cells]
+    if comparison.is_until_decided:
+        yield from _until_decided(comparison, first, second)
+        return
+    averages = [_Result.of(comparison, row, first, second) for row in comparison.averages]
+    cells = [_Result.of(comparison, row, first, second) for row in comparison.cells]
     breakdowns = {}
     for title, part in comparison.parts.items():
         breakdowns[title] = [_Result(row, first, second) for row in part]
     has_several_tasks = any(average.gap.tasks > 1 for average in averages)
 
-    yield f"{first} against {second}, on the same episodes."
+    if comparison.is_of_settings:
+        yield f"{first}, every setting against explicit on the same episodes."
+    else:
+        yield f"{first} against {second}, on the same episodes."
     yield ""
     for average in averages:
         yield average.sentence
@@ -55,8 +62,43 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
     yield ""
     results = itertools.chain(averages, *breakdowns.values())
     yield from _p_value_notes(results, has_several_tasks=has_several_tasks)
+    yield f"However often one looked: {'; '.join(_anytime_texts(comparison))}."
     if breakdowns:
         yield "Each breakdown is corrected separately, over all its rows."
+    yield from _left_out(comparison.averages)
+
+
+def _anytime_texts(comparison: Comparison) -> Iterator[str]:
+    """Yield of each average what holds however often one looked: ``direct p = 0.021``."""
+    for average, figures in zip(comparison.averages, comparison.anytime, strict=True):
+        yield f"{options_label(average.key.options)} {figures.text}"
+
+
+def _until_decided(comparison: Comparison, first: str, second: str) -> Iterator[str]:
+    """Yield the comparison of policies of which one played until it was decided.
+
+    The number of its episodes depends on their results, so only what holds at any time is printed.
+    """
+    if comparison.is_of_settings:
+        yield f"{first}, every setting against explicit; its run stopped when decided."
+    else:
+        yield f"{first} against {second}, on the same episodes; at least one stopped when decided."
+    yield ""
+    for average, figures in zip(comparison.averages, comparison.anytime, strict=True):
+        result = _Result.of(comparison, average, first, second)
+        gap = result.gap.value
+        finding = "no clear difference"
+        if figures.p_holm <= ALPHA:
+            finding = f"{result.better} is better"
+        label = options_label(average.key.options)
+        yield f"{label}: {finding}, {points(gap, 1)} points, {figures.text}."
+    yield ""
+    yield (
+        "p-values and intervals hold however often one looked, after Holm's correction over these "
+        "averages; p-values for a fixed number of episodes would not."
+    )
+    if comparison.parts:
+        yield "Breakdowns are left out: theirs are for a fixed number of episodes."
     yield from _left_out(comparison.averages)
 
 
@@ -111,6 +153,18 @@ class _Result:
     first: str
     second: str
 
+    @classmethod
+    def of(cls, comparison: Comparison, result: Compared, first: str, second: str) -> Self:
+        """Return a result of a comparison; a setting that is compared with explicit is a side."""
+        if comparison.is_of_settings:
+            return cls(result, options_label(result.key.options), EXPLICIT)
+        return cls(result, first, second)
+
+    @property
+    def better(self) -> str:
+        """The side with the higher rate."""
+        return self.first if self.gap.value > 0 else self.second
+
     @property
     def gap(self) -> Gap:
         return cast("Gap", self.result.gap)  # results without one are left out
@@ -144,8 +198,7 @@ class _Result:
             subject += f", {key.label}"
         if not self.is_decided:
             return f"{subject}: no clear difference, {self._figures}.{self._outlook}"
-        better = self.first if self.gap.value > 0 else self.second
-        return f"{subject}: {better} is better, {self._figures}."
+        return f"{subject}: {self.better} is better, {self._figures}."
 
     @property
     def _figures(self) -> str:
@@ -199,7 +252,7 @@ def _left_out(averages: Iterable[Compared]) -> Iterator[str]:
     for average in averages:
         for cell in (*average.cells.values(), *average.others.values()):
             unpaired += len(cell.verdicts)
-            unjudged += cell.errors + cell.missing
+            unjudged += cell.errors + cell.missing + cell.spared
         if average.gap is not None:
             unpaired -= average.gap.trials  # paired trials, counted for both policies
     if unpaired:

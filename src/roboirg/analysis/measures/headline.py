@@ -86,6 +86,11 @@ def headline_notes(cells: Cells, names: RunNames) -> Iterator[str]:
                 f"{name} has no headline number: the floors are those of our own words of each "
                 f"split, and it was played in {policy_run.conditions.text('wordings')}."
             )
+        elif policy_run.is_until_decided:
+            yield (
+                f"{name} has no headline number: its run stopped when it was decided; play the "
+                "whole plan for one."
+            )
         elif headline.interval is None:
             episodes = counted(headline.episodes, "episode")
             yield (
@@ -136,7 +141,7 @@ class _TaskCells(NamedTuple):
     def is_complete(self) -> bool:
         """Whether every planned trial has a verdict."""
         cells = (self.explicit, *self.in_settings)
-        return not any(cell.errors or cell.missing for cell in cells)
+        return not any(cell.errors or cell.missing or cell.spared for cell in cells)
 
 
 def _tasks_in_settings(

@@ -7,7 +7,7 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
-from roboirg.analysis.results.frame import MISSING, Frame, RunNames
+from roboirg.analysis.results.frame import UNPLAYED, Frame, RunNames
 from roboirg.core.plain_text import counted
 from roboirg.stats.cells import Key, rows_of
 from roboirg.stats.rates import percent_range
@@ -27,7 +27,7 @@ def count_heard(frame: Frame, by: Sequence[str]) -> Mapping[Key, HeardCounts]:
     counts_by_key: defaultdict[Key, HeardCounts] = defaultdict(Counter)
     runs_with_limit = set()
     for run, *values, prompt, outcome in rows_of(frame, "run", *by, "prompt", "outcome"):
-        if outcome == MISSING:
+        if outcome in UNPLAYED:
             continue
         # Adds 1 to both: all episodes, and those with this prompt (heard, cut or unknown).
         counts_by_key[run, *values].update(("episodes", prompt))
@@ -42,7 +42,7 @@ def heard_notes(frame: Frame, names: RunNames) -> list[str]:
     Prompts count that were cut at the limit of the policy's model, and those that may have been.
     """
     counts = count_heard(frame, ())
-    played = frame.take([outcome != MISSING for outcome in frame["outcome"]])
+    played = frame.take(frame.is_played)
     episodes = Counter(played["run"])
     guesses = Counter(itertools.compress(frame["run"], frame["guessed"]))
     notes = []

@@ -224,7 +224,7 @@ def _trials_in(groups: Mapping[Key, ByTask]) -> int:
     trials = 0
     for by_task in groups.values():
         for cell in by_task.values():
-            trials += len(cell.verdicts) + cell.errors + cell.missing
+            trials += len(cell.verdicts) + cell.errors + cell.missing + cell.spared
     return trials
 
 
@@ -426,7 +426,17 @@ def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
         lambda key: with_options(key, replace(key.options, form="resolved")),
         family=lambda key: (key.policy_run, families[key.scope]),
     )
-    return {summary.key: summary for summary in found}
+    return {row.key: only_what_holds(row, row.key.policy_run) for row in found}
+
+
+def only_what_holds(row: Measured[K], policy_run: PolicyRun) -> Measured[K]:
+    """Return a row without intervals and p-values if its run stopped when it was decided.
+
+    They are for a number of episodes that does not depend on the results.
+    """
+    if not policy_run.is_until_decided:
+        return row
+    return replace(row, interval=None, gap=None, second_gap=None, p_holm=None)
 
 
 def _families(scopes: Mapping[ScopeKey, ByTask]) -> dict[str, str]:

@@ -47,6 +47,8 @@ class RunData:
         These ended in an error or were not played.
         """
         label = self.frame.names[policy_run]
+        if policy_run.is_until_decided:
+            return label
         for key, cell in self.cells.items():
             if key.policy_run == policy_run and not cell.counts.is_complete:
                 return f"{label} (incomplete)"

@@ -12,10 +12,10 @@ from typing import NamedTuple, get_args
 
 from roboirg.analysis.page.episodes import PageEpisodes
 from roboirg.analysis.results.frame import suite, task_order
-from roboirg.analysis.results.option_labels import options_label, options_sort_key
+from roboirg.analysis.results.option_labels import options_sort_key
 from roboirg.analysis.tables.diagnostic_tables import FAILURE_KINDS, UNATTRIBUTED
 from roboirg.core.episode import DIFFICULTIES
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions, options_label
 from roboirg.language import FORMS
 from roboirg.records.mixing import FAIRNESS
 from roboirg.records.record import ERROR_KINDS, Outcome, Summary

@@ -70,7 +70,11 @@ class PageEpisodes:
         frames = []
         for name, source in _named(runs):
             if name:
-                frames.append(make_frame([(name, source.results)], source.planned, run_name=name))
+                parts = source.frame_parts
+                spared = parts.spared_of(name)
+                frames.append(
+                    make_frame([(name, parts.results)], parts.planned, run_name=name, spared=spared)
+                )
             else:
                 frames.append(source.frame)
         frame = join(frames)

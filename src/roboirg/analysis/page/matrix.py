@@ -14,10 +14,10 @@ from roboirg.analysis.measures.measure import (
 from roboirg.analysis.page.columns import setting_label
 from roboirg.analysis.page.episodes import JsonObject, PageEpisodes
 from roboirg.analysis.results.frame import suite, task_order
-from roboirg.analysis.results.option_labels import options_label, options_sort_key
+from roboirg.analysis.results.option_labels import options_sort_key
 from roboirg.analysis.results.run_cells import Cells, cells_of
 from roboirg.core.episode import DIFFICULTIES
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions, options_label
 from roboirg.core.plain_text import counted
 from roboirg.stats.intervals import TOO_FEW, Interval
 from roboirg.stats.rates import interval_note, p_text, points, whole_percent
@@ -140,6 +140,8 @@ def _cell(summary: ScopeSummary, subject: str) -> JsonObject:
         cell["errors"] = summary.counts.errors
     if summary.counts.missing:
         cell["missing"] = summary.counts.missing
+    if summary.counts.spared:
+        cell["spared"] = summary.counts.spared
     return cell
 
 
@@ -160,12 +162,17 @@ def notes(summary: ScopeSummary, subject: str) -> list[str]:
             f"{whole_percent(summary.rate)} % success{mean}: {counts.successes} of "
             f"{counted(counts.trials, 'trial')}, {counted(counts.episodes, 'episode')}"
         )
-        lines.append(_interval_note(summary.interval))
+        if summary.key.policy_run.is_until_decided:
+            lines.append("no interval: the run stopped when it was decided")
+        else:
+            lines.append(_interval_note(summary.interval))
     lines += _gap_notes(summary)
     if counts.errors:
         lines.append(f"{counted(counts.errors, 'error')} left out of the rates")
     if counts.missing:
         lines.append(f"{counts.missing} still to be played")
+    if counts.spared:
+        lines.append(f"{counts.spared} need not be played")
     return lines
 
 

@@ -14,6 +14,7 @@ from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.page.columns import make_filters, make_numbers
 from roboirg.analysis.page.details import EpisodeDetails
 from roboirg.analysis.page.episodes import JsonObject, PageEpisodes
+from roboirg.analysis.page.evidence_paths import evidence_paths
 from roboirg.analysis.page.matrix import make_matrix
 from roboirg.analysis.page.run_warnings import comparisons, facts_of, run_warnings
 from roboirg.analysis.results.frame import Frame
@@ -159,6 +160,7 @@ def _render(
         name=" against ".join(episodes.runs),
         facts=facts_of(episodes),
         warnings=run_warnings(episodes),
+        paths=list(evidence_paths(episodes.runs.values())),
         breakdowns=_breakdown_tables(frame),
         failures=_tables_with_rows(lambda: make_failure_table(episodes.data, means=True)),
         links_videos=details.links_videos,

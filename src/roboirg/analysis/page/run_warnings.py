@@ -15,6 +15,7 @@ from roboirg.analysis.measures.heard_rates import heard_notes
 from roboirg.analysis.page.episodes import JsonObject, PageEpisodes
 from roboirg.analysis.results.frame import MISSING
 from roboirg.analysis.results.policy_run import PolicyRun
+from roboirg.analysis.tables.table_notes import findings_of
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.core.word_pools import words_label
@@ -56,7 +57,7 @@ def run_warnings(episodes: PageEpisodes) -> list[Notice]:
     warnings = list(_incomplete(episodes))
     warnings += mixtures(episodes.records)
     warnings += heard_notes(episodes.data.frame, episodes.names)
-    notes = list(_without_reference(episodes))
+    notes = [*findings_of(episodes.data.frame), *_without_reference(episodes)]
     notes += _private(episodes)
     notes += headline_notes(episodes.data.cells, episodes.names)
     notices = [Notice("warning", warning) for warning in warnings]

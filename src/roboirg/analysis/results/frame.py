@@ -1,6 +1,7 @@
 """Results as one long table: a row for each episode, its columns declared once.
 
-Planned episodes that were not played are rows, too: their outcome is ``missing``.
+Planned episodes that were not played are rows, too: their outcome is ``missing``, or ``spared`` if
+they need not be played.
 """
 
 from __future__ import annotations
@@ -13,15 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.analysis.results.option_labels import (
-    SortKey,
-    options_label,
-    options_sort_key,
-    place_in,
-)
+from roboirg.analysis.results.option_labels import SortKey, options_sort_key, place_in
 from roboirg.analysis.results.policy_run import EvalConditions, PolicyRun, labels
 from roboirg.core.arms import TOLD
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions, options_label
 from roboirg.core.versions import Versions
 from roboirg.records.record import Job, Summary
 from roboirg.records.record_codec import RecordKey, identity_key
@@ -29,6 +25,10 @@ from roboirg.tasks import all_tasks
 
 MISSING = "missing"
 """Outcome of planned episodes that were not played."""
+SPARED = "spared"
+"""Outcome of those that need not be, because what the run compares was decided before; also of
+those that were played after that, as these count nowhere."""
+UNPLAYED = (MISSING, SPARED)
 
 Values = NDArray[np.object_]
 Runs = Sequence[tuple[str, Sequence[Summary]]]
@@ -45,12 +45,24 @@ class _FrameRow(NamedTuple):
     Attributes:
         policy_run: that played it, or should have.
         job: its result; if it was not played, the planned job.
-        outcome: that of the result, or ``missing``.
+        outcome: that of the result, or one of `UNPLAYED`.
     """
 
     policy_run: PolicyRun
     job: Job
     outcome: str
+
+
+class Spared(NamedTuple):
+    """What a run needs no more that stops when what it compares is decided.
+
+    Attributes:
+        findings: what it compares, and what was found, in sentences.
+        jobs: of the plan that need no result.
+    """
+
+    findings: tuple[str, ...]
+    jobs: Sequence[Job]
 
 
 class FrameColumn(NamedTuple):
@@ -228,7 +240,7 @@ class Frame(Mapping[str, Any]):
         values = []
         for result, outcome in zip(self["result"], self["outcome"], strict=True):
             value = None
-            if outcome != MISSING:
+            if outcome not in UNPLAYED:
                 value = read(result)
             values.append(value)
         return as_column(values)
@@ -287,7 +299,12 @@ class Frame(Mapping[str, Any]):
         """The results, without episodes that were not played; none of frames without results."""
         if "result" not in self.columns:
             return []
-        return list(self["result"][self["outcome"] != MISSING])
+        return list(self["result"][self.is_played])
+
+    @property
+    def is_played(self) -> NDArray[np.bool_]:
+        """Of each row, whether its episode has a result that counts."""
+        return np.array([outcome not in UNPLAYED for outcome in self["outcome"]], dtype=bool)
 
     @cached_property
     def names(self) -> RunNames:
@@ -321,7 +338,13 @@ def join(frames: Iterable[Frame]) -> Frame:
     return Frame(columns)
 
 
-def make_frame(runs: Runs, planned: Sequence[Job] = (), *, run_name: str = "") -> Frame:
+def make_frame(
+    runs: Runs,
+    planned: Sequence[Job] = (),
+    *,
+    run_name: str = "",
+    spared: Mapping[str, Spared] | None = None,
+) -> Frame:
     """Return the results of one or several runs as a table, a row for each episode.
 
     Rows are sorted by policy run, task, options and episode. A policy run is a policy under one set
@@ -334,7 +357,9 @@ def make_frame(runs: Runs, planned: Sequence[Job] = (), *, run_name: str = "") -
         planned: jobs that should have a result; those without one are missing.
         run_name: the name of a run that all its policy runs bear; without it, only those bear one
             that have to stay apart.
+        spared: of each run that stops when it is decided, by name.
     """
+    stopped = spared or {}
     policies_apart = _played_twice(runs)
     missing = {identity_key(job): job for job in planned}
     rows = []
@@ -343,25 +368,30 @@ def make_frame(runs: Runs, planned: Sequence[Job] = (), *, run_name: str = "") -
             policy_run = PolicyRun.of(result, run_name)
             if result.policy in policies_apart and not run_name:
                 policy_run = policy_run._replace(run=name)
+            if name in stopped:
+                policy_run = policy_run._replace(findings=stopped[name].findings)
             rows.append(_FrameRow(policy_run, result, result.outcome))
             if missing:
                 missing.pop(identity_key(result), None)
     if missing:
-        rows += _missing_rows(missing.values(), rows, run_name)
+        rows += _unplayed_rows(missing.values(), MISSING, rows, run_name)
+    for of_run in stopped.values():
+        rows += _unplayed_rows(of_run.jobs, SPARED, rows, run_name)
     policies = list(dict.fromkeys(job.policy for job in planned))
     return _sorted(rows, policies)
 
 
-def _missing_rows(
-    jobs: Iterable[Job], played: Sequence[_FrameRow], run_name: str
+def _unplayed_rows(
+    jobs: Iterable[Job], outcome: str, played: Sequence[_FrameRow], run_name: str
 ) -> list[_FrameRow]:
-    """Return a row for each planned job without a result.
+    """Return a row for each planned job without a result that counts.
 
     Its versions are unknown, so it counts to the first policy run that has played with its policy
     and conditions, or to a policy run without versions if none has.
 
     Args:
         jobs: without a result.
+        outcome: of these, one of `UNPLAYED`.
         played: the rows with one.
         run_name: the name of the run, for policy runs that have not played anything.
     """
@@ -374,7 +404,7 @@ def _missing_rows(
         conditions = EvalConditions.of(job)
         unplayed = PolicyRun(job.policy, conditions, Versions(), run_name)
         policy_run = first_runs.get((job.policy, conditions), unplayed)
-        rows.append(_FrameRow(policy_run, job, MISSING))
+        rows.append(_FrameRow(policy_run, job, outcome))
     return rows
 
 

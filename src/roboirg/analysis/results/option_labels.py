@@ -2,53 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict
-from typing import Any
+from collections.abc import Sequence
 
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.plain_text import counted
+from roboirg.core.instruction_options import InstructionOptions, options_label
 from roboirg.language import STAGE_SETS
 from roboirg.language.settings import EXPLICIT, all_settings, setting_names
 
 SortKey = tuple[object, ...]
 """What something is sorted by, compared value by value."""
 
-_DEFAULTS = InstructionOptions()
-_PHRASES: dict[str, Callable[[Any], str]] = {
-    "form": str,
-    "stages": lambda stages: "stages " + ",".join(map(str, stages)),
-    "distractor": "{} distractor".format,
-    "distractors": lambda count: counted(count, "distractor"),
-    "frame": "{} frame".format,
-    "delivery": "in {}".format,
-}
-"""How labels name the value of an option; of any other option, by its name."""
 REFERENCE_OPTIONS = InstructionOptions(EXPLICIT)
 """Those that a gap refers to."""
 
 
-def options_label(options: InstructionOptions) -> str:
-    """Return how instruction options are printed: ``relational (resolved, 2 distractors)``.
-
-    In brackets behind the setting are the options that differ from their defaults.
-    """
-    phrases = []
-    for name, value in asdict(options).items():
-        is_default = value == getattr(_DEFAULTS, name)
-        if is_default or name in ("setting", "wordings"):
-            continue
-        phrase_of = _PHRASES.get(name, f"{name} {{}}".format)
-        phrases.append(phrase_of(value))
-
-    if not phrases:
-        return options.setting
-    return f"{options.setting} ({', '.join(phrases)})"
-
-
 def options_sort_key(options: InstructionOptions) -> SortKey:
     """Sort by setting; within a setting the implicit form first, then by label."""
-    is_implicit = options.form == _DEFAULTS.form
+    is_implicit = options.form == REFERENCE_OPTIONS.form
     return (*setting_sort_key(options.setting), not is_implicit, options_label(options))
 
 

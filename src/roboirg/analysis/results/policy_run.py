@@ -23,6 +23,8 @@ CONDITIONS = ("split", *ENVIRONMENT_OPTIONS, "wordings", "arm")
 
 PRIVILEGED_MARK = " (privileged)"
 """Mark of policies that read the simulator's state."""
+UNTIL_DECIDED_MARK = " (until decided)"
+"""Mark of runs that stopped when what they compare was decided."""
 HANDS_MARK = f" ({SCRIPTED_HANDS})"
 """Mark of planners whose hands read it, while they see pictures and words."""
 
@@ -66,6 +68,9 @@ class PolicyRun(NamedTuple):
         run: name of the run if several runs hold the same episodes, else empty.
         is_privileged: whether the policy read the simulator's state.
         robot: the real robot of a study; None in simulation.
+        findings: sentences on what its run compares, if that stops when it is decided; empty for
+            other runs. Its rates are of fewer episodes, whose number depends on them, so they have
+            no interval.
     """
 
     policy: str
@@ -74,10 +79,16 @@ class PolicyRun(NamedTuple):
     run: str = ""
     is_privileged: bool = False
     robot: str | None = None
+    findings: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, result: Summary, run: str = "") -> PolicyRun:
         return _policy_run(run, *_read_facts(result))
+
+    @property
+    def is_until_decided(self) -> bool:
+        """Whether its run stops when what it compares is decided."""
+        return bool(self.findings)
 
     @property
     def language(self) -> str:
@@ -96,11 +107,14 @@ class PolicyRun(NamedTuple):
 
     @property
     def mark(self) -> str:
-        """The mark of a privileged policy; empty for the others."""
-        if not self.is_privileged:
-            return ""
-        has_scripted_hands = SCRIPTED_HANDS in str(self.versions.policy_version)
-        return HANDS_MARK if has_scripted_hands else PRIVILEGED_MARK
+        """The marks of a privileged policy, and of a run until decided; empty for the others."""
+        mark = ""
+        if self.is_privileged:
+            has_scripted_hands = SCRIPTED_HANDS in str(self.versions.policy_version)
+            mark = HANDS_MARK if has_scripted_hands else PRIVILEGED_MARK
+        if self.is_until_decided:
+            mark += UNTIL_DECIDED_MARK
+        return mark
 
 
 _read_facts = operator.attrgetter(

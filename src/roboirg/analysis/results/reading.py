@@ -7,7 +7,14 @@ import itertools
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from roboirg.analysis.results.frame import COLUMNS, Frame, FrameColumn, as_column, make_frame
+from roboirg.analysis.results.frame import (
+    COLUMNS,
+    Frame,
+    FrameColumn,
+    Spared,
+    as_column,
+    make_frame,
+)
 from roboirg.analysis.results.sources import Source
 from roboirg.language.instruction import command_expressions
 from roboirg.records.record import Job, Record
@@ -114,11 +121,16 @@ def _frame_of(sources: Sequence[Source]) -> Frame:
     """Return the results of runs as a table; that of a single run is made only once."""
     if len(sources) == 1:
         return sources[0].frame
-    runs = [(str(source.path), source.results) for source in sources]
+    runs = []
     planned: list[Job] = []
+    spared: dict[str, Spared] = {}
     for source in sources:
-        planned += source.planned
-    return make_frame(runs, planned)
+        parts = source.frame_parts
+        name = str(source.path)
+        runs.append((name, parts.results))
+        planned += parts.planned
+        spared |= parts.spared_of(name)
+    return make_frame(runs, planned, spared=spared)
 
 
 def with_words(frame: Frame, records: Iterable[Record]) -> Frame:

@@ -3,23 +3,49 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
-from roboirg.analysis.results.frame import Frame, make_frame
+from roboirg.analysis.results.frame import Frame, Spared, make_frame
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.records.packs import PACK_SUFFIX, opened_run
 from roboirg.records.record import Job, Record, Summary
 from roboirg.records.record_codec import read_summary
 from roboirg.records.run_files import run_folder
 from roboirg.records.store import StoredRun, iterate_records
-from roboirg.runs.plan.stored_plans import read_plan
+from roboirg.runs.plan.plan import Plan
+from roboirg.runs.plan.stopping import Stopping, find_stopping
+from roboirg.runs.plan.stored_plans import read_plan, read_plans
 from roboirg.util.freed_memory import paused_collection
 
+
+class FrameParts(NamedTuple):
+    """What of a run its frame is made of.
+
+    Attributes:
+        results: those that count.
+        planned: jobs that should have a result.
+        spared: what a run needs no more that stops when it is decided; None for other runs.
+    """
+
+    results: Sequence[Summary]
+    planned: Sequence[Job]
+    spared: Spared | None
+
+    def spared_of(self, name: str) -> Mapping[str, Spared]:
+        """Return what is spared by the name of the run, as `make_frame` takes it."""
+        return {} if self.spared is None else {name: self.spared}
+
+
 AnyJob = TypeVar("AnyJob", bound=Job)
+
+_UNKNOWN_FINDING = (
+    "what was found cannot be told here: the run was merged with others, or its scenes are private "
+    "and their salt is not known."
+)
 
 
 @dataclass(frozen=True)
@@ -75,17 +101,54 @@ class Source:
         return tuple(self.wanted(newest))
 
     @cached_property
-    def planned(self) -> tuple[Job, ...]:
+    def _plan(self) -> Plan | None:
+        """The newest plan; None if it is not known."""
+        return read_plan(self.folder)
+
+    @cached_property
+    def _jobs(self) -> tuple[Job, ...]:
         """The jobs of the newest plan; none if the plan or its episodes are not known."""
-        plan = read_plan(self.folder)
-        if plan is None:
+        if self._plan is None:
             return ()
-        return tuple(self.wanted(plan.drawable_jobs(self.stored.newest)))
+        return self._plan.drawable_jobs(self.stored.newest)
+
+    @cached_property
+    def planned(self) -> tuple[Job, ...]:
+        """The jobs of the newest plan, of wanted policies; none if it is not known."""
+        return tuple(self.wanted(self._jobs))
+
+    @cached_property
+    def stopping(self) -> Stopping | None:
+        """What a run that stops when it is decided has found; None for other runs."""
+        plan = self._plan
+        if plan is None or plan.stop is None or not self._jobs:
+            return None
+        return find_stopping(plan.stop, plan.attempts, self._jobs, self.stored.newest)
+
+    @cached_property
+    def frame_parts(self) -> FrameParts:
+        """What the frame of the run is made of."""
+        stopping = self.stopping
+        if stopping is None:
+            spared = None
+            if any(plan.stop is not None for plan in read_plans(self.folder)):
+                spared = Spared((_UNKNOWN_FINDING,), ())
+            return FrameParts(self.results, self.planned, spared)
+        results = list(filter(stopping.needs, self.results))
+        planned = []
+        unneeded = []
+        for job in self.planned:
+            jobs = planned if stopping.needs(job) else unneeded
+            jobs.append(job)
+        findings = tuple(compared.sentence for compared in stopping.compared)
+        return FrameParts(results, planned, Spared(findings, unneeded))
 
     @cached_property
     def frame(self) -> Frame:
         """The results as a table, with a row for each planned job without one, too."""
-        return make_frame([(str(self.path), self.results)], self.planned)
+        parts = self.frame_parts
+        name = str(self.path)
+        return make_frame([(name, parts.results)], parts.planned, spared=parts.spared_of(name))
 
     def records(self) -> Iterator[Record]:
         """Yield the whole records; those that were written again come twice."""

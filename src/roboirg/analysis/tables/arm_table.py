@@ -17,11 +17,10 @@ from roboirg.analysis.measures.arm_figures import (
 from roboirg.analysis.measures.measure import mean_rate, measure_groups
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.frame import Frame
-from roboirg.analysis.results.option_labels import options_label
 from roboirg.analysis.results.policy_run import labels
 from roboirg.analysis.tables.table import Row, Table, named_columns
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions, options_label
 from roboirg.stats.cells import NOTHING, ByTask, rate_interval
 from roboirg.stats.intervals import TOO_FEW, Interval
 from roboirg.stats.rates import (

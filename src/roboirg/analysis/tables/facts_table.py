@@ -8,11 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from roboirg.analysis.measures.run_data import RunData
-from roboirg.analysis.results.option_labels import (
-    options_label,
-    options_sort_key,
-)
+from roboirg.analysis.results.option_labels import options_sort_key
 from roboirg.analysis.tables.table import Column, Row, Table
+from roboirg.core.instruction_options import options_label
 from roboirg.core.word_pools import words_label
 from roboirg.policies.contract.policy_calls import SERVER
 from roboirg.records.record import Record, Summary

@@ -25,6 +25,7 @@ from roboirg.analysis.tables.table import (
     ERROR_MARK,
     MISSING_MARK,
     POLICY,
+    SPARED_MARK,
     Column,
     Entry,
     Row,
@@ -187,12 +188,14 @@ def _entry(key: CellKey, results: TableResults) -> Entry:
         marks += ERROR_MARK
     if cell.missing:
         marks += MISSING_MARK
+    if key.policy_run.is_until_decided:
+        marks += SPARED_MARK
     rate = cell.rate
     return Entry(
         percent=None if rate is None else percent(rate),
         marks=marks,
         counts=cell.counts,
-        interval=rate_interval([cell]),
+        interval=None if key.policy_run.is_until_decided else rate_interval([cell]),
         differences=results.differences.get(key),
         episodes=frozenset(cell.by_episode()),
     )

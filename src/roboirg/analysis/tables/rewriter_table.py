@@ -9,15 +9,11 @@ import numpy as np
 
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.frame import Frame
-from roboirg.analysis.results.option_labels import (
-    REFERENCE_OPTIONS,
-    options_label,
-    options_sort_key,
-)
+from roboirg.analysis.results.option_labels import REFERENCE_OPTIONS, options_sort_key
 from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.analysis.tables.table import Row, Table, named_columns
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions, options_label
 from roboirg.core.policy_ref import BEHIND, RESOLVE
 from roboirg.core.versions import POLICY, makeup_text
 from roboirg.stats.cells import ByTask, Cell, Key, gather

@@ -26,25 +26,21 @@ from roboirg.analysis.measures.measure import (
     pair,
 )
 from roboirg.analysis.results.frame import Frame
-from roboirg.analysis.results.option_labels import (
-    REFERENCE_OPTIONS,
-    SortKey,
-    options_label,
-    options_sort_key,
-)
+from roboirg.analysis.results.option_labels import REFERENCE_OPTIONS, SortKey, options_sort_key
 from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.analysis.results.run_cells import CellKey, Cells, cells_of
 from roboirg.analysis.tables.table import (
     ERROR_MARK,
     MISSING_MARK,
+    SPARED_MARK,
     Column,
     Entry,
     Row,
     Table,
 )
-from roboirg.analysis.tables.table_notes import range_text, where_played
+from roboirg.analysis.tables.table_notes import findings_of, range_text, where_played
 from roboirg.core.arms import TOLD
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions, options_label
 from roboirg.core.plain_text import counted, printable
 from roboirg.records.record import Summary
 from roboirg.stats.cells import NOTHING, ByTask
@@ -95,7 +91,7 @@ def make_run_tables(frame: Frame) -> list[Table]:
     if tables:
         last = tables[-1]
         legend = "; ".join(_legend(cells, results_by_run.values()))
-        tables[-1] = replace(last, notes=(*last.notes, legend))
+        tables[-1] = replace(last, notes=(*last.notes, legend, *findings_of(frame)))
     return tables
 
 
@@ -249,6 +245,8 @@ def _entry(result: _ScopeResult | None, differences: AllDifferences) -> Entry:
         marks.append(f"{counts.errors}{ERROR_MARK}")
     if counts.missing:
         marks.append(f"{counts.missing}{MISSING_MARK}")
+    if counts.spared:
+        marks.append(f"{counts.spared}{SPARED_MARK}")
     rate = measured.rate
     if rate is None:
         return Entry(word=NOT_APPLICABLE, marks=" ".join(marks))
@@ -293,6 +291,8 @@ def _legend(cells: Cells, results_of_runs: Iterable[_RunResults]) -> Iterator[st
         yield f"{ERROR_MARK} episodes ended in an error and are left out of the rates"
     if any(cell.missing for cell in cells.values()):
         yield f"{MISSING_MARK} episodes are still to be played"
+    if any(cell.spared for cell in cells.values()):
+        yield f"{SPARED_MARK} episodes need not be played: what is compared was decided before"
     if any(key.policy_run.is_privileged for key in cells):
         yield "privileged policies and scripted hands use the simulator's state"
 

@@ -18,8 +18,14 @@ Source = Literal["ours", "published", "cited", "chance"]
 
 ERROR_MARK = "!"
 MISSING_MARK = "…"
+SPARED_MARK = "‡"
 PARTIAL_MARK = "*"
-MARK_NAMES = {ERROR_MARK: "errors", MISSING_MARK: "missing", PARTIAL_MARK: "partial"}
+MARK_NAMES = {
+    ERROR_MARK: "errors",
+    MISSING_MARK: "missing",
+    SPARED_MARK: "until decided",
+    PARTIAL_MARK: "partial",
+}
 """Why a rate is incomplete, by the mark behind it."""
 CHECK_MARK = "✓"
 PUBLISHED_MARK = " (published)"

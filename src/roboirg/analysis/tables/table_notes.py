@@ -10,23 +10,21 @@ from roboirg.analysis.measures.headline import headline_notes
 from roboirg.analysis.measures.measured_floors import unmeasured_note
 from roboirg.analysis.published import NOTES
 from roboirg.analysis.results.frame import Frame
-from roboirg.analysis.results.option_labels import (
-    is_usual,
-    options_label,
-    options_sort_key,
-)
+from roboirg.analysis.results.option_labels import is_usual, options_sort_key
 from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.analysis.results.run_cells import CellKey
 from roboirg.analysis.tables.table import (
     ERROR_MARK,
     MISSING_MARK,
     PARTIAL_MARK,
+    SPARED_MARK,
     Column,
     Entry,
     Row,
     Table,
 )
 from roboirg.analysis.tables.table_kinds import TWIN_MARK, PaperTable, TableResults
+from roboirg.core.instruction_options import options_label
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.records.mixing import mixtures
 from roboirg.stats.cells import Counts
@@ -93,7 +91,7 @@ def with_mixtures(tables: Sequence[Table], frame: Frame) -> list[Table]:
 
     Control arms, which have other words on purpose, do not count.
     """
-    notes = mixtures(frame.without_control_arms().played)
+    notes = [*findings_of(frame), *mixtures(frame.without_control_arms().played)]
     noted = []
     for table in tables:
         if table.key == "coverage":
@@ -101,6 +99,15 @@ def with_mixtures(tables: Sequence[Table], frame: Frame) -> list[Table]:
         else:
             noted.append(replace(table, notes=(*table.notes, *notes)))
     return noted
+
+
+def findings_of(frame: Frame) -> Iterator[str]:
+    """Yield what runs found that stop when what they compare is decided, each sentence once."""
+    sentences: dict[str, None] = {}
+    for policy_run in frame.names:
+        sentences.update(dict.fromkeys(policy_run.findings))
+    for sentence in sentences:
+        yield f"Until decided: {sentence}"
 
 
 def where_played(policy_runs: Collection[PolicyRun]) -> str:
@@ -191,9 +198,11 @@ def _count_notes(cells: Sequence[Counts], entries: Sequence[Entry]) -> Iterator[
     judged = []
     errors = 0
     missing = 0
+    spared = 0
     for cell in cells:
         errors += cell.errors
         missing += cell.missing
+        spared += cell.spared
         if cell.trials:
             judged.append(cell)
     if judged:
@@ -210,7 +219,12 @@ def _count_notes(cells: Sequence[Counts], entries: Sequence[Entry]) -> Iterator[
         )
     if any(PARTIAL_MARK in entry.marks for entry in entries):
         yield PARTIAL_NOTE
-    if errors or missing:
+    if spared:
+        yield (
+            f"{SPARED_MARK} until decided: {counted(spared, 'trial')} of the plan need not be "
+            "played. Such rates have no interval, and no protocol's number is made of them."
+        )
+    if errors or missing or spared:
         yield "Incomplete entries have no arrow, and their columns no best entry."
 
 

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from roboirg.analysis.measures.breakdowns import BREAKDOWNS
 from roboirg.analysis.results.frame import as_column
-from roboirg.analysis.results.option_labels import options_label
 from roboirg.analysis.tables.diagnostic_tables import make_breakdown_table
 from roboirg.analysis.tables.table import Row, Table, named_columns
 from roboirg.apps.grounding.answer_scores import GroundingScore, ScoreRow, score_rows
 from roboirg.apps.grounding.items.grounding_item import GroundingItem
+from roboirg.core.instruction_options import options_label
 from roboirg.core.plain_text import counted
 from roboirg.stats.intervals import TOO_FEW, Interval
 from roboirg.stats.rates import NOT_APPLICABLE, gap_words, half_up

@@ -22,6 +22,7 @@ from roboirg.records.record_codec import RecordKey, identity_key, read_summary
 from roboirg.records.store import StoredRun
 from roboirg.runs.job_instruction import has_other_words
 from roboirg.runs.plan.plan import Plan
+from roboirg.runs.plan.stopping import find_stopping
 from roboirg.runs.plan.stored_plans import read_kept_plans, read_plans
 from roboirg.tasks.splits.private_splits import check_salt
 from roboirg.util.parallel_map import parallel_map
@@ -112,14 +113,17 @@ def _summed_up(
         checks: of each record, in any order.
     """
     kept: Plans = {plan.fingerprint: plan for plan in read_kept_plans(folder)}
-    planned = _slugs(read_plans(folder))
+    plans = read_plans(folder)
+    planned = _slugs(plans)
+    spared = _spared(plans, entries)
+    needed = {key: slug for key, slug in planned.items() if key not in spared}
     failed = sorted(result for result in checks if result.findings)
     outcomes = Counter(entry.outcome for entry in entries)
     notes = [*_plan_notes(planned, kept, entries), *_excuses(failed, entries)]
     return Verification(
         records=len(entries),
         checks=tuple(failed),
-        missing=_missing(planned, entries),
+        missing=_missing(needed, entries),
         verdicts=Counter(result.replayed for result in checks),
         deviation=_largest_tolerated(checks),
         faults=tuple(_faults(kept, entries)),
@@ -133,6 +137,18 @@ def _missing(planned: Mapping[RecordKey, str], entries: Iterable[Summary]) -> tu
     recorded = {identity_key(entry) for entry in entries}
     missing = {slug for key, slug in planned.items() if key not in recorded}
     return tuple(sorted(missing))
+
+
+def _spared(plans: Iterable[Plan], entries: Sequence[Summary]) -> set[RecordKey]:
+    """Return what identifies the episodes that plans need not play, as it was decided before."""
+    spared: set[RecordKey] = set()
+    for plan in plans:
+        if plan.stop is None:
+            continue
+        jobs = plan.jobs()
+        stopping = find_stopping(plan.stop, plan.attempts, jobs, entries)
+        spared.update(identity_key(job) for job in jobs if not stopping.needs(job))
+    return spared
 
 
 def _largest_tolerated(checks: Iterable[RecordCheck]) -> float:

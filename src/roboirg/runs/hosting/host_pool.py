@@ -32,11 +32,13 @@ class HostSettings:
         batch: most episodes that a policy is asked about together.
         devices: values of ``CUDA_VISIBLE_DEVICES``; each policy gets a process on each of them.
         variables: environment variables with secrets that every policy gets.
+        keep_idle: whether policies stay while others play, as they take turns.
     """
 
     batch: int = DEFAULT_BATCH
     devices: tuple[str, ...] = ()
     variables: tuple[str, ...] = ()
+    keep_idle: bool = False
 
 
 @contextlib.contextmanager
@@ -165,7 +167,8 @@ class HostPool:
                 raise EOFError
             devices = self._settings.devices or (None,)
             children = [self._child(_Slot(policy, device)) for device in devices]
-            self._end_others(policy)
+            if not self._settings.keep_idle:
+                self._end_others(policy)
             child = min(children, key=lambda child: child.worlds)
             child.worlds += 1
         child.serve(passed, self._settings.batch)

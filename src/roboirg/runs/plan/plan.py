@@ -89,6 +89,11 @@ class Plan(PlanFields):
         for form, stages in itertools.product(self.forms, self.stages):
             check_options(replace(self.instruction, form=form, stages=stages))
         self.environment.check()
+        if self.stop is not None and self.arms != (TOLD,):
+            raise InvalidValueError(
+                "A run that stops when it is decided compares episodes in their own words; leave "
+                f"arms out, or stop (arms are {', '.join(self.arms)})."
+            )
         # Only in settings that use the option `delivery` can utterances come one after another.
         in_turns = [name for name, rule in all_settings().items() if "delivery" in rule.reads]
         check_names("setting in turns", self.in_turns, in_turns)

@@ -51,7 +51,14 @@ from roboirg.runs.plan.option_parsing import (
     parse_policies,
     parse_stage_sets,
 )
-from roboirg.runs.plan.plan_sections import Attempts, Hosting, ModelUse, WorkerNeeds, names_of
+from roboirg.runs.plan.plan_sections import (
+    Attempts,
+    Hosting,
+    ModelUse,
+    StopRule,
+    WorkerNeeds,
+    names_of,
+)
 from roboirg.util.short_hash import short_hash
 
 MOST_JOBS = 1_000_000
@@ -212,6 +219,11 @@ class PlanFields(BaseModel):
         WorkerNeeds(),
         "What a worker reserves on a machine of a Ray cluster, and what it gets from this one.",
     )
+    stop: StopRule | None = _option(
+        None,
+        "Play scene by scene, and stop when what is compared is decided: {alpha: 0.05, margin: "
+        "10}, with the margin in points; against: NAME for a policy with results in the folder.",
+    )
     # Which words each task has, as in records: no option, but what `checked` finds installed.
     words: Names = ()
 
@@ -300,6 +312,8 @@ class PlanFields(BaseModel):
             "hosting": {"policy_env"},
             "policies": {"__all__": {"makeup"}},
         }
+        if self.stop is None:  # then it is the plan that it was before there was such an option
+            excluded = {**excluded, "stop": True}
         return short_hash(self.model_dump_json(exclude=excluded))
 
 

@@ -10,11 +10,12 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from roboirg.core.errors import check_names
-from roboirg.core.field_types import MOST_COUNT, described
+from roboirg.core.field_types import MOST_COUNT, Label, described
 from roboirg.policies.contract.option_checking import Seconds
-from roboirg.records.record import ERROR_KINDS, ErrorKind
+from roboirg.records.record import ERROR_KINDS, ErrorKind, Summary
 from roboirg.runs.hosting.host_pool import DEFAULT_BATCH, HostSettings
 from roboirg.runs.plan.option_parsing import Names, parse_names
+from roboirg.stats.intervals import ALPHA
 
 PolicyProcessMode = Literal["own", "shared"]
 RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure")
@@ -109,6 +110,10 @@ class Attempts:
         metadata=described("Kinds of errors after which an episode is played again; or none."),
     )
 
+    def has_left(self, result: Summary) -> bool:
+        """Return whether an episode with this result is to be played again."""
+        return result.error in self.retry_on and result.attempt < self.tries
+
 
 @dataclass(frozen=True, slots=True)
 class ModelUse:
@@ -126,6 +131,23 @@ class ModelUse:
             "stored: replies in the folder are used again; anew: models are asked again."
         ),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class StopRule:
+    """When a run has played enough scenes to say how the sides that it compares differ.
+
+    Attributes:
+        alpha: level at which a difference counts as shown, over all comparisons of the run.
+        margin: points; a comparison is closed, too, if its difference is surely smaller. 0 for
+            never.
+        against: name of a policy whose results are in the run's folder already, and with which the
+            plan's is compared; None for a plan that has both sides.
+    """
+
+    alpha: Annotated[float, Field(gt=0, lt=1)] = ALPHA
+    margin: Annotated[float, Field(ge=0, le=100)] = 10.0
+    against: Label | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,8 @@ from rich.text import Text
 from roboirg.core.arms import TOLD
 from roboirg.core.plain_text import counted, printable
 from roboirg.records.record import Record
+from roboirg.runs.plan.stopping import ComparedSides, Stopping
+from roboirg.stats.rates import p_text
 
 ESTIMATE_AFTER = 5
 """Episodes of a run after which the time left is estimated."""
@@ -40,6 +42,9 @@ class Reporter:
     def advance(self, record: Record, *, is_new: bool = True) -> None:
         """Report a stored record; it is not new if the episode was retried."""
 
+    def compare(self, found: Stopping) -> None:
+        """Show what a run that stops when it is decided has found so far, after every look."""
+
     def warn(self, text: str) -> None:
         """Show a sentence that the user should read now."""
 
@@ -55,6 +60,7 @@ class ConsoleReporter(Reporter):
         self._played = 0
         self._seconds_played = 0.0
         self._workers: int | None = None
+        self._compared: list[ComparedSides] = []
         self._start = time.monotonic()
         self._bar = Progress(
             TextColumn("[bold]{task.description}"),
@@ -119,6 +125,14 @@ class ConsoleReporter(Reporter):
         rounds = math.ceil(remaining / workers)
         return str(timedelta(seconds=round(self._seconds_played / self._played * rounds)))
 
+    def compare(self, found: Stopping) -> None:
+        """Show every comparison below the bar; print those that are newly closed."""
+        earlier = [compared.contrast for compared in self._compared if not compared.is_open]
+        self._compared = found.compared
+        for compared in self._compared:
+            if not compared.is_open and compared.contrast not in earlier:
+                self._console.print(compared.sentence, soft_wrap=True, highlight=False)
+
     def warn(self, text: str) -> None:
         """Print a line on stderr, above the bar."""
         sys.stderr.write(f"{printable(text)}\n")
@@ -132,7 +146,8 @@ class ConsoleReporter(Reporter):
         self._live.stop()
 
     def _render(self) -> RenderableType:
-        return Group(self._bar, Text(self._score(), "dim"))
+        lines = [Text(_progress_of(compared), "dim") for compared in self._compared]
+        return Group(self._bar, Text(self._score(), "dim"), *lines)
 
     def _score(self) -> str:
         """Return the outcomes so far in one line: ``explicit 3/4 · direct 1/2 · errors 1``.
@@ -150,6 +165,19 @@ class ConsoleReporter(Reporter):
         if errors:
             parts.append(f"errors {errors}")
         return " · ".join(parts)
+
+
+def _progress_of(compared: ComparedSides) -> str:
+    """Return how far a comparison is: ``direct, mine to pi0: 84 of 550 scenes, p = 0.21 …``.
+
+    The p-value holds however often one looks, and is corrected over all comparisons.
+    """
+    decision = compared.decision
+    line = f"{compared.name}: {decision.scenes} of {compared.planned} scenes"
+    if not compared.is_open:
+        return f"{line}, closed"
+    left = compared.planned - decision.scenes
+    return f"{line}, {p_text(decision.p_holm)} (decided at {compared.alpha}); at most {left} left"
 
 
 def _summary(record: Record) -> str:

@@ -8,6 +8,7 @@ import signal
 import threading
 from collections import Counter, deque
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import NamedTuple
@@ -37,6 +38,7 @@ from roboirg.runs.play.rollout import EpisodeRunner, PlayJob
 from roboirg.runs.play.video_writer import check_video_support, without_unfinished_videos
 from roboirg.runs.run.executor import Executor
 from roboirg.runs.run.progress import Reporter
+from roboirg.runs.run.stop_watch import StopWatch
 from roboirg.tasks.splits.splits import get_episode
 
 UNREACHABLE_AFTER = 20
@@ -52,9 +54,10 @@ class RunSummary(NamedTuple):
         total: number of jobs in the plan.
         played: number of episodes played in this run, retries not counted.
         errors: records of the plan whose outcome is an error.
-        missing: number of jobs of the plan without a record.
+        missing: number of jobs of the plan without a record that should have one.
         video_errors: why videos of new records could not be written.
         unreachable: policies skipped after too many connection errors.
+        spared: number of jobs that need no record, because what is compared was decided before.
     """
 
     total: int
@@ -63,6 +66,7 @@ class RunSummary(NamedTuple):
     missing: int
     video_errors: tuple[str, ...]
     unreachable: tuple[str, ...]
+    spared: int = 0
 
 
 def run_plan(
@@ -102,23 +106,34 @@ def run_plan(
         _report_torn_line(store, reporter)
         _check_versions(plan, store.stored.values(), folder)
         _warn_of_untrained(plan, reporter)
+        todo = _jobs_to_play(plan, jobs, store, retry_errors=retry_errors)
+        watch = None
+        if plan.stop is not None:
+            watch = StopWatch(plan, jobs, store, reporter)
+            todo = watch.in_order(todo)
         write_plan(plan, folder)
-
-        todo = _jobs_to_play(jobs, store, retry_errors=retry_errors)
         reporter.start(len(jobs), len(jobs) - len(todo), getattr(executor, "workers", None))
-        loop = _RunLoop(plan, store, reporter)
+        loop = _RunLoop(plan, store, reporter, watch)
         loop.play(todo, play, executor)
         return loop.summary(jobs)
 
 
-def _jobs_to_play(jobs: Iterable[Job], store: RecordStore, *, retry_errors: bool) -> list[Job]:
-    """Return the jobs without a record, and with `retry_errors` those whose record is an error."""
+def _jobs_to_play(
+    plan: Plan, jobs: Iterable[Job], store: RecordStore, *, retry_errors: bool
+) -> list[Job]:
+    """Return the jobs without a record, and with `retry_errors` those whose record is an error.
+
+    If the plan stops when it is decided, its looks wait for errors with tries left in any case.
+    """
     todo = []
     for job in jobs:
         stored = store.stored.get(identity_key(job))
-        is_retried = retry_errors and stored is not None and stored.outcome == "error"
-        if stored is None or is_retried:
+        if stored is None:
             todo.append(job)
+        elif stored.outcome == "error":
+            is_awaited = plan.stop is not None and plan.attempts.has_left(stored)
+            if retry_errors or is_awaited:
+                todo.append(job)
     return todo
 
 
@@ -130,12 +145,15 @@ def episode_runner(plan: Plan, folder: Path) -> EpisodeRunner:
     """
     if plan.video != "off":
         check_video_support()
+    hosting = plan.hosting.settings
+    if hosting is not None and plan.stop is not None:
+        hosting = replace(hosting, keep_idle=True)
     return EpisodeRunner(
         folder,
         plan.video,
         policy_timeout_s=plan.hosting.policy_timeout_s,
         plan=plan.fingerprint,
-        hosting=plan.hosting.settings,
+        hosting=hosting,
         refuse_long=plan.long_prompts == "refuse",
         replies=ReplySettings(folder, plan.models.max_cost, plan.models.model_replies == "anew"),
     )
@@ -180,10 +198,13 @@ class _RunLoop:
         unreachable: policies skipped after too many connection errors.
     """
 
-    def __init__(self, plan: Plan, store: RecordStore, reporter: Reporter) -> None:
+    def __init__(
+        self, plan: Plan, store: RecordStore, reporter: Reporter, watch: StopWatch | None = None
+    ) -> None:
         self._plan = plan
         self._store = store
         self._reporter = reporter
+        self._watch = watch  # of a run that stops when it is decided
         self._connection_errors: Counter[str] = Counter()  # in a row, by policy
         self.tries: Counter[Job] = Counter()
         self.video_errors: list[str] = []
@@ -200,22 +221,36 @@ class _RunLoop:
             executor: where jobs are played.
         """
         queue = deque(todo)
-        jobs = {identity_key(job): job for job in todo}
+        unneeded = [] if self._watch is None else self._watch.unneeded  # until it is opened again
+        jobs = {identity_key(job): job for job in (*todo, *unneeded)}
         with contextlib.closing(executor.run(queue, play, self._reporter.warn)) as records:
             for record in records:
                 job = jobs[identity_key(record)]
                 self._store_record(job, record)
-                # The executor takes its next job from this queue, so it must be changed in place.
-                if self._is_unreachable(record):  # its remaining jobs are skipped
-                    remaining = [queued for queued in queue if queued.policy != record.policy]
-                    queue.clear()
-                    queue.extend(remaining)
-                elif not self._should_retry(job, record):
-                    continue
-                elif record.error == "infrastructure":
-                    queue.appendleft(job)  # what was lost with a machine can be played at once
-                else:
-                    queue.append(job)
+                self._queue_again(queue, job, record)
+                if self._watch is not None:
+                    self._watch.look(queue, job)
+
+    def _queue_again(self, queue: deque[Job], job: Job, record: Record) -> None:
+        """Put a job back into the queue if it is to be tried again; drop those of a lost policy.
+
+        The executor takes its next job from this queue, so it is changed in place.
+        """
+        if self._is_unreachable(record):  # its remaining jobs are skipped
+            remaining = [queued for queued in queue if queued.policy != record.policy]
+            if self._watch is not None:
+                remaining = []  # without one side nothing can be compared
+                self._watch.give_up()
+            queue.clear()
+            queue.extend(remaining)
+            return
+        if not self._should_retry(job, record):
+            return
+        # What was lost with a machine can be played at once, and a scene that others wait for is.
+        if record.error == "infrastructure" or self._watch is not None:
+            queue.appendleft(job)
+        else:
+            queue.append(job)
 
     def summary(self, jobs: Sequence[Job]) -> RunSummary:
         """Return counts of played and missing jobs, and all errors, at the end of the run.
@@ -224,13 +259,15 @@ class _RunLoop:
         """
         records = [self._store.stored.get(identity_key(job)) for job in jobs]
         found = [record for record in records if record is not None]
+        spared = 0 if self._watch is None else self._watch.spared(jobs)
         return RunSummary(
             total=len(jobs),
             played=len(self.tries),
             errors=tuple(record for record in found if record.outcome == "error"),
-            missing=len(jobs) - len(found),
+            missing=len(jobs) - len(found) - spared,
             video_errors=tuple(self.video_errors),
             unreachable=tuple(self.unreachable),
+            spared=spared,
         )
 
     def _store_record(self, job: Job, record: Record) -> None:

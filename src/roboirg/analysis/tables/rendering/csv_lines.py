@@ -27,6 +27,7 @@ HEAD = (
     "episodes",
     "errors",
     "missing",
+    "spared",
     "low_percent",
     "high_percent",
     "comparable",

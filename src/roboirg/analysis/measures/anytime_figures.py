@@ -1,0 +1,140 @@
+"""What two sides show at any time: p-values and intervals that hold however often one looked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from roboirg.analysis.measures.measure import Measured
+from roboirg.analysis.results.policy_run import PolicyRun
+from roboirg.core.plain_text import counted
+from roboirg.runs.plan.stopping import PlanScene, scene_order
+from roboirg.stats.anytime import PairedScenes, mean_bounds, p_in_any_order, p_path
+from roboirg.stats.cells import ByTask, Cell
+from roboirg.stats.intervals import Interval
+from roboirg.stats.paired_tests import holm
+from roboirg.stats.rates import bounds_text, p_text
+
+
+class AnytimeFigures(NamedTuple):
+    """Evidence on a difference that holds however often one looked.
+
+    Attributes:
+        p_holm: p-value, corrected over all that are tested together.
+        interval: 95 %, of the mean difference over all planned scenes; None if those that were
+            played are no random part of these, as in a run that plays task by task.
+        scenes: how many have results of both sides.
+        planned: how many both sides are planned to have.
+    """
+
+    p_holm: float
+    interval: Interval | None
+    scenes: int
+    planned: int
+
+    @property
+    def text(self) -> str:
+        """The p-value, and of an unfinished plan where its difference will lie, if known.
+
+        For example ``p = 0.21 after 84 of 550 scenes (over all of them between −2.0 and +30.1
+        points, 95 %)``.
+        """
+        words = p_text(self.p_holm)
+        if self.scenes == self.planned:
+            return words
+        words += f" after {self.scenes} of {counted(self.planned, 'scene')}"
+        if self.interval is None:
+            return words
+        return f"{words} (over all of them {bounds_text(self.interval)}, 95 %)"
+
+
+def anytime_figures(
+    groups: Sequence[Measured[Any]], first: PolicyRun, second: PolicyRun
+) -> list[AnytimeFigures]:
+    """Return what each group shows against its reference at any time, corrected over all groups.
+
+    Args:
+        groups: that are tested together.
+        first: that the groups are of.
+        second: that their references are of; the same one if these are another setting of it.
+    """
+    is_until_decided = first.is_until_decided or second.is_until_decided
+    p_values = []
+    intervals: list[Interval | None] = []
+    every = []
+    for group in groups:
+        pairs = paired_scenes(group.cells, group.others, first.conditions.split)
+        every.append(pairs)
+        in_order = _is_in_order(group.cells, first) and _is_in_order(group.others, second)
+        if is_until_decided and in_order:
+            p_values.append(float(p_path(pairs.differences).min(initial=1.0)))
+            intervals.append(mean_bounds(pairs))
+        else:
+            p_values.append(p_in_any_order(pairs.differences))
+            intervals.append(None)
+    figures = []
+    for pairs, interval, p_holm in zip(every, intervals, holm(p_values), strict=True):
+        figures.append(AnytimeFigures(p_holm, interval, len(pairs.differences), pairs.planned))
+    return figures
+
+
+def _is_in_order(cells: ByTask, policy_run: PolicyRun) -> bool:
+    """Return whether results are those of the first scenes of the random order, or of all."""
+    return policy_run.is_until_decided or not any(cell.missing for cell in cells.values())
+
+
+def paired_scenes(cells: ByTask, others: ByTask, split: str) -> PairedScenes:
+    """Return the differences of two sides in the scenes that both have, in the random order.
+
+    Scenes that a side lacks come last in the order: they were not looked at.
+
+    Args:
+        cells: trials of the first side, by task.
+        others: those of the second.
+        split: of the scenes.
+    """
+    differences = {}
+    planned = {}
+    for task in cells.keys() & others.keys():
+        found = _differences(cells[task], others[task])
+        if found:
+            planned[task] = min(_planned_episodes(cells[task]), _planned_episodes(others[task]))
+        for episode, difference in found.items():
+            differences[PlanScene(task, episode)] = difference
+    order = scene_order(differences, split)
+    # The mean over scenes is then the unweighted mean over tasks.
+    weight_of = {task: sum(planned.values()) / (len(planned) * planned[task]) for task in planned}
+    weights = [weight_of[scene.task] for scene in order]
+    for task, count in planned.items():
+        unknown = count - sum(scene.task == task for scene in order)
+        weights += [weight_of[task]] * unknown
+    ordered = [differences[scene] for scene in order]
+    return PairedScenes(np.array(ordered, dtype=np.float64), np.array(weights))
+
+
+def _differences(first: Cell, second: Cell) -> dict[int, float]:
+    """Return by how much the first is better in each episode that both have, -1 to 1.
+
+    Policy seeds that both have count, or all seeds if they share none.
+    """
+    first_episodes = first.by_episode()
+    second_episodes = second.by_episode()
+    differences = {}
+    for episode in first_episodes.keys() & second_episodes.keys():
+        first_verdicts = first_episodes[episode]
+        second_verdicts = second_episodes[episode]
+        seeds = first_verdicts.keys() & second_verdicts.keys()
+        first_wins = [first_verdicts[seed] for seed in seeds or first_verdicts]
+        second_wins = [second_verdicts[seed] for seed in seeds or second_verdicts]
+        differences[episode] = float(np.mean(first_wins) - np.mean(second_wins))
+    return differences
+
+
+def _planned_episodes(cell: Cell) -> int:
+    """Return how many episodes a cell is planned to have, with those that have no verdict."""
+    counts = cell.counts
+    unknown = counts.errors + counts.missing + counts.spared
+    trials_per_episode = max(counts.trials / max(counts.episodes, 1), 1.0)
+    return counts.episodes + round(unknown / trials_per_episode)

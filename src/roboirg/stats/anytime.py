@@ -1,0 +1,292 @@
+"""Evidence from paired scenes that holds however often one looked, and when to stop for it.
+
+A p-value of a fixed number of scenes is wrong if somebody looks after every scene and stops when
+it suits him. The evidence here is what a gambler has won who began with 1 and bets on the next
+scene before he sees it. If nothing can be won on average, he multiplies his money by 20 in at most
+5 % of all games, at whatever moment one looks (Ville, 1939). So 1 / (the largest winnings so far)
+is a p-value at every moment.
+
+Scenes come in a random order that does not depend on results. Their differences are those of two
+policies, or of two instructions of one, in the same scene: from -1 to 1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta
+
+from roboirg.stats.intervals import ALPHA, Interval
+from roboirg.stats.paired_tests import holm
+
+Numbers = NDArray[np.float64]
+
+BETS = 64
+"""Stakes among which the money is spread; more of them change results by less than 1 %."""
+BETA_SHAPE = 2.0
+"""Of the symmetric beta distribution that spreads money over stakes on the sign of a difference.
+Chosen by simulation: 2 decides more games than 1/2, which decides clear ones a little earlier."""
+_HALVINGS = 20
+"""Of the range in which an end of an interval is searched."""
+_ROUNDING = 1e-9
+"""Sums of shares that differ by less are equal."""
+
+Finding = Literal["first", "second", "within", "undecided", "open"]
+"""What the scenes so far say: the first or the second is better; they differ by less than the
+margin; neither although all scenes are known; neither yet."""
+
+
+class PairedScenes(NamedTuple):
+    """Two sides in the scenes of a plan, in its random order. All scenes of the plan have a place.
+
+    Attributes:
+        differences: (known,) of the first scenes of the order: success of the first side less that
+            of the second, -1 to 1; NaN in a scene that is left out, as a side is not played there
+            or ended in an error.
+        weights: (places,) by how much each scene counts in the mean difference; 0 in a scene in
+            which a side is not planned. Their sum is the number of planned scenes.
+    """
+
+    differences: Numbers
+    weights: Numbers
+
+    @property
+    def planned(self) -> int:
+        """The number of scenes in which both sides are planned."""
+        return int(np.count_nonzero(self.weights))
+
+    @property
+    def is_even(self) -> bool:
+        """Whether all planned scenes count alike, as tasks have equally many."""
+        planned = self.weights[self.weights > 0]
+        return not len(planned) or bool(np.allclose(planned, planned[0]))
+
+    def first(self, places: int) -> PairedScenes:
+        """Return what was known after so many places of the order."""
+        return PairedScenes(self.differences[:places], self.weights)
+
+
+class SequentialDecision(NamedTuple):
+    """What the scenes say about two sides, up to the place of the order where it was decided.
+
+    Attributes:
+        finding: which side is better, if any.
+        places: of the random order that count; while it is open, those that were looked at.
+        scenes: of these, how many have results of both sides.
+        p_value: of the hypothesis that the two could be swapped in every scene; holds at any time.
+        p_holm: the same after Holm's correction over all decisions of the plan.
+    """
+
+    finding: Finding
+    places: int
+    scenes: int
+    p_value: float
+    p_holm: float
+
+
+def decide(
+    contrasts: Sequence[PairedScenes], alpha: float = ALPHA, margin: float = 0.0
+) -> list[SequentialDecision]:
+    """Look after every scene, and close each contrast when it is decided; return what was found.
+
+    A look needs the results of the scene in all open contrasts, so it waits for the slowest one.
+
+    Args:
+        contrasts: of one plan, with equally many places.
+        alpha: level of Holm's test over all contrasts.
+        margin: a contrast is closed, too, if its mean difference is surely smaller, 0 to 1; 0 for
+            never.
+    """
+    p_paths = [p_path(pairs.differences) for pairs in contrasts]
+    within_paths = [within_path(pairs, margin, alpha) for pairs in contrasts]
+    findings: list[Finding] = ["open"] * len(contrasts)
+    p_values = [1.0] * len(contrasts)
+    p_holm = [1.0] * len(contrasts)
+    looks = [0] * len(contrasts)
+    places = max((len(pairs.weights) for pairs in contrasts), default=0)
+
+    for place in range(places):
+        still_open = [number for number, finding in enumerate(findings) if finding == "open"]
+        if any(place >= len(p_paths[number]) for number in still_open):
+            break
+        for number in still_open:
+            p_values[number] = float(p_paths[number][place])
+            looks[number] = place + 1
+        p_holm = list(holm(p_values))
+        for number in still_open:
+            if p_holm[number] <= alpha:
+                findings[number] = _better(contrasts[number].first(place + 1))
+            elif within_paths[number][place]:
+                findings[number] = "within"
+            elif place + 1 == places:
+                findings[number] = "undecided"
+
+    decisions = []
+    for number, pairs in enumerate(contrasts):
+        scenes = int(np.isfinite(pairs.differences[: looks[number]]).sum())
+        decisions.append(
+            SequentialDecision(
+                findings[number], looks[number], scenes, p_values[number], p_holm[number]
+            )
+        )
+    return decisions
+
+
+def _better(seen: PairedScenes) -> Finding:
+    """Return the side with more successes; the sign test can only decide if there is one."""
+    return "first" if np.nansum(seen.differences) > 0 else "second"
+
+
+def mean_difference(seen: PairedScenes) -> float:
+    """Return the weighted mean of the differences that are known; 0 without any."""
+    has_result = np.isfinite(seen.differences)
+    if not has_result.any():
+        return 0.0
+    weights = seen.weights[: len(seen.differences)][has_result]
+    return float(np.average(seen.differences[has_result], weights=weights))
+
+
+def p_path(differences: Numbers) -> Numbers:
+    """Return the p-value after each scene: 1 / (the largest winnings so far), at most 1.
+
+    Args:
+        differences: (..., n) from -1 to 1; NaN in scenes that are left out.
+    """
+    most = np.maximum.accumulate(sign_winnings(np.nan_to_num(differences)), axis=-1)
+    return np.asarray(1 / np.maximum(most, 1.0))
+
+
+def p_in_any_order(differences: Numbers) -> float:
+    """Return the p-value of scenes that became known in another order, such as task by task.
+
+    The winnings are the same in every order, but how high they once were is not. So this is
+    1 / (the winnings now): it may rise again, and holds however often one looked.
+
+    Args:
+        differences: (n,) from -1 to 1.
+    """
+    if not len(differences):
+        return 1.0
+    return float(1 / max(sign_winnings(differences)[-1], 1.0))
+
+
+def sign_winnings(differences: Numbers) -> Numbers:
+    """Return the winnings after each scene of bets on the sign of its difference.
+
+    If the two could be swapped in every scene, a stake wins as often as it loses. Of differences of
+    -1, 0 and 1 this is the mixture of sign tests over the scenes in which one side alone succeeds.
+
+    Args:
+        differences: (..., n) from -1 to 1.
+    """
+    # A stake of 0.5 turns 1 into 1.5 at a difference of 1, and into 0.5 at one of -1.
+    quantiles = (np.arange(BETS) + 0.5) / BETS
+    stakes = 2 * beta.ppf(quantiles, BETA_SHAPE, BETA_SHAPE) - 1
+    return _mixed_winnings(differences, stakes)
+
+
+def within_path(pairs: PairedScenes, margin: float, alpha: float = ALPHA) -> NDArray[np.bool_]:
+    """Return after each scene whether the mean difference over all is surely below a margin.
+
+    Args:
+        pairs: in the order of the plan.
+        margin: between 0 and 1; the mean difference must be nearer to 0.
+        alpha: share of games in which this may be wrong at some moment.
+    """
+    shares, scale = _shares(pairs)
+    highest = (1 + margin / scale) / 2
+    is_below = winnings_above(1 - highest, 1 - shares, pairs.planned) >= 2 / alpha
+    is_above = winnings_above(1 - highest, shares, pairs.planned) >= 2 / alpha
+    path = np.logical_or.accumulate(is_below) & np.logical_or.accumulate(is_above)
+    # Of each place the look after the last scene with a result.
+    scenes = np.cumsum(np.isfinite(pairs.differences))
+    before_any = np.concatenate([[False], path])
+    return np.asarray(before_any[scenes])
+
+
+def mean_bounds(pairs: PairedScenes, alpha: float = ALPHA) -> Interval:
+    """Return where the weighted mean difference of all planned scenes lies, given the first ones.
+
+    An end is the mean at which bets against it, on scenes drawn without putting back, have at some
+    moment won 2 / alpha (Waudby-Smith and Ramdas, 2020). When all scenes are known, both ends are
+    the mean.
+
+    Args:
+        pairs: in the order of the plan.
+        alpha: share of games in which the mean may be outside at some moment.
+    """
+    shares, scale = _shares(pairs)
+    low = _lowest_mean(shares, pairs.planned, alpha / 2)
+    high = 1 - _lowest_mean(1 - shares, pairs.planned, alpha / 2)
+    return Interval(scale * (2 * low - 1), scale * (2 * high - 1))
+
+
+def _shares(pairs: PairedScenes) -> tuple[Numbers, float]:
+    """Return the weighted differences of scenes with results as numbers from 0 to 1, and a scale.
+
+    A share of 0.5 is no difference. A mean share of m stands for a mean difference of
+    scale · (2 m - 1).
+    """
+    scale = float(pairs.weights.max(initial=1.0))
+    weighted = pairs.weights[: len(pairs.differences)] * pairs.differences
+    return (1 + weighted[np.isfinite(weighted)] / scale) / 2, scale
+
+
+def _lowest_mean(shares: Numbers, planned: int, alpha: float) -> float:
+    """Return the least mean of all scenes that bets on more do not rule out.
+
+    Args:
+        shares: (n,) from 0 to 1, of the first scenes.
+        planned: the number of all.
+        alpha: bets that win 1 / alpha rule a mean out.
+    """
+    known = float(shares.sum())
+    # What is not known yet may be 0 everywhere, or 1.
+    low = known / max(planned, 1)
+    high = (known + planned - len(shares)) / max(planned, 1)
+    if winnings_above(low, shares, planned).max(initial=1.0) < 1 / alpha:
+        return low
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        if winnings_above(middle, shares, planned).max(initial=1.0) >= 1 / alpha:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def winnings_above(mean: float | Numbers, shares: Numbers, planned: int) -> Numbers:
+    """Return the winnings after each scene of bets that scenes have more than a mean.
+
+    They are endless once more was seen than there can be with that mean.
+
+    Args:
+        mean: of all scenes, from 0 to 1; or (..., 1), one for each game.
+        shares: (..., n) from 0 to 1, of the first scenes.
+        planned: the number of all.
+    """
+    seen = np.cumsum(shares, axis=-1)
+    left = planned - np.arange(shares.shape[-1])
+    # The mean of the scenes that are left, if that of all is right.
+    expected = np.maximum(planned * mean - (seen - shares), 0.0) / left
+    gains = np.divide(shares, expected, out=np.ones_like(shares), where=expected > 0)
+    stakes = (np.arange(BETS) + 0.5) / BETS
+    winnings = _mixed_winnings(gains - 1, stakes)
+    winnings[seen > planned * mean + _ROUNDING] = math.inf
+    return winnings
+
+
+def _mixed_winnings(gains: Numbers, stakes: Numbers) -> Numbers:
+    """Return the winnings after each scene, with the money spread evenly over the stakes.
+
+    Args:
+        gains: (..., n) what a scene adds to a stake of 1; at least -1.
+        stakes: parts of the money that are bet on each scene.
+    """
+    with np.errstate(divide="ignore", over="ignore"):  # nothing is left, or more than can be said
+        logarithms = np.cumsum(np.log1p(gains[..., np.newaxis] * stakes), axis=-2)
+        return np.asarray(np.exp(logarithms).mean(axis=-1))

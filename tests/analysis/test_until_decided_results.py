@@ -1,0 +1,227 @@
+"""What tables, comparisons and the page make of a run that stopped when it was decided."""
+
+import pytest
+from made_records import make_record
+from run_fakes import FakePlay, changed, small_plan
+
+from roboirg.analysis.measures.breakdowns import BREAKDOWNS, break_down
+from roboirg.analysis.measures.comparison import compare_settings
+from roboirg.analysis.measures.comparison_text import sentences
+from roboirg.analysis.measures.measure import summarize
+from roboirg.analysis.page.evidence_paths import evidence_paths
+from roboirg.analysis.results.run_cells import cells_of
+from roboirg.analysis.results.sources import Source
+from roboirg.analysis.results.stored_side import against_stored
+from roboirg.analysis.run_results import Results
+from roboirg.core.errors import InvalidValueError
+from roboirg.records.merging import merge_runs
+from roboirg.runs.plan.plan_sections import StopRule
+from roboirg.runs.plan.stored_plans import write_plan
+from roboirg.runs.run.executor import InProcess
+from roboirg.runs.run.runner import run_plan
+
+
+@pytest.fixture(scope="module")
+def stopped_run(tmp_path_factory):
+    """Return the folder of a run over 50 scenes that stopped after 16.
+
+    Explicit always succeeds, and direct in 7 of the 16.
+    """
+    folder = tmp_path_factory.mktemp("stopped")
+    plan = changed(small_plan(50), stop=StopRule())
+    run_plan(plan, folder, FakePlay(), InProcess())
+    return folder
+
+
+def test_episodes_that_need_not_be_played_have_an_outcome_of_their_own(stopped_run):
+    """Of 2 x 50 planned episodes 2 x 16 count; none is missing."""
+    outcomes = list(Source(stopped_run).frame["outcome"])
+
+    assert outcomes.count("spared") == 2 * (50 - 16)
+    assert outcomes.count("missing") == 0
+    assert outcomes.count("success") == 16 + 7
+
+
+def test_results_from_after_the_decision_count_nowhere(tmp_path):
+    """A full run that is given the rule afterwards has the table of one that stopped."""
+    full = small_plan(50)
+    run_plan(full, tmp_path, FakePlay(), InProcess())
+
+    run_plan(changed(full, stop=StopRule()), tmp_path, FakePlay(), InProcess())
+
+    outcomes = list(Source(tmp_path).frame["outcome"])
+    assert outcomes.count("spared") == 2 * (50 - 16)
+
+
+def test_rates_of_a_stopped_run_have_neither_interval_nor_p_value(stopped_run):
+    """Both are for a number of episodes that does not depend on the results."""
+    summaries = summarize(cells_of(Source(stopped_run).frame))
+
+    assert len(summaries) > 0
+    for summary in summaries.values():
+        assert summary.interval is None
+        assert summary.gap is None
+        assert summary.p_holm is None
+
+
+def test_the_table_marks_a_stopped_run_and_prints_what_was_found(stopped_run):
+    table = Results(stopped_run).table("main", "markdown")
+
+    assert "random (until decided)" in table
+    assert "43.75 ‡" in table
+    assert "Until decided: random, direct to explicit: explicit is better, −56.3 points" in table
+    assert "random has no headline number" not in table
+
+
+def test_gaps_by_kind_of_words_of_a_stopped_run_have_neither_interval_nor_p_value(stopped_run):
+    """Their episodes are those of the run, whose number depends on the results, too."""
+    rows = break_down(Source(stopped_run).frame, BREAKDOWNS["difficulty"])
+
+    assert len(rows) > 0
+    for row in rows:
+        assert row.rate is not None
+        assert (row.interval, row.gap, row.p_holm) == (None, None, None)
+
+
+def test_the_page_draws_the_evidence_from_the_first_scene_to_the_last_look(stopped_run):
+    """The drawing is 600 wide for 50 planned scenes, so that the 16th is at 192.
+
+    It ends above the dashed line, where a single comparison is decided: lower numbers are higher.
+    """
+    (path,) = evidence_paths([Source(stopped_run)])
+
+    corners = path.points.split()
+    last_left, last_height = corners[-1].split(",")
+    assert corners[0] == "0.0,120.0"
+    assert len(corners) == 1 + 16
+    assert last_left == "192.0"
+    assert float(last_height) < path.mark
+
+
+def test_a_comparison_of_a_stopped_run_prints_only_what_holds_at_any_time(stopped_run):
+    comparison = compare_settings(Source(stopped_run).frame)
+
+    text = "\n".join(sentences(comparison, "random", "random"))
+
+    assert "direct: explicit is better, −56.3 points, p = 0.043 after 16 of 50 scenes" in text
+    assert "exact paired test" not in text
+
+
+def test_a_full_run_is_compared_by_both_kinds_of_p_value(tmp_path):
+    """The plan of 16 scenes was fixed before, so the exact test holds, too."""
+    run_plan(small_plan(16), tmp_path, FakePlay(), InProcess())
+
+    comparison = compare_settings(Source(tmp_path).frame)
+
+    text = "\n".join(sentences(comparison, "random", "random"))
+    assert "exact paired test" in text
+    assert "However often one looked: direct p = " in text
+
+
+def test_the_results_of_a_stored_policy_are_copied_once_and_become_a_side(tmp_path):
+    """The stored policy ``random`` has played; ``oracle`` is the one that is to be compared."""
+    stored = changed(small_plan(8), settings="direct")
+    run_plan(stored, tmp_path / "stored", FakePlay(), InProcess())
+    plan = changed(small_plan(8, policies=("oracle",)), settings="direct", stop=StopRule())
+    folder = tmp_path / "new"
+
+    first = against_stored(plan, str(tmp_path / "stored"), folder)
+    again = against_stored(plan, f"{tmp_path / 'stored'}:random", folder)
+    run_plan(first, folder, FakePlay(), InProcess())
+
+    assert first == again
+    assert first.stop.against == "random"
+    (compared,) = Source(folder).stopping.compared
+    assert compared.name == "direct, oracle to random"
+    assert compared.decision.scenes == 8
+    assert len(Source(folder).results) == 16
+
+
+def test_a_stored_policy_of_the_same_name_is_refused(tmp_path):
+    """Its results could not be told from the new ones."""
+    run_plan(small_plan(2), tmp_path / "stored", FakePlay(), InProcess())
+
+    with pytest.raises(InvalidValueError, match="give that another one with --policy NAME=SPEC"):
+        against_stored(small_plan(2), str(tmp_path / "stored"), tmp_path / "new")
+
+
+def test_stored_results_under_other_conditions_are_refused(tmp_path):
+    """They were played with fewer steps than the plan allows."""
+    stored = changed(small_plan(2), max_steps=100)
+    run_plan(stored, tmp_path / "stored", FakePlay(), InProcess())
+    plan = small_plan(2, policies=("oracle",))
+
+    with pytest.raises(InvalidValueError, match="no result of an episode of this plan"):
+        against_stored(plan, str(tmp_path / "stored"), tmp_path / "new")
+
+
+def test_results_that_an_earlier_plan_left_in_the_folder_are_no_trials(tmp_path):
+    """The stored policy has seeds 0 and 1 there, and silent controls; the plan has seed 0 alone."""
+    earlier = changed(small_plan(8, seeds=2), settings="direct", arms="told,silent")
+    run_plan(earlier, tmp_path, FakePlay(), InProcess())
+    plan = changed(
+        small_plan(8, policies=("oracle",)), settings="direct", stop=StopRule(against="random")
+    )
+
+    run_plan(plan, tmp_path, FakePlay(), InProcess())
+
+    source = Source(tmp_path)
+    counts = {len(jobs) for scenes in source.stopping.trials.values() for jobs in scenes.values()}
+    assert counts == {1}
+    assert set(source.frame["arm"]) == {"told"}
+
+
+def test_only_scenes_that_the_stored_policy_has_are_played(tmp_path):
+    """It has played 4 of the 8 scenes, and one of these ended in an error that it had tries for."""
+    stored = changed(small_plan(4), settings="direct")
+
+    def play(job):
+        if job.episode == 0:
+            return make_record(job, "error", "lost", error="connection")
+        return FakePlay()(job)
+
+    run_plan(stored, tmp_path / "stored", play, InProcess())
+    again = changed(stored, tries=9)
+    plan = changed(small_plan(8, policies=("oracle",)), settings="direct", stop=StopRule(), tries=9)
+    folder = tmp_path / "new"
+    run_plan(again, folder, play, InProcess())
+    plan = against_stored(plan, str(tmp_path / "stored"), folder)
+
+    summary = run_plan(plan, folder, FakePlay(), InProcess())
+
+    assert (summary.played, summary.spared) == (4, 4)
+    (compared,) = Source(folder).stopping.compared
+    assert not compared.is_open
+    assert compared.decision.scenes == 3
+
+
+def test_a_merged_run_is_still_marked(stopped_run, tmp_path):
+    """A merged folder has the plans of its parts, but none of its own."""
+    merge_runs([stopped_run], tmp_path / "merged")
+
+    rows = summarize(cells_of(Source(tmp_path / "merged").frame))
+
+    assert len(rows) > 0
+    for row in rows.values():
+        assert row.key.policy_run.is_until_decided
+        assert row.interval is None
+
+
+def test_results_of_a_run_that_played_task_by_task_have_no_bounds(tmp_path):
+    """The first 8 of 16 scenes are no random half, so they do not say where the rest lies."""
+    plan = small_plan(16)
+    run_plan(small_plan(8), tmp_path, FakePlay(), InProcess())
+    write_plan(plan, tmp_path)
+
+    (figures,) = compare_settings(Source(tmp_path).frame).anytime
+
+    assert (figures.scenes, figures.planned, figures.interval) == (8, 16, None)
+    assert figures.text.endswith("after 8 of 16 scenes")
+
+
+def test_a_stored_side_is_refused_for_a_plan_of_two_policies(tmp_path):
+    run_plan(small_plan(2), tmp_path / "stored", FakePlay(), InProcess())
+    plan = small_plan(2, policies=("oracle", "listener"))
+
+    with pytest.raises(InvalidValueError, match="this plan has several: oracle, listener"):
+        against_stored(plan, str(tmp_path / "stored"), tmp_path / "new")
