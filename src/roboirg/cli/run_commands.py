@@ -100,7 +100,6 @@ def run(
     from roboirg.records.run_files import run_folder
     from roboirg.runs.plan.plan_file import plan_text
     from roboirg.runs.plan.plan_sections import StopRule
-    from roboirg.runs.play.prompt_shares import prompt_shares, warning_lines
     from roboirg.runs.play.video_writer import check_video_support
     from roboirg.runs.run.runner import check_run
 
@@ -129,14 +128,21 @@ def run(
         return
     if against is not None:
         made = against_stored(made, against, folder)
-    if made.stop is not None and len(made.policies) > 1:
-        names = " and ".join(policy.name for policy in made.policies)
-        typer.echo(f"Scene by scene, so {names} stay loaded at the same time.", err=True)
-    for line in warning_lines(prompt_shares(made.jobs())):
-        typer.echo(line, err=True)
+    _print_warnings(made)
     summary = play(made, folder, chosen, retry=retry_errors)
     print_tables_of(Source(folder))
     report_problems(summary, folder)
+
+
+def _print_warnings(plan: Plan) -> None:
+    """Print on stderr what a user should know before a plan is played."""
+    from roboirg.runs.play.prompt_shares import prompt_shares, warning_lines
+
+    if plan.stop is not None and len(plan.policies) > 1:
+        names = " and ".join(policy.name for policy in plan.policies)
+        typer.echo(f"Scene by scene, so {names} stay loaded at the same time.", err=True)
+    for line in warning_lines(prompt_shares(plan.jobs())):
+        typer.echo(line, err=True)
 
 
 def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummary:

@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,39 +102,73 @@ def decide(
         margin: a contrast is closed, too, if its mean difference is surely smaller, 0 to 1; 0 for
             never.
     """
-    p_paths = [p_path(pairs.differences) for pairs in contrasts]
-    within_paths = [within_path(pairs, margin, alpha) for pairs in contrasts]
-    findings: list[Finding] = ["open"] * len(contrasts)
-    p_values = [1.0] * len(contrasts)
-    p_holm = [1.0] * len(contrasts)
-    looks = [0] * len(contrasts)
+    watched = [_Watched.of(pairs, alpha, margin) for pairs in contrasts]
+    p_holm: Sequence[float] = [1.0] * len(watched)
     places = max((len(pairs.weights) for pairs in contrasts), default=0)
-
     for place in range(places):
-        still_open = [number for number, finding in enumerate(findings) if finding == "open"]
-        if any(place >= len(p_paths[number]) for number in still_open):
-            break
-        for number in still_open:
-            p_values[number] = float(p_paths[number][place])
-            looks[number] = place + 1
-        p_holm = list(holm(p_values))
-        for number in still_open:
-            if p_holm[number] <= alpha:
-                findings[number] = _better(contrasts[number].first(place + 1))
-            elif within_paths[number][place]:
-                findings[number] = "within"
-            elif place + 1 == places:
-                findings[number] = "undecided"
+        still_open = [contrast for contrast in watched if contrast.finding == "open"]
+        if any(place >= len(contrast.p_path) for contrast in still_open):
+            break  # not all of them know this scene
+        for contrast in still_open:
+            contrast.look(place)
+        p_holm = holm([contrast.p_value for contrast in watched])
+        for contrast, corrected in zip(watched, p_holm, strict=True):
+            if contrast.finding == "open":
+                contrast.close_if_decided(corrected <= alpha, place + 1 == places)
 
     decisions = []
-    for number, pairs in enumerate(contrasts):
-        scenes = int(np.isfinite(pairs.differences[: looks[number]]).sum())
+    for contrast, corrected in zip(watched, p_holm, strict=True):
+        scenes = int(np.isfinite(contrast.pairs.differences[: contrast.places]).sum())
         decisions.append(
             SequentialDecision(
-                findings[number], looks[number], scenes, p_values[number], p_holm[number]
+                contrast.finding, contrast.places, scenes, contrast.p_value, corrected
             )
         )
     return decisions
+
+
+@dataclass
+class _Watched:
+    """A contrast while its scenes are looked at one by one.
+
+    Attributes:
+        pairs: its scenes.
+        p_path: p-value after each scene that is known.
+        within_path: whether its difference is surely within the margin then.
+        finding: so far.
+        places: that were looked at.
+        p_value: at the last look.
+    """
+
+    pairs: PairedScenes
+    p_path: Numbers
+    within_path: NDArray[np.bool_]
+    finding: Finding = "open"
+    places: int = 0
+    p_value: float = 1.0
+
+    @classmethod
+    def of(cls, pairs: PairedScenes, alpha: float, margin: float) -> Self:
+        return cls(pairs, p_path(pairs.differences), within_path(pairs, margin, alpha))
+
+    def look(self, place: int) -> None:
+        """Look at the scene at a place of the order."""
+        self.places = place + 1
+        self.p_value = float(self.p_path[place])
+
+    def close_if_decided(self, is_shown: bool, is_last: bool) -> None:
+        """Close the contrast after a look, if there is a reason.
+
+        Args:
+            is_shown: whether the corrected test shows a difference.
+            is_last: whether no scene is left.
+        """
+        if is_shown:
+            self.finding = _better(self.pairs.first(self.places))
+        elif self.within_path[self.places - 1]:
+            self.finding = "within"
+        elif is_last:
+            self.finding = "undecided"
 
 
 def _better(seen: PairedScenes) -> Finding:

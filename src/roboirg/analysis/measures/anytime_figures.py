@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roboirg.analysis.measures.measure import Measured
 from roboirg.analysis.results.policy_run import PolicyRun
@@ -60,15 +61,12 @@ def anytime_figures(
         first: that the groups are of.
         second: that their references are of; the same one if these are another setting of it.
     """
-    is_until_decided = first.is_until_decided or second.is_until_decided
+    split = first.conditions.split
+    every = [paired_scenes(group.cells, group.others, split) for group in groups]
     p_values = []
     intervals: list[Interval | None] = []
-    every = []
-    for group in groups:
-        pairs = paired_scenes(group.cells, group.others, first.conditions.split)
-        every.append(pairs)
-        in_order = _is_in_order(group.cells, first) and _is_in_order(group.others, second)
-        if is_until_decided and in_order:
+    for group, pairs in zip(groups, every, strict=True):
+        if _was_looked_at_in_order(group, first, second):
             p_values.append(float(p_path(pairs.differences).min(initial=1.0)))
             intervals.append(mean_bounds(pairs))
         else:
@@ -78,6 +76,16 @@ def anytime_figures(
     for pairs, interval, p_holm in zip(every, intervals, holm(p_values), strict=True):
         figures.append(AnytimeFigures(p_holm, interval, len(pairs.differences), pairs.planned))
     return figures
+
+
+def _was_looked_at_in_order(group: Measured[Any], first: PolicyRun, second: PolicyRun) -> bool:
+    """Return whether looks followed the random order of scenes: in a run that stops when decided.
+
+    A stored side that such a run is compared with must have all of its scenes.
+    """
+    if not (first.is_until_decided or second.is_until_decided):
+        return False
+    return _is_in_order(group.cells, first) and _is_in_order(group.others, second)
 
 
 def _is_in_order(cells: ByTask, policy_run: PolicyRun) -> bool:
@@ -95,7 +103,7 @@ def paired_scenes(cells: ByTask, others: ByTask, split: str) -> PairedScenes:
         others: those of the second.
         split: of the scenes.
     """
-    differences = {}
+    differences: dict[PlanScene, float] = {}
     planned = {}
     for task in cells.keys() & others.keys():
         found = _differences(cells[task], others[task])
@@ -104,14 +112,28 @@ def paired_scenes(cells: ByTask, others: ByTask, split: str) -> PairedScenes:
         for episode, difference in found.items():
             differences[PlanScene(task, episode)] = difference
     order = scene_order(differences, split)
-    # The mean over scenes is then the unweighted mean over tasks.
-    weight_of = {task: sum(planned.values()) / (len(planned) * planned[task]) for task in planned}
-    weights = [weight_of[scene.task] for scene in order]
-    for task, count in planned.items():
-        unknown = count - sum(scene.task == task for scene in order)
-        weights += [weight_of[task]] * unknown
-    ordered = [differences[scene] for scene in order]
-    return PairedScenes(np.array(ordered, dtype=np.float64), np.array(weights))
+    ordered = np.array([differences[scene] for scene in order], dtype=np.float64)
+    return PairedScenes(ordered, _weights(order, planned))
+
+
+def _weights(order: Sequence[PlanScene], planned: Mapping[str, int]) -> NDArray[np.float64]:
+    """Return the weights of known scenes in their order, and then of unknown ones.
+
+    With these the mean over scenes is the unweighted mean over tasks.
+
+    Args:
+        order: the scenes that are known.
+        planned: of each task, how many scenes there are.
+    """
+    scenes = sum(planned.values())
+    unknown = dict(planned)
+    weights = []
+    for scene in order:
+        weights.append(scenes / (len(planned) * planned[scene.task]))
+        unknown[scene.task] -= 1
+    for task, count in unknown.items():
+        weights += [scenes / (len(planned) * planned[task])] * count
+    return np.array(weights)
 
 
 def _differences(first: Cell, second: Cell) -> dict[int, float]:

@@ -135,8 +135,8 @@ class Source:
                 spared = Spared((_UNKNOWN_FINDING,), ())
             return FrameParts(self.results, self.planned, spared)
         results = list(filter(stopping.needs, self.results))
-        planned = []
-        unneeded = []
+        planned: list[Job] = []
+        unneeded: list[Job] = []
         for job in self.planned:
             jobs = planned if stopping.needs(job) else unneeded
             jobs.append(job)

@@ -115,15 +115,13 @@ def _summed_up(
     kept: Plans = {plan.fingerprint: plan for plan in read_kept_plans(folder)}
     plans = read_plans(folder)
     planned = _slugs(plans)
-    spared = _spared(plans, entries)
-    needed = {key: slug for key, slug in planned.items() if key not in spared}
     failed = sorted(result for result in checks if result.findings)
     outcomes = Counter(entry.outcome for entry in entries)
     notes = [*_plan_notes(planned, kept, entries), *_excuses(failed, entries)]
     return Verification(
         records=len(entries),
         checks=tuple(failed),
-        missing=_missing(needed, entries),
+        missing=_missing(planned, plans, entries),
         verdicts=Counter(result.replayed for result in checks),
         deviation=_largest_tolerated(checks),
         faults=tuple(_faults(kept, entries)),
@@ -132,10 +130,12 @@ def _summed_up(
     )
 
 
-def _missing(planned: Mapping[RecordKey, str], entries: Iterable[Summary]) -> tuple[str, ...]:
-    """Return the slugs of planned episodes without a record, sorted."""
-    recorded = {identity_key(entry) for entry in entries}
-    missing = {slug for key, slug in planned.items() if key not in recorded}
+def _missing(
+    planned: Mapping[RecordKey, str], plans: Iterable[Plan], entries: Sequence[Summary]
+) -> tuple[str, ...]:
+    """Return the slugs of planned episodes that should have a record and have none, sorted."""
+    found = {identity_key(entry) for entry in entries} | _spared(plans, entries)
+    missing = {slug for key, slug in planned.items() if key not in found}
     return tuple(sorted(missing))
 
 
