@@ -161,14 +161,6 @@ def test_run_colon_policy_shows_the_results_of_that_policy_alone(run_of_two_poli
     assert forgetful.splitlines() == [head, *(row for row in rows if "forgetful" in row)]
 
 
-def test_two_policies_named_apart_are_shown_as_their_whole_run_is(run_of_two_policies):
-    """`RUN:forgetful` is one of the two policies of a run; with the other they are all of it."""
-    options = ("--which", "main", "--format", "csv")
-    policies = (f"{run_of_two_policies}:forgetful", f"{run_of_two_policies}:listener")
-
-    assert call("tables", *policies, *options) == call("tables", run_of_two_policies, *options)
-
-
 def test_a_policy_of_a_folder_and_one_of_its_pack_are_shown_as_the_whole_run_is(
     run_of_two_policies, pack_of_the_run
 ):

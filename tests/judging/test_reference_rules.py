@@ -85,15 +85,6 @@ def test_a_repick_goes_on_while_the_cube_is_in_the_air():
     assert status_after(episode, [picked], [], [], [picked], [lying], [PRESSED]) is Status.SUCCESS
 
 
-def test_repick_counts_a_cube_that_was_let_go_as_put_down_wherever_it_lies():
-    """The cube is to be picked up twice, then the button pressed. Each list holds the facts of one
-    step. The cube only has to lie somewhere; the next pick is the second one."""
-    episode, picked, lying = repick_episode_and_facts(2)
-    picks = [[picked], [lying], [picked], [lying]]
-
-    assert status_after(episode, *picks, [PRESSED]) is Status.SUCCESS
-
-
 @pytest.mark.parametrize(
     ("facts", "timer_start", "due"),
     [

@@ -13,7 +13,6 @@ from contextlib import contextmanager, suppress
 
 PATIENCE = 300
 """Seconds; far more than anything here takes on a loaded machine."""
-MAX_MIB = 300
 UPGRADE = (
     "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
     "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"

@@ -198,15 +198,6 @@ def test_an_unreadable_reply_is_asked_again_with_the_reason():
     assert "no JSON object" in complaint["content"][0]["text"]
 
 
-def test_two_unreadable_replies_are_counted_and_no_third_is_asked_for():
-    with fake_vlm(["no idea", "", GREEN_THREE_TIMES]) as server:
-        policy = make_listener(server)
-
-        assert policy.decide(ENV, "Do it.") is None
-
-    assert spent(policy) == usage_of(calls=2, unparsed=1)
-
-
 def test_a_prompt_that_google_blocks_counts_as_an_unreadable_reply():
     """Google replies with the reason for which it blocked the prompt, and without an answer. The
     model is asked a second time, with *(no answer)* in place of its reply, and in vain.

@@ -273,18 +273,6 @@ def test_a_planner_that_waits_for_a_subgoal_s_end_repeats_an_unreadable_question
     assert len(server.requests) == 11
 
 
-def test_the_qwen_planner_sends_the_current_picture_alone_besides_the_video():
-    """Chunks have 16 steps, so it asks at steps 0, 16, 32 and 48.
-
-    Each picture has the number of its step as its shade of grey. A request has one picture, that
-    of its own step: the video of 60 frames is sent as a clip, which does not count as a picture.
-    """
-    with fake_vlm([REPLY]) as server:
-        play_in_chunks(make_planner("qwen", server, video="mp4"), 48, demonstration=video(60))
-
-    assert [pictures(body) for body in server.requests] == [[0], [16], [32], [48]]
-
-
 def test_the_qwen_planner_sends_the_subgoals_so_far():
     """At four questions the model names: here, there, put down, here.
 
@@ -553,17 +541,6 @@ def pictures_sent_by_memer(*replies):
     with fake_vlm(list(replies)) as server:
         play_in_chunks(make_planner("memer", server), 16 * (len(replies) - 1))
     return [pictures(body) for body in server.requests]
-
-
-def test_the_memer_planner_sends_every_second_frame_since_its_last_question():
-    """The model chooses no frame to keep."""
-    sent = pictures_sent_by_memer(memer_reply(), memer_reply(), memer_reply())
-
-    assert sent == [
-        [0],
-        [2, 4, 6, 8, 10, 12, 14, 16],
-        [18, 20, 22, 24, 26, 28, 30, 32],
-    ]
 
 
 def test_the_memer_planner_sends_the_frames_that_its_model_chose_before_the_new_ones():

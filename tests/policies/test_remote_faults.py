@@ -79,20 +79,6 @@ def test_a_malformed_reply_is_reported_with_the_server_that_sent_it(reply, words
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_after_a_malformed_reply_the_next_episode_works(protocol):
-    """The server's reply to the first question is no array but *left*: that episode ends.
-
-    Its next one, of a new client, gets its chunk of actions.
-    """
-    with failing_at_inference(protocol, {"actions": "left"}) as server:
-        with client_of(server, protocol) as policy, pytest.raises(PolicyReplyError):
-            play_episode(policy)
-
-        with client_of(server, protocol) as following:
-            assert len(play_episode(following)) == 1
-
-
-@pytest.mark.parametrize("protocol", PROTOCOLS)
 @pytest.mark.parametrize(
     "reply",
     [

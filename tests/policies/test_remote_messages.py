@@ -109,17 +109,6 @@ def test_challenge_messages_are_byte_for_byte_the_stored_ones(name, options, has
     assert policy.calibration == has_sensors
 
 
-def test_a_challenge_server_is_shown_each_moment_once():
-    """The server (a stand-in) answers with the number of moments that it was shown so far: a video
-    of three and moment 3 make four, and the moments 4 and 5 make six.
-    """
-    with ChallengeServer() as server, client_of(server, "challenge") as policy:
-        policy.reset(INSTRUCTION, video(3))
-
-        assert (policy.act(moment(3, history=())) == 4).all()
-        assert (policy.act(moment(5, history=(moment(4), moment(5)))) == 6).all()
-
-
 def test_the_metadata_of_a_challenge_server_are_kept_with_its_address():
     """The server (a stand-in) says that it is *submission*, version *phase-1*. The client adds its
     address, and that it executes all actions of a chunk.

@@ -64,14 +64,6 @@ def test_an_episode_is_what_the_harness_would_send(server, client, snapshot):
     assert re.sub(r"roboirg [\d.]+", "roboirg", sent) == snapshot  # without our version
 
 
-def test_each_observation_is_answered_by_one_action(client):
-    """The server (a stand-in) answers its n-th observation with eight numbers n."""
-    client.reset(INSTRUCTION, video(0))
-
-    assert client.act(moment(3)).tolist() == [[1] * 8]
-    assert client.act(moment(4)).tolist() == [[2] * 8]
-
-
 def test_the_version_of_a_server_is_its_name_and_that_of_vla_eval(client):
     """The server (a stand-in) says in its hello that it is *Test*, with vla-eval 0.8.0."""
     client.reset(INSTRUCTION, video(0))

@@ -32,16 +32,6 @@ def test_each_arm_of_an_episode_is_a_job_of_its_own():
     assert len({job.slug for job in jobs}) == len(jobs)
 
 
-def test_scenes_of_video_repick_have_no_second_goal_and_so_no_arm_other_goal():
-    """The arm would state another goal of the scene: one with other things to pick up."""
-    plan = plan_with_arms("told,other-goal", tasks="VideoRepick")
-
-    jobs = plan.jobs()
-
-    assert [job.arm for job in jobs] == ["told", "told", "told"]
-    assert plan.left_out(jobs) == {"other-goal": 3}
-
-
 def test_a_scene_without_a_second_goal_lacks_the_arm_other_goal_and_is_counted_as_left_out():
     """The test episodes 0 and 1 of PickXtimes have one cube, so that no other can be picked up;
     episode 2 has cubes of three colors.

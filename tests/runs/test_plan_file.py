@@ -57,15 +57,6 @@ def test_the_plan_paper_is_the_protocol_of_the_paper():
     assert plan.environment.max_steps == 1300
 
 
-def test_the_plan_paper_has_91_pairs_of_a_task_and_a_setting_or_form():
-    """40 pairs of a task and an implicit setting, in two forms, and 11 tasks in explicit."""
-    plan = make_plan(["random"], **read_plan_file("paper") | {"episodes": "1"})
-
-    cells = {(job.task, job.setting, job.form) for job in plan.jobs()}
-
-    assert len(cells) == 40 + 40 + 11
-
-
 def test_the_plan_paper_context_plays_three_tasks_with_each_set_of_utterance_stages():
     jobs = make_plan(["random"], **read_plan_file("paper-context")).jobs()
 

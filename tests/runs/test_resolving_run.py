@@ -77,14 +77,3 @@ def test_a_policy_behind_a_rewriter_has_both_their_versions_in_the_plan_and_in_t
 
     assert open_policy(read_policy(policy)).version == "built-in → v7"
     assert record_of(policy).policy_version == "built-in → v7"
-
-
-@pytest.mark.parametrize(("rewriter", "is_privileged"), [("listener", True), ("surface", False)])
-def test_a_policy_behind_a_rewriter_is_privileged_if_the_rewriter_knows_the_declared_meaning(
-    rewriter, is_privileged
-):
-    """`listener` is given the meaning that the benchmark declares for the words; `surface` reads
-    the words alone. The policy behind them, `KeepsWords`, knows nothing but what it hears."""
-    policy = read_policy(f"resolve:{rewriter}?policy=test_resolving_run:KeepsWords")
-
-    assert policy.is_privileged == is_privileged

@@ -6,7 +6,6 @@ import itertools
 import json
 import os
 import re
-import signal
 import time
 from collections import deque
 from types import SimpleNamespace
@@ -248,19 +247,6 @@ def test_a_record_has_the_time_in_a_queue_apart_from_the_time_of_the_call():
 
     assert timings["policy_queue"] >= 5.3
     assert timings["policy_reset"] <= total - 0.3 + 1e-6
-
-
-def test_a_worker_whose_episode_takes_too_long_is_killed():
-    """The episode of the worker sleeps for an hour. Within a limit of an hour (3600 s) it goes on;
-    beyond one of 0 s its process is ended by SIGKILL."""
-    worker = Worker(sleeps_for_an_hour, small_plan(1).jobs()[0])
-    assert worker.poll(episode_timeout_s=3600) is None
-
-    record = worker.poll(episode_timeout_s=0.0)
-
-    assert record.error == "timeout"
-    assert worker.is_dead
-    assert worker.child.exit == (-signal.SIGKILL,)
 
 
 @pytest.mark.parametrize(

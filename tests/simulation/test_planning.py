@@ -181,26 +181,6 @@ def test_a_goal_at_the_current_pose_does_not_lead_by_way_of_home(planner, distan
 
 
 @pytest.mark.parametrize(
-    ("goal", "fewest", "most"),
-    [
-        ((-0.1, 0.0, 0.10), 20, 26),
-        ((-0.1, 0.0, 0.05), 20, 27),
-        ((-0.1, 0.1, 0.20), 16, 22),
-        ((-0.1, 0.2, 0.20), 22, 30),
-    ],
-    ids=["down 10 cm", "down 15 cm", "aside 10 cm", "aside 20 cm"],
-)
-def test_free_moves_take_as_many_control_steps_as_robomme_s(planner, goal, fewest, most):
-    """From 0.2 m above the table, down or aside. RoboMME's moves of these lengths take between
-    `fewest` and `most` control steps of 1/20 s."""
-    start = planner.plan_straight(HOME, pose_facing_down(-0.1, 0.0, 0.2))[-1]
-
-    path = planner.plan_straight(start, pose_facing_down(*goal))
-
-    assert fewest <= len(path) <= most
-
-
-@pytest.mark.parametrize(
     ("task", "primitive", "fewest", "most"),
     [("PickXtimes", "pick_cube", 89, 157), ("VideoUnmask", "pick_container", 77, 134)],
 )

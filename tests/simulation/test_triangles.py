@@ -24,16 +24,6 @@ def test_an_octahedron_needs_as_many_vertices_as_it_has_normals():
     assert len(shared.vertices) == 8
 
 
-def test_two_triangles_of_a_square_share_two_vertices():
-    low = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
-    high = [(1, 0, 0), (1, 1, 0), (0, 1, 0)]
-    square = Triangles(np.float32([low, high]), np.float32([(0, 0, 1), (0, 0, 1)]))
-
-    shared = index_triangles(square)
-
-    assert len(shared.vertices) == 4
-
-
 def test_sharing_vertices_keeps_each_triangle_and_its_normal():
     """A triangle may begin at another of its corners than before."""
     shared = index_triangles(octahedron()).to_triangles()

@@ -238,16 +238,6 @@ def test_an_update_changes_fast_weights_by_a_norm_of_at_most_five():
     assert float(change.norm()) == pytest.approx(5.0)
 
 
-def test_an_update_of_fast_weights_with_a_rate_of_zero_changes_nothing():
-    """The rate is the size of a step of learning; keys and values are drawn."""
-    fast, norm, keys, values, rates = fast_numbers(seed=0)
-
-    updated = fast.updated(keys, values, 0 * rates, norm)
-
-    assert torch.equal(updated.weights, fast.weights)
-    assert torch.equal(updated.biases, fast.biases)
-
-
 def frames_kept_at(look):
     """Return the numbers of the frames that are kept at a look; -1 fills the 32 places up."""
     return even_frames(torch.tensor([[look]]))[0, 0].tolist()
