@@ -5,11 +5,14 @@ import pickle
 import weakref
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 import pytest
+from flat_jobs import job_of
 from selection import slow_but
 
 import roboirg
+from roboirg.runs.play.rollout import EpisodeRunner
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.expert.primitives import MotionPrimitives
@@ -276,6 +279,55 @@ def test_a_video_that_was_drawn_has_the_same_arrays_as_one_that_was_read():
     drawn.draw()
 
     check_same(dict(drawn), dict(read))
+
+
+class Viewer:
+    """Acts on the pictures of the video, of which it gets every sixth."""
+
+    demonstration_frames = 6
+
+    def reset(self, instruction, demonstration):
+        self.seen = demonstration["wrist_rgb"].mean(axis=(1, 2, 3))
+
+    def act(self, observation):
+        actions = np.tile(HOME_ACTION, (40, 1))
+        actions[:11, 0] += 1e-3 * self.seen
+        return actions
+
+
+def record_of_viewer(folder):
+    """Return the fields of the record of a run, but for those that tell the time."""
+    job = job_of(
+        policy=f"{__name__}:Viewer", task=SHORT, split="test", episode=1, setting="direct",
+        max_steps=80,
+    )  # fmt: skip
+    record = msgspec.structs.asdict(EpisodeRunner(folder)(job))
+    for name in ("started_at", "duration_s", "timings", "details"):
+        del record[name]
+    return record
+
+
+def test_a_run_records_the_same_with_an_empty_a_filled_and_no_cache(cache, tmp_path, monkeypatch):
+    """The policy acts on the pictures of a video of 66 steps, which come from the simulator at
+    first and from the cache afterwards. A wrong picture would change its actions and so the
+    record."""
+    with_empty_cache = record_of_viewer(tmp_path)
+    with_filled_cache = record_of_viewer(tmp_path)
+    monkeypatch.setenv("ROBOIRG_CACHE", "off")
+    without_cache = record_of_viewer(tmp_path)
+
+    assert with_empty_cache["demonstration_steps"] == 66
+    assert with_filled_cache == with_empty_cache
+    assert without_cache == with_empty_cache
+
+
+def test_a_reset_fills_the_cache_with_a_recording_and_the_pictures_of_each_camera(cache):
+    """The cache is empty before. `dict` reads all arrays of the video, so that its pictures are
+    drawn: one file has its actions, and one for each of two cameras has pictures."""
+    dict(reset(cameras=("front", "wrist"), demonstration_frames=6).video)
+
+    assert len(list(cache.glob("actions/*"))) == 1
+    assert len(list(cache.glob("frames/*"))) == 2
 
 
 def test_with_a_filled_cache_no_picture_of_the_video_is_drawn(
