@@ -75,11 +75,6 @@ def play_without_simulator(monkeypatch):
     return end_with
 
 
-def run_with_plan_file(**fields):
-    """Return the words of a run with a plan file."""
-    return (*RUN_RANDOM, "--plan", plan_file(**fields))
-
-
 def check_refused(roboirg, words, sentence):
     """Assert that a command with these words is refused in one sentence, with exit code 2."""
     result = roboirg(*words)

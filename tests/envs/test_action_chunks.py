@@ -96,13 +96,6 @@ def test_sub_environments_that_take_chunks_equal_single_ones(vector):
     check_second(batch, infos, *single.reset(options={"episode": 2}))
 
 
-def test_a_reset_of_sub_environments_gives_the_demonstration_of_each(vector):
-    """Those of test episodes 0 and 1 have 114 and 168 frames, as long as the episodes' motions."""
-    _, infos = vector.reset(seed=50)
-
-    assert [video.length for video in infos["demonstration"]] == [114, 168]
-
-
 @pytest.mark.parametrize(
     "wrong",
     [np.zeros((2, 7)), np.zeros(7), np.full((3, 7), np.nan), "up"],

@@ -83,18 +83,6 @@ def vector():
     made.close()
 
 
-def test_gymnasium_s_vector_environment_gives_what_single_environments_give(vector):
-    """`vector` has two environments of PickXtimes. Gymnasium gives the first one the seed 4, and
-    the second one the next, 5, which choose episodes 4 and 5. So the second row of each part of the
-    observations must be that of a single environment of episode 5, made with the same OPTIONS."""
-    batch, infos = vector.reset(seed=4)
-
-    observation, _ = roboirg.make("PickXtimes", episode=5, **OPTIONS).reset()
-    assert infos["is_success"].tolist() == [False, False]
-    for key, value in observation.items():
-        assert np.array_equal(batch[key][1], value), key
-
-
 def test_gymnasium_s_vector_environment_goes_on_with_the_next_episodes(vector):
     """`vector` has two environments with episodes of two steps. Seed 4 starts episode 4 in the
     first and 5 in the second; each goes on with its own next one, 5 and 6. An episode ends at the

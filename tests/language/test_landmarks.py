@@ -131,18 +131,6 @@ def test_every_superlative_applies_to_a_single_cube(phrase):
     assert name_called(scene, phrase, "cube") == "cube_red"
 
 
-def test_of_two_objects_equally_far_to_the_left_none_is_the_leftmost():
-    """Places are (x, y) in meters: x grows away from the robot, y to its left. container_0 and
-    container_1 stand equally far to the left, container_2 to the right of them; container_0 is the
-    nearest one."""
-    scene = containers((0.0, 0.1), (0.1, 0.1), (0.05, -0.1))
-
-    assert name_called(scene, "farthest to your left") is None
-    assert name_called(scene, "farthest to your right") == "container_2"
-    assert name_called(scene, "at your far right") == "container_2"
-    assert name_called(scene, "closest to you") == "container_0"
-
-
 @pytest.mark.parametrize(
     ("phrase", "expected"),
     [
@@ -242,14 +230,6 @@ def test_left_and_right_of_the_camera_follow_its_picture_and_not_the_table():
 
     assert name_called(scene, "farthest to your left") == "container_1"
     assert name_called(scene, "farthest to the camera's right", frame="camera") == "container_0"
-
-
-def test_a_thing_is_in_a_corner_if_work_area_and_table_agree():
-    """Places are (x, y) in meters: x grows away from the robot, y to its left. A listener may think
-    of the corner of the table or of the area where things stand. In a square, container_0, near and
-    on the left, is the nearest to both near left corners."""
-    clear = containers((-0.15, 0.15), (-0.15, -0.15), (0.15, 0.15), (0.15, -0.15))
-    assert name_called(clear, "closest to your near left corner") == "container_0"
 
 
 def test_a_corner_phrase_is_dropped_if_work_area_and_table_corner_disagree():

@@ -204,15 +204,6 @@ def test_near_and_far_are_not_said_where_depth_and_distance_from_the_robot_disag
 
 
 @pytest.mark.parametrize(
-    ("frame", "phrase"), [("robot", "closest to you"), ("camera", "closest to the robot")]
-)
-def test_closest_is_said_where_depth_and_distance_from_the_robot_agree(frame, phrase):
-    """container_0 is the nearer one by both measures."""
-    scene = containers([(-0.2, 0.0), (-0.14, 0.25)])
-    assert names_by_phrase(scene, frame=frame)[phrase] == "container_0"
-
-
-@pytest.mark.parametrize(
     ("other", "words"),
     [
         ((0.02, 0.02), {"nearest to the back left corner"}),
@@ -352,17 +343,6 @@ def test_the_camera_sees_the_robot_s_leftmost_thing_on_the_right_of_the_picture(
     its left; the camera faces the robot."""
     phrases = phrases_after_a_noun(ROW_OF_FIVE, "container_4", frame="camera")
     assert phrases == {"all the way on the right of the picture"}
-
-
-@pytest.mark.parametrize(
-    ("name", "phrase"),
-    [("container_2", "in the back left corner"), ("container_1", "at the front right")],
-)
-def test_everyday_words_for_the_corners_of_a_square(name, phrase):
-    """Places are (x, y) in meters: x grows away from the robot, y to its left. So container_2
-    stands in the back on the left, container_1 in the front on the right."""
-    square = containers([(-0.15, 0.15), (-0.15, -0.15), (0.15, 0.15), (0.15, -0.15)])
-    assert phrase in phrases_after_a_noun(square, name)
 
 
 @pytest.mark.parametrize(

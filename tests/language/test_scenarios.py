@@ -43,6 +43,7 @@ from roboirg.language.scenarios.spoken import say_chosen
 from roboirg.language.scenarios.wording_file import parse_wordings
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.variants import instructions
+from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode, split_episodes
 
@@ -778,11 +779,13 @@ def test_a_context_of_nine_remarks_begins_with_those_of_a_context_of_two(kind):
     assert many[-2:] == few[-2:]
 
 
-def test_a_task_without_words_of_ours_is_refused_by_name(monkeypatch):
-    """`take_words` removes our file of words of VideoRepick, as if none had been written."""
+def test_planning_a_run_of_a_task_without_a_file_of_words_is_refused(monkeypatch):
+    """`take_words` removes our file of words of VideoRepick, as if none had been written: there
+    would be nothing to tell a policy."""
     take_words(monkeypatch, "VideoRepick")
-    with pytest.raises(InvalidValueError, match="VideoRepick names no file of words"):
-        instruct(get_episode("VideoRepick", "test", 0), "direct")
+    message = r"VideoRepick names no file of words \(write one, see"
+    with pytest.raises(InvalidValueError, match=message):
+        make_plan(["random"], tasks="VideoRepick", episodes="1")
 
 
 def test_a_scenario_for_a_task_without_words_of_ours_needs_commands_of_its_own(monkeypatch):

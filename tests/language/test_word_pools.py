@@ -37,16 +37,6 @@ def test_choosing_a_pool_gives_the_words_of_a_split_that_uses_it(setting, pool, 
 
 
 @each_pool
-def test_the_metadata_of_an_instruction_name_the_chosen_pool(pool):
-    """ "own" tells that its command is ours, and no whole sentence of a user's file."""
-    said = instruct(get_episode("StopCube", "test", 0), wordings=pool)
-
-    assert said.metadata["pool"] == pool
-    assert said.metadata["wordings"] == pool
-    assert said.metadata["command"] == "own"
-
-
-@each_pool
 def test_the_command_show_accepts_a_pool_of_wordings(pool):
     """It prints the words of the pool for the same episode."""
     said = instruct(get_episode("StopCube", "test", 0), wordings=pool)

@@ -34,7 +34,7 @@ from roboirg.language.meaning import command_goals
 from roboirg.language.request import values_of_goal
 from roboirg.language.scenarios.identity import words_digest, words_of
 from roboirg.language.scenarios.wording_file import parse_wordings, read_wordings
-from roboirg.language.scenarios.wording_store import find_wordings, register_wordings
+from roboirg.language.scenarios.wording_store import register_wordings
 from roboirg.shortcuts.command_chance import blind_goals, goals_of_command, understood_goals
 from roboirg.tasks.splits.splits import get_episode
 
@@ -969,8 +969,6 @@ def test_episodes_of_a_user_s_words_need_their_file():
     """`open_wordings(None, …)` is a run without `--wordings` that continues one with such words."""
     with pytest.raises(InvalidValueError, match="need their file; none was given"):
         open_wordings(None, "hand@00000000")
-    with pytest.raises(InvalidValueError, match="are not open"):
-        find_wordings("hand@00000000")
 
 
 def test_episodes_of_our_words_need_no_file():

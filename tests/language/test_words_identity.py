@@ -154,18 +154,6 @@ def test_the_word_repeats_and_the_placeholder_repeats_have_different_digests(dig
     assert digest_of(word) != digest_of(placeholder)
 
 
-def test_each_task_and_pool_has_a_digest_of_its_own():
-    found = {
-        words_of("PickXtimes", "train"), words_of("PickXtimes", "test"),
-        words_of("StopCube", "train"), words_of("StopCube", "test"),
-    }  # fmt: skip
-    assert len(found) == 4
-
-
-def test_a_task_without_words_has_none_in_the_place_of_the_digest():
-    assert words_of("Gone", "test") == "Gone/test@none"
-
-
 def test_the_language_label_lists_the_words_of_each_task_after_the_version():
     """A task that does not exist, "Gone", stands for one without words."""
     digest = identity.words_digest("PickXtimes", "train")

@@ -96,17 +96,6 @@ def test_a_file_of_records_cut_anywhere_loses_only_the_line_that_was_cut(data):
             assert path.with_name(TORN_FILE).read_bytes() == torn + b"\n"
 
 
-def test_a_record_that_is_added_behind_a_cut_line_has_a_line_of_its_own(tmp_path):
-    """A crash has cut off the last 10 bytes of the second of two records; the first is kept."""
-    first, second, *_ = eight_records()
-    path = fill(tmp_path, first, second) / RECORDS_FILE
-    path.write_bytes(path.read_bytes()[:-10])
-
-    fill(tmp_path, second)
-
-    assert read_records(tmp_path) == (first, second)
-
-
 def test_an_error_before_a_policy_declares_its_version_gets_that_of_its_verdicts(tmp_path):
     """Of a policy that declares its version late one episode was won, with version 7; another one
     ended in an error before that, so that its version is unknown.

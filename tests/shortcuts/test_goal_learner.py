@@ -177,15 +177,6 @@ def test_the_facts_of_a_scene_do_not_depend_on_the_order_of_its_objects(task):
     assert scene_facts(turned) == scene_facts(scene)
 
 
-@pytest.mark.parametrize("task", FACTS_TASKS)
-def test_the_facts_of_a_scene_do_not_name_its_objects(task):
-    """A name such as cube_red_2 could tell the goal; *button* is also the kind of the thing."""
-    scene = get_episode(task, "random", 3).scene
-    facts = " ".join(scene_facts(scene))
-    for thing in scene.objects:
-        assert thing.name == thing.kind or thing.name not in facts
-
-
 def test_two_learners_of_the_same_texts_guess_the_same():
     """Learning is random, but with a fixed seed. Would find a seed that is missing.
 

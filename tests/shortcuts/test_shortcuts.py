@@ -5,7 +5,6 @@ A rule guesses the value that was named first (first-mention), last (last-mentio
 a tuple of values, equally likely, for each place of each slot of the goal.
 """
 
-import sys
 from dataclasses import replace
 from fractions import Fraction
 
@@ -18,7 +17,7 @@ from plan_files import plan_file
 from typer.testing import CliRunner
 
 from roboirg.core.episode import values_in
-from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct, instruct_with
 from roboirg.language.settings import settings_of
@@ -288,24 +287,6 @@ def test_elimination_is_right_if_the_command_names_every_value(task, setting):
             assert score_rule("elimination", (episode, said)).goal == 1, said.text
 
 
-def test_in_a_known_episode_the_first_mention_is_right_and_elimination_wrong():
-    """Hidden is to which of two targets, the one used *before* or *after* the press. The text names
-    *after*, which is right: "first-mention" guesses what is named first, and "elimination" what is
-    not named."""
-    episode = get_episode("VideoPlaceButton", "test", 0)
-    said = instruct(episode, "direct")
-
-    first_mention = score_rule("first-mention", (episode, said))
-    elimination = score_rule("elimination", (episode, said))
-
-    assert said.text == (
-        "I'm supposed to test the target the robot used right after pressing the button. Put the "
-        "green cube there."
-    )
-    assert first_mention.slots == {"relation": 1}
-    assert elimination.slots == {"relation": 0}
-
-
 def test_an_explicit_instruction_leaves_nothing_to_chance():
     """No slot is scored, and a guess of the goal is right with probability 1."""
     episode = get_episode("VideoPlaceButton", "test", 0)
@@ -518,16 +499,6 @@ def test_a_wrong_option_of_the_shortcuts_command_is_one_sentence(words, sentence
 
     assert isinstance(outcome.exception, (InvalidValueError, UnknownNameError))
     assert sentence in str(outcome.exception)
-
-
-def test_without_scikit_learn_the_learned_floors_are_refused_with_what_to_install(monkeypatch):
-    """Importing scikit-learn's networks fails, as where it is not installed. The learners need
-    them; the extra `report` brings them."""
-    monkeypatch.setitem(sys.modules, "sklearn.neural_network", None)
-    outcome = shortcuts_command("--tasks", "StopCube", "--learned")
-
-    assert isinstance(outcome.exception, MissingDependencyError)
-    assert "[report]'" in str(outcome.exception)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from language_variants import expressible_options
 
 import roboirg
 from roboirg import tasks
@@ -15,12 +14,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Primitive, Stage
 from roboirg.core.errors import RoboIRGError
 from roboirg.judging import Judge, Status
-from roboirg.language import instruct_with
-from roboirg.language.scenarios import scenario_file
-from roboirg.language.settings import plain_settings, settings_of
 from roboirg.policies import make_policy, play
-from roboirg.runs.plan.plan_maker import make_plan
-from roboirg.shortcuts.command_chance import understood_goals
 from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.splits import get_episode
 
@@ -63,53 +57,6 @@ def test_a_task_of_another_package_is_not_part_of_all(task):
     """The fixture has registered the documentation's task, "PlaceAndPress". *All* are the tasks of
     the benchmark."""
     assert OUTSIDE_TASK not in tasks.find_tasks(["all"])
-
-
-def test_a_task_of_another_package_has_the_settings_but_spatial(task):
-    plain = plain_settings(task)
-
-    assert plain == ("explicit", "direct", "reasoning", "contextual")
-    assert set(settings_of(task)) - set(plain) == {"direct-rival", "grounded"}
-
-
-def test_the_instructions_of_a_task_of_another_package_mean_its_goals(task):
-    """The fixture has registered the documentation's task, "PlaceAndPress". Of eight episodes every
-    instruction that its words can express is read by the interpreter, which returns the goals that
-    the words leave open: of a good instruction that is the episode's own and no other."""
-    instructions = 0
-    for index in range(8):
-        episode = get_episode(OUTSIDE_TASK, "test", index)
-        for options in expressible_options(episode):
-            said = instruct_with(episode, options)
-            instructions += 1
-
-            assert understood_goals(said, episode) == (episode.goal,), said.text
-
-    assert instructions >= 8
-
-
-@pytest.fixture
-def _task_without_words(task, monkeypatch):
-    """The documentation's task is registered again without the file that has its words, and what
-    was read of such files is forgotten."""
-    without_words = replace(task, words="")
-    read_anew = scenario_file.task_scenarios.__wrapped__
-    # Undone before the fixture `task` puts the registry back.
-    with monkeypatch.context() as patch:
-        patch.setattr(tasks, "_registry", lambda: (without_words,))
-        patch.setattr(scenario_file, "task_scenarios", read_anew)
-        tasks.all_tasks.cache_clear()
-        yield
-
-
-@pytest.mark.usefixtures("_task_without_words")
-def test_planning_a_run_of_a_task_without_a_file_of_words_is_refused():
-    """The fixture has registered the documentation's task, "PlaceAndPress", without the name of a
-    file of words: there would be nothing to tell a policy."""
-    message = r"PlaceAndPress names no file of words \(write one, see"
-
-    with pytest.raises(RoboIRGError, match=message):
-        make_plan(["random"], tasks="PlaceAndPress", episodes="1")
 
 
 def test_a_failure_in_a_task_of_another_package_has_a_readable_cause(task):

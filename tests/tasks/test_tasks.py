@@ -12,7 +12,6 @@ from roboirg.core import object_sizes
 from roboirg.core.episode import DIFFICULTIES, ROBOT_BASE, SPLITS
 from roboirg.core.footprints import Circle, overlap
 from roboirg.core.motions import Away, Glow, Shuttle, Swap, Vanish
-from roboirg.language.settings import plain_settings
 from roboirg.tasks import every_task, get_task
 from roboirg.tasks.other_goals import other_goals
 from roboirg.tasks.shared.fixtures import footprint
@@ -55,17 +54,6 @@ def test_the_registry_holds_each_task_once_in_the_order_of_its_code():
         (12, "PutInBox", "real", True),
         (13, "PickByCount", "real", True),
     ]
-
-
-def test_only_tasks_with_words_for_sides_have_the_setting_spatial():
-    """The other four settings are there for every task; a task says in `spatial` whether left and
-    right name its objects."""
-    for name, task in every_task().items():
-        settings = plain_settings(task)
-
-        assert name == task.name
-        assert settings[:4] == ("explicit", "direct", "reasoning", "contextual"), name
-        assert settings[4:] == (("spatial",) if task.spatial else ()), name
 
 
 @pytest.mark.parametrize(
