@@ -1,6 +1,7 @@
 """Runs that stop when what they compare is decided."""
 
 import hashlib
+import os
 import signal
 import subprocess
 import sys
@@ -106,8 +107,10 @@ def test_a_run_that_is_killed_ten_times_decides_at_the_same_scene(tmp_path, work
     plan = two_policies()
     run_plan(plan, tmp_path / "whole", Lucky(), InProcess())
     killed = tmp_path / "killed"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}  # with the helpers
     for kill in range(10):
-        child = subprocess.Popen([sys.executable, __file__, str(killed), str(workers)])
+        command = [sys.executable, __file__, str(killed), str(workers)]
+        child = subprocess.Popen(command, env=environment)
         while line_count(killed) <= 2 * kill and child.poll() is None:
             time.sleep(0.02)
         child.send_signal(signal.SIGKILL)
