@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -242,14 +242,10 @@ def compare(
 
     Example: roboirg compare runs/first runs/second --by pattern
     """
-    from rich.console import Console
-    from rich.text import Text
-
     from roboirg.analysis.measures.comparison import compare as compare_frames
     from roboirg.analysis.results.reading import read_frame
     from roboirg.analysis.results.sources import opened_sources
     from roboirg.cli.run_commands import warn_of_mixtures
-    from roboirg.util.console_width import widen
 
     breakdowns = _breakdowns(by)
     needs_words = bool(breakdowns)
@@ -267,10 +263,7 @@ def compare(
     if name == other_name:  # the same policy in two runs
         name = f"{name} ({first})"
         other_name = f"{other_name} ({second})"
-    console = Console()
-    widen(console)
-    for line in _comparison_lines(comparison, (frame, other_frame), (name, other_name)):
-        console.print(Text(line), highlight=False)
+    _print_lines(_comparison_lines(comparison, (frame, other_frame), (name, other_name)))
 
 
 def _print_settings(run: str, by: str | None) -> None:
@@ -280,15 +273,11 @@ def _print_settings(run: str, by: str | None) -> None:
         run: as typed, of one policy.
         by: as typed; breakdowns are of two policies.
     """
-    from rich.console import Console
-    from rich.text import Text
-
     from roboirg.analysis.measures.comparison import compare_settings
     from roboirg.analysis.measures.comparison_text import sentences
     from roboirg.analysis.results.reading import read_frame
     from roboirg.analysis.results.sources import opened_sources
     from roboirg.cli.run_commands import warn_of_mixtures
-    from roboirg.util.console_width import widen
 
     if by is not None:
         raise InvalidValueError("--by compares two policies; name the second, too.")
@@ -296,10 +285,20 @@ def _print_settings(run: str, by: str | None) -> None:
         frame = read_frame(sources)
     comparison = compare_settings(frame)
     warn_of_mixtures(frame)
+    policy = comparison.first.marked_policy
+    _print_lines(sentences(comparison, policy, policy))
+
+
+def _print_lines(lines: Iterable[str]) -> None:
+    """Print lines of text as wide as the terminal allows."""
+    from rich.console import Console
+    from rich.text import Text
+
+    from roboirg.util.console_width import widen
+
     console = Console()
     widen(console)
-    policy = comparison.first.marked_policy
-    for line in sentences(comparison, policy, policy):
+    for line in lines:
         console.print(Text(line), highlight=False)
 
 

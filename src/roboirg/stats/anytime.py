@@ -13,7 +13,7 @@ policies, or of two instructions of one, in the same scene: from -1 to 1.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Self
 
@@ -172,6 +172,18 @@ def _better(seen: PairedScenes) -> Finding:
     return "first" if np.nansum(seen.differences) > 0 else "second"
 
 
+def scene_weights(sizes: Mapping[str, int]) -> dict[str, float]:
+    """Return by how much a scene of each task counts, so that the mean is that over tasks.
+
+    For one task of 1 scene and one of 9 these are 5 and 10/18; over all scenes they add up to 10.
+
+    Args:
+        sizes: of each task, how many scenes are planned.
+    """
+    scenes = sum(sizes.values())
+    return {task: scenes / (len(sizes) * size) for task, size in sizes.items()}
+
+
 def mean_difference(seen: PairedScenes) -> float:
     """Return the weighted mean of the differences that are known; 0 without any."""
     has_result = np.isfinite(seen.differences)
@@ -231,9 +243,9 @@ def within_path(pairs: PairedScenes, margin: float, alpha: float = ALPHA) -> NDA
         alpha: share of games in which this may be wrong at some moment.
     """
     shares, scale = _shares(pairs)
-    highest = (1 + margin / scale) / 2
-    is_below = winnings_above(1 - highest, 1 - shares, pairs.planned) >= 2 / alpha
-    is_above = winnings_above(1 - highest, shares, pairs.planned) >= 2 / alpha
+    lowest = (1 - margin / scale) / 2
+    is_below = winnings_above(lowest, 1 - shares, pairs.planned) >= 2 / alpha
+    is_above = winnings_above(lowest, shares, pairs.planned) >= 2 / alpha
     path = np.logical_or.accumulate(is_below) & np.logical_or.accumulate(is_above)
     # Of each place the look after the last scene with a result.
     scenes = np.cumsum(np.isfinite(pairs.differences))

@@ -64,19 +64,7 @@ class Pairs:
         An episode in which the first succeeded with one of two seeds, and the second with both,
         has the row ``(1, 2, 2, 2)``: successes and trials of the first, then of the second.
         """
-        first_episodes = first.by_episode()
-        second_episodes = second.by_episode()
-        rows = []
-        for episode in sorted(first_episodes.keys() & second_episodes.keys()):
-            first_by_seed = first_episodes[episode]
-            second_by_seed = second_episodes[episode]
-            shared_seeds = first_by_seed.keys() & second_by_seed.keys()
-            if shared_seeds:
-                first_by_seed = {seed: first_by_seed[seed] for seed in shared_seeds}
-                second_by_seed = {seed: second_by_seed[seed] for seed in shared_seeds}
-            first_wins = sum(first_by_seed.values())
-            second_wins = sum(second_by_seed.values())
-            rows.append((first_wins, len(first_by_seed), second_wins, len(second_by_seed)))
+        rows = list(paired_episodes(first, second).values())
         return cls(np.array(rows, dtype=np.int64).reshape(-1, 4), _overlap(first, second))
 
     @cached_property
@@ -101,6 +89,38 @@ class Pairs:
         if np.array_equal(first_trials, second_trials):
             return np.asarray(first - second)
         return np.asarray(first * second_trials - second * first_trials)
+
+
+class PairedEpisode(NamedTuple):
+    """Numbers of trials of two cells in one episode."""
+
+    first_wins: int
+    first_trials: int
+    second_wins: int
+    second_trials: int
+
+
+def paired_episodes(first: Cell, second: Cell) -> dict[int, PairedEpisode]:
+    """Return successes and trials of two cells in each episode with verdicts in both, in order.
+
+    Counts the policy seeds that both cells have, or all seeds if they share none.
+    """
+    first_episodes = first.by_episode()
+    second_episodes = second.by_episode()
+    paired = {}
+    for episode in sorted(first_episodes.keys() & second_episodes.keys()):
+        first_by_seed = first_episodes[episode]
+        second_by_seed = second_episodes[episode]
+        shared_seeds = first_by_seed.keys() & second_by_seed.keys()
+        if shared_seeds:
+            first_by_seed = {seed: first_by_seed[seed] for seed in shared_seeds}
+            second_by_seed = {seed: second_by_seed[seed] for seed in shared_seeds}
+        first_wins = sum(first_by_seed.values())
+        second_wins = sum(second_by_seed.values())
+        paired[episode] = PairedEpisode(
+            first_wins, len(first_by_seed), second_wins, len(second_by_seed)
+        )
+    return paired
 
 
 def _overlap(first: Cell, second: Cell) -> Overlap:

@@ -12,10 +12,10 @@ from roboirg.analysis.measures.measure import Measured
 from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.core.plain_text import counted
 from roboirg.runs.plan.stopping import PlanScene, scene_order
-from roboirg.stats.anytime import PairedScenes, mean_bounds, p_in_any_order, p_path
+from roboirg.stats.anytime import PairedScenes, mean_bounds, p_in_any_order, p_path, scene_weights
 from roboirg.stats.cells import ByTask, Cell
 from roboirg.stats.intervals import Interval
-from roboirg.stats.paired_tests import holm
+from roboirg.stats.paired_tests import holm, paired_episodes
 from roboirg.stats.rates import bounds_text, p_text
 
 
@@ -119,38 +119,28 @@ def paired_scenes(cells: ByTask, others: ByTask, split: str) -> PairedScenes:
 def _weights(order: Sequence[PlanScene], planned: Mapping[str, int]) -> NDArray[np.float64]:
     """Return the weights of known scenes in their order, and then of unknown ones.
 
-    With these the mean over scenes is the unweighted mean over tasks.
-
     Args:
         order: the scenes that are known.
         planned: of each task, how many scenes there are.
     """
-    scenes = sum(planned.values())
+    weight_of = scene_weights(planned)
     unknown = dict(planned)
     weights = []
     for scene in order:
-        weights.append(scenes / (len(planned) * planned[scene.task]))
+        weights.append(weight_of[scene.task])
         unknown[scene.task] -= 1
     for task, count in unknown.items():
-        weights += [scenes / (len(planned) * planned[task])] * count
+        weights += [weight_of[task]] * count
     return np.array(weights)
 
 
 def _differences(first: Cell, second: Cell) -> dict[int, float]:
-    """Return by how much the first is better in each episode that both have, -1 to 1.
-
-    Policy seeds that both have count, or all seeds if they share none.
-    """
-    first_episodes = first.by_episode()
-    second_episodes = second.by_episode()
+    """Return by how much the first is better in each episode that both have, -1 to 1."""
     differences = {}
-    for episode in first_episodes.keys() & second_episodes.keys():
-        first_verdicts = first_episodes[episode]
-        second_verdicts = second_episodes[episode]
-        seeds = first_verdicts.keys() & second_verdicts.keys()
-        first_wins = [first_verdicts[seed] for seed in seeds or first_verdicts]
-        second_wins = [second_verdicts[seed] for seed in seeds or second_verdicts]
-        differences[episode] = float(np.mean(first_wins) - np.mean(second_wins))
+    for episode, row in paired_episodes(first, second).items():
+        differences[episode] = (
+            row.first_wins / row.first_trials - row.second_wins / row.second_trials
+        )
     return differences
 
 

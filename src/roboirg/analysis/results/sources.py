@@ -130,8 +130,10 @@ class Source:
         """What the frame of the run is made of."""
         stopping = self.stopping
         if stopping is None:
+            # A merged run has no plan of its own, but those of its parts.
+            plans = read_plans(self.folder) if self._plan is None else (self._plan,)
             spared = None
-            if any(plan.stop is not None for plan in read_plans(self.folder)):
+            if any(plan.stop is not None for plan in plans):
                 spared = Spared((_UNKNOWN_FINDING,), ())
             return FrameParts(self.results, self.planned, spared)
         results = list(filter(stopping.needs, self.results))

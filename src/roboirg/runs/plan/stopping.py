@@ -29,6 +29,7 @@ from roboirg.stats.anytime import (
     decide,
     mean_bounds,
     mean_difference,
+    scene_weights,
 )
 from roboirg.stats.rates import bounds_text, p_text, points
 from roboirg.util.short_hash import short_hash
@@ -233,11 +234,6 @@ class Stopping:
             )
         return found
 
-    @property
-    def is_over(self) -> bool:
-        """Whether all contrasts are closed, so that nothing needs to be played."""
-        return all(decision.finding != "open" for decision in self.decisions)
-
     @cached_property
     def _needed(self) -> frozenset[RecordKey]:
         """The jobs of the scenes that both sides of a contrast have, up to its decision."""
@@ -265,11 +261,10 @@ class Stopping:
         first = self.trials[contrast.first]
         second = self.trials[contrast.second]
         shared = first.keys() & second.keys()
-        sizes = Counter(scene.task for scene in shared)
+        weight_of = scene_weights(Counter(scene.task for scene in shared))
         weights = np.zeros(len(self.order))
         for scene in shared:
-            # The mean over scenes is then the unweighted mean over tasks.
-            weights[self.places[scene]] = len(shared) / (len(sizes) * sizes[scene.task])
+            weights[self.places[scene]] = weight_of[scene.task]
 
         differences = []
         for scene in self.order:
