@@ -85,6 +85,18 @@ def trained_files(
     return PolicyFiles(body, reader)
 
 
+def prepare_bodies(plan: BodyPlan, folder: Path, workers: int, progress: Progress) -> None:
+    """Make what all bodies of a folder share, unless it has them: recordings and a detector.
+
+    Afterwards several bodies can be trained at once. Arguments and errors are those of
+    `trained_files`.
+    """
+    _check_folder(plan, folder)
+    recorded = record_all(plan, folder, workers, progress)
+    object_classes = object_classes_of(played.recording for played in recorded)
+    _trained_detector(plan, recorded, object_classes, folder, progress)
+
+
 def trained_body_file(plan: BodyPlan, folder: Path, workers: int, progress: Progress) -> Path:
     """Train the body of a policy unless the folder has it; return its file.
 
