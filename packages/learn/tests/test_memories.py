@@ -16,7 +16,7 @@ from roboirg_learn.policy.fast_weights import (  # noqa: E402
     FastWeights,
 )
 from roboirg_learn.policy.frame_memory import even_frames  # noqa: E402
-from roboirg_learn.policy.memories import MemoryCache  # noqa: E402
+from roboirg_learn.policy.memories import Decisions, MemoryCache  # noqa: E402
 from roboirg_learn.policy.policy_data import LABELS, LookArrays  # noqa: E402
 from roboirg_learn.policy.policy_plan import (  # noqa: E402
     HANDS,
@@ -49,9 +49,14 @@ def batch_of(seed, decisions=(3, 7)):
         torch.from_numpy(rng.normal(0, 1, (1, LOOKS, TOOL_NUMBERS)).astype(np.float32)),
         torch.ones((1, LOOKS), dtype=torch.bool),
         torch.ones((1, PARTS)),
-        torch.tensor([list(decisions)]),
-        **dict.fromkeys(LABELS, torch.zeros((1, len(decisions)), dtype=torch.long)),
+        decisions_at(*decisions),
+        **dict.fromkeys(LABELS, torch.zeros(len(decisions), dtype=torch.long)),
     )
+
+
+def decisions_at(*looks):
+    """Return decisions of one episode at these looks."""
+    return Decisions(torch.zeros(len(looks), dtype=torch.long), torch.tensor(looks))
 
 
 def body_of(memory):
@@ -90,12 +95,11 @@ def test_decisions_do_not_depend_on_later_looks(memory):
 def first_looks_of(batch, looks, things):
     """Return the first looks of a batch, in which some things were not yet seen, and the last."""
     parts = [part[:, :looks, :things] for part in batch[:5]]
-    last = torch.tensor([[looks - 1]])
     return batch._replace(
         **dict(zip(batch._fields, parts, strict=False)),
         tool=batch.tool[:, :looks],
         has_look=batch.has_look[:, :looks],
-        decisions=last,
+        decisions=decisions_at(looks - 1),
     )
 
 
@@ -164,8 +168,8 @@ def test_an_object_that_was_never_seen_is_never_chosen(memory):
 
 def with_one_kept_look(batch):
     """Return a batch of one decision with what planners read: no context, and look 0 as kept."""
-    nothing = torch.zeros((1, 1, 0))
-    kept_looks = torch.zeros((1, 1, 1), dtype=torch.long)
+    nothing = torch.zeros((1, 0))
+    kept_looks = torch.zeros((1, 1), dtype=torch.long)
     return batch._replace(subgoal_inputs=SubgoalInputBatch(nothing, kept_looks, nothing))
 
 
@@ -182,7 +186,7 @@ def test_any_memory_lets_the_same_objects_be_chosen_in_sight_or_not(memory):
     batch.visible[:, 7, 2] = False  # (episode, look, object)
     batch.confirmed[:, :, 3] = False
 
-    probabilities = body(batch).tracks.softmax(-1)  # (episode, decision, move, object)
+    probabilities = body(batch).tracks.softmax(-1)  # (decision, move, object)
 
     can_be_chosen = (probabilities > 0).any(-2).flatten()
     assert can_be_chosen.tolist() == [True, True, True, False, True]

@@ -16,13 +16,14 @@ from roboirg_learn.policy.fast_weights import FastWeightMemory
 from roboirg_learn.policy.frame_memory import EvenFrameMemory, KeptFrameMemory
 from roboirg_learn.policy.memories import (
     BLOCKED_SCORE,
+    Decisions,
     EmbeddedLooks,
     LookMemory,
     MemoryCache,
     MemoryOutput,
     NoMemory,
     RecurrentMemory,
-    values_at_looks,
+    values_at_decisions,
 )
 from roboirg_learn.policy.policy_plan import KEYFRAME_PLANNER
 from roboirg_learn.policy.subgoal_net import ContextInput, KeepScore, SubgoalInputBatch
@@ -53,7 +54,7 @@ MOST_COUNTED = 24
 
 
 class EpisodeBatch(NamedTuple):
-    """A batch of B episodes with T looks, K tracks and D decisions, padded.
+    """A batch of B episodes with T looks and K tracks, padded, and the N decisions of all of them.
 
     A look is a moment at which the front picture is looked at, a track an object that is followed
     from look to look. From `moves` to `steps_left` are labels, -1 where nothing is learned.
@@ -67,12 +68,12 @@ class EpisodeBatch(NamedTuple):
         tool: (B, T, TOOL_NUMBERS) state of the tool.
         has_look: (B, T) False for padding.
         goals: (B, parts) 1 for each part of the goal, else 0.
-        decisions: (B, D) numbers of the looks at which something is chosen or learned.
-        moves: (B, D) the right move by number; for planners the right subgoal template.
-        tracks: (B, D) the right track: of the object that the move or subgoal is at.
-        stages_done: (B, D) how many stages of the goal are completed.
-        passes: (B, D) how often a moving cube has passed a target.
-        steps_left: (B, D) control steps until a wait ends.
+        decisions: episodes and looks at which something is chosen or learned.
+        moves: (N,) the right move by number; for planners the right subgoal template.
+        tracks: (N,) the right track: of the object that the move or subgoal is at.
+        stages_done: (N,) how many stages of the goal are completed.
+        passes: (N,) how often a moving cube has passed a target.
+        steps_left: (N,) control steps until a wait ends.
         subgoal_inputs: for hands the subgoals that they follow, for planners what they named and
             keep; None for other networks.
     """
@@ -85,7 +86,7 @@ class EpisodeBatch(NamedTuple):
     tool: Tensor
     has_look: Tensor
     goals: Tensor
-    decisions: Tensor
+    decisions: Decisions
     moves: Tensor
     tracks: Tensor
     stages_done: Tensor
@@ -95,15 +96,15 @@ class EpisodeBatch(NamedTuple):
 
 
 class BodyAnswer(NamedTuple):
-    """The logits of a network at D decisions of each of B episodes.
+    """The logits of a network at N decisions.
 
     Attributes:
-        moves: (B, D, M) of each move; for planners, of each subgoal template.
-        tracks: (B, D, M, K) of each track, given the move.
-        stages_done: (B, D, MOST_COUNTED + 1) of how many stages are completed; for training only.
-        passes: (B, D, MOST_COUNTED + 1) the same of passes of a moving cube.
-        time_left: (B, D) no logits, but log(1 + control steps until a wait ends / `WAIT_STEPS`).
-        keep_scores: (B, D, RECENT) of keeping each recent look; of the planner `KEYFRAME_PLANNER`,
+        moves: (N, M) of each move; for planners, of each subgoal template.
+        tracks: (N, M, K) of each track, given the move.
+        stages_done: (N, MOST_COUNTED + 1) of how many stages are completed; for training only.
+        passes: (N, MOST_COUNTED + 1) the same of passes of a moving cube.
+        time_left: (N,) no logits, but log(1 + control steps until a wait ends / `WAIT_STEPS`).
+        keep_scores: (N, RECENT) of keeping each recent look; of the planner `KEYFRAME_PLANNER`,
             else None.
     """
 
@@ -161,26 +162,23 @@ class BodyNet(nn.Module):
         the object of any confirmed track can be chosen, in sight or not.
 
         Args:
-            batch: B episodes with D decisions.
+            batch: episodes with N decisions.
             cache: what the memory knows of earlier looks, and is updated; None to begin anew.
         """
-        goal = self.goal(batch.goals)[:, None]
-        looks = self._looks(batch, goal)._replace(cache=cache)
+        goals = self.goal(batch.goals)
+        looks = self._looks(batch, goals)._replace(cache=cache)
         memory_output = self.memory(looks, batch.decisions)
-        can_choose = values_at_looks(batch.confirmed, batch.decisions).flatten(0, 1)
-        tokens = self._tokens(batch, goal, looks, memory_output)
+        can_choose = values_at_decisions(batch.confirmed, batch.decisions)
+        tokens = self._tokens(batch, goals, looks, memory_output)
         tokens = self._attend(tokens, can_choose, memory_output.hooks)
 
-        # B and D were one axis for attention; they become two again.
-        shape = batch.decisions.shape
-        track_scores = self._track_scores(tokens[:, 0], tokens[:, 1:], can_choose)
-        robot = tokens[:, 0].unflatten(0, shape)
+        robot = tokens[:, 0]
         keep_scores = None
         if self.keeps is not None:
             keep_scores = self.keeps(looks, batch.decisions, robot)
         return BodyAnswer(
             moves=self.move(robot),
-            tracks=track_scores.unflatten(0, shape),
+            tracks=self._track_scores(robot, tokens[:, 1:], can_choose),
             stages_done=self.done(robot),
             passes=self.passes(robot),
             time_left=self.time_left(robot)[..., 0],
@@ -188,28 +186,29 @@ class BodyNet(nn.Module):
         )
 
     def _tokens(
-        self, batch: EpisodeBatch, goal: Tensor, looks: EmbeddedLooks, memory_output: MemoryOutput
+        self, batch: EpisodeBatch, goals: Tensor, looks: EmbeddedLooks, memory_output: MemoryOutput
     ) -> Tensor:
-        """Return the tokens (B * D, 1 + K, WIDTH) of each decision: the robot's, then K tracks'.
+        """Return the tokens (N, 1 + K, WIDTH) of each decision: the robot's, then K tracks'.
 
         Each is the sum of what is seen, what is remembered, the goal, and for networks with
         subgoals what `ContextInput` makes of these.
 
         Args:
             batch: the episodes.
-            goal: (B, 1, WIDTH) embedded.
+            goals: (B, WIDTH) of the episodes, embedded.
             looks: all looks, embedded.
             memory_output: what the memory adds at the decisions.
         """
         decisions = batch.decisions
-        tracks = values_at_looks(looks.tracks, decisions) + memory_output.tracks + goal[:, :, None]
-        robot = values_at_looks(looks.robot, decisions) + memory_output.robot
+        goal = goals[decisions.episodes][:, None]
+        tracks = values_at_decisions(looks.tracks, decisions) + memory_output.tracks + goal
+        robot = values_at_decisions(looks.robot, decisions) + memory_output.robot
         if self.given is not None and batch.subgoal_inputs is not None:
-            positions = values_at_looks(batch.positions, decisions)
+            positions = values_at_decisions(batch.positions, decisions)
             to_robot, to_tracks = self.given(batch.subgoal_inputs.context, positions)
             robot = robot + to_robot
             tracks = tracks + to_tracks
-        return torch.cat([robot[:, :, None], tracks], 2).flatten(0, 1)
+        return torch.cat([robot[:, None], tracks], 1)
 
     def _attend(self, tokens: Tensor, can_choose: Tensor, hooks: Sequence[LayerHook]) -> Tensor:
         """Return the tokens after all layers; no token attends to objects that cannot be chosen.
@@ -240,12 +239,12 @@ class BodyNet(nn.Module):
         scores = queries @ keys.transpose(1, 2) / math.sqrt(WIDTH)
         return scores.masked_fill(~can_choose[:, None], BLOCKED_SCORE)
 
-    def _looks(self, batch: EpisodeBatch, goal: Tensor) -> EmbeddedLooks:
-        """Return the looks of a batch as the memory reads them; `goal` is (B, 1, WIDTH)."""
+    def _looks(self, batch: EpisodeBatch, goals: Tensor) -> EmbeddedLooks:
+        """Return the looks of a batch as the memory reads them; `goals` are (B, WIDTH)."""
         tool = self.tool(batch.tool)
         return EmbeddedLooks(
             tracks=self._embed_tracks(batch),
-            robot=tool + goal,
+            robot=tool + goals[:, None],
             tool=tool,
             positions=batch.positions,
             visible=batch.visible,

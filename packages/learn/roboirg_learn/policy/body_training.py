@@ -233,8 +233,8 @@ def _keep_loss(scores: Tensor, labels: Tensor) -> Tensor:
     """Return the loss of choosing which of the recent looks to keep.
 
     Args:
-        scores: (B, D, RECENT) logits.
-        labels: (B, D, RECENT) 1 to keep, 0 not to; -1 where nothing is learned.
+        scores: (N, RECENT) logits.
+        labels: (N, RECENT) 1 to keep, 0 not to; -1 where nothing is learned.
     """
     has_label = labels >= 0
     known_labels = labels[has_label].float()
@@ -264,7 +264,7 @@ def _labeled_scores(answer: BodyAnswer, batch: EpisodeBatch) -> dict[str, Labele
 
 
 def _where_labeled(scores: Tensor, labels: Tensor) -> LabeledScores:
-    """Return the scores (B, D, choices) where labels (B, D) are not -1.
+    """Return the scores (N, choices) where labels (N,) are not -1.
 
     Counts beyond the greatest that is predicted are labeled as that.
     """
@@ -277,7 +277,7 @@ def _labeled_tracks(tracks: Tensor, batch: EpisodeBatch) -> LabeledScores:
     """Return the scores of tracks at those decisions whose right track can be chosen.
 
     Args:
-        tracks: (B, D, M, K) logits of tracks for each move; those of the right move are taken.
+        tracks: (N, M, K) logits of tracks for each move; those of the right move are taken.
         batch: with the right moves and tracks.
     """
     is_at_object = (batch.moves >= 0) & (batch.tracks >= 0)

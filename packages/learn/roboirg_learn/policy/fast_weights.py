@@ -24,6 +24,7 @@ from roboirg_learn.policy.body_layers import (
     split_heads,
 )
 from roboirg_learn.policy.memories import (
+    Decisions,
     EmbeddedLooks,
     FrameTokens,
     LookMemory,
@@ -166,8 +167,8 @@ class FastWeightMemory(LookMemory):
         self.narrow = nn.Linear(WIDTH, EXPERT_WIDTH)
         self.layers = nn.ModuleList(ExpertLayer() for _ in range(LAYERS))
 
-    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
-        """Return what the memory changes in each layer at decisions (B, D).
+    def forward(self, looks: EmbeddedLooks, decisions: Decisions) -> MemoryOutput:
+        """Return what the memory changes in each layer at decisions.
 
         All looks (B, T) update the fast weights in turn; the policy's network attends to the tokens
         of the `READ_LOOKS` looks up to each decision, as they were read at their own time.
@@ -175,8 +176,9 @@ class FastWeightMemory(LookMemory):
         tokens = self.frames(looks)
         read_values = self._read_in_turn(tokens, looks.cache or MemoryCache())
         values = tokens.values + self.out(self.norm(read_values))
-        recent = decisions[..., None] - torch.arange(READ_LOOKS - 1, -1, -1)  # numbers of looks
-        narrow = tokens_at_looks(MaskedTokens(self.narrow(values), tokens.mask), recent)
+        recent = decisions.looks[:, None] - torch.arange(READ_LOOKS - 1, -1, -1)  # their numbers
+        every_narrow = MaskedTokens(self.narrow(values), tokens.mask)
+        narrow = tokens_at_looks(every_narrow, decisions.episodes, recent)
         hooks: list[LayerHook] = []
         for layer in self.layers:
             values, hook = layer(narrow)

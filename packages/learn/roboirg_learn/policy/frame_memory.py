@@ -19,6 +19,7 @@ from roboirg_learn.policy.body_layers import (
     split_heads,
 )
 from roboirg_learn.policy.memories import (
+    Decisions,
     EmbeddedLooks,
     FrameTokens,
     LookMemory,
@@ -58,23 +59,23 @@ class EvenFrameMemory(LookMemory):
         self.frames = FrameTokens()
         self.layers = nn.ModuleList(Modulation() for _ in range(LAYERS))
 
-    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
-        """Return how the chosen looks modulate each layer at decisions (B, D)."""
+    def forward(self, looks: EmbeddedLooks, decisions: Decisions) -> MemoryOutput:
+        """Return how the chosen looks modulate each layer at decisions."""
         tokens = self.frames(looks)
         chosen = self.chosen(looks, decisions)
-        hooks = [layer(tokens, chosen) for layer in self.layers]
+        hooks = [layer(tokens, decisions.episodes, chosen) for layer in self.layers]
         return MemoryOutput(hooks=hooks)
 
-    def chosen(self, looks: EmbeddedLooks, decisions: Tensor) -> Tensor:  # noqa: ARG002
-        """Return the numbers of looks (B, D, frames) that are attended to; -1 for none."""
-        return even_frames(decisions)
+    def chosen(self, looks: EmbeddedLooks, decisions: Decisions) -> Tensor:  # noqa: ARG002
+        """Return the numbers of looks (N, frames) that are attended to; -1 for none."""
+        return even_frames(decisions.looks)
 
 
 class KeptFrameMemory(EvenFrameMemory):
     """The same with looks that a planner keeps."""
 
-    def chosen(self, looks: EmbeddedLooks, decisions: Tensor) -> Tensor:  # noqa: ARG002
-        """Return the numbers of the looks that are kept (B, D, S); -1 for none."""
+    def chosen(self, looks: EmbeddedLooks, decisions: Decisions) -> Tensor:  # noqa: ARG002
+        """Return the numbers of the looks that are kept (N, S); -1 for none."""
         if looks.kept_looks is None:
             raise RuntimeError("KeptFrameMemory needs a planner's looks.")
         return looks.kept_looks
@@ -95,15 +96,16 @@ class Modulation(nn.Module):
         nn.init.normal_(self.scale_shift.weight, std=INITIAL_WEIGHT_STD)
         nn.init.zeros_(self.scale_shift.bias)
 
-    def forward(self, tokens: MaskedTokens, chosen: Tensor) -> ModulationHook:
+    def forward(self, tokens: MaskedTokens, episodes: Tensor, chosen: Tensor) -> ModulationHook:
         """Return what scales and shifts one layer's input: keys and values of the chosen looks.
 
         Args:
             tokens: (B, T, m, WIDTH) of all looks.
-            chosen: (B, D, frames) looks to attend to; -1 for none.
+            episodes: (N,) number of the episode of each decision.
+            chosen: (N, frames) looks to attend to; -1 for none.
         """
         keys_and_values = MaskedTokens(self.keyed(self.norm(tokens.values)), tokens.mask)
-        of_chosen = tokens_at_looks(keys_and_values, chosen)
+        of_chosen = tokens_at_looks(keys_and_values, episodes, chosen)
         keys, values = of_chosen.values[:, None].chunk(2, -1)
         return ModulationHook(self, keys, values, of_chosen.mask[:, None, None])
 

@@ -61,8 +61,8 @@ class EmbeddedLooks(NamedTuple):
         visible: (B, T, K) whether the look shows the object.
         confirmed: (B, T, K) whether it was seen until then, often enough to be no mistake.
         has_look: (B, T) False for padding: the episode is shorter.
-        kept_looks: (B, D, S) numbers of the looks that a planner keeps at each decision, -1 for
-            none; None where there is no planner.
+        kept_looks: (N, S) numbers of the looks that a planner keeps at each decision, -1 for none;
+            None where there is no planner.
         cache: what the memory knows of the first looks; None if all looks are new, and nothing is
             to be kept. Decisions are at looks that are new.
     """
@@ -78,13 +78,25 @@ class EmbeddedLooks(NamedTuple):
     cache: MemoryCache | None = None
 
 
-class MemoryOutput(NamedTuple):
-    """What a memory adds to the network at decisions; B episodes, D decisions, K tracks.
+class Decisions(NamedTuple):
+    """The N decisions of some episodes: those of the first one, then those of the next.
 
     Attributes:
-        tracks: (B, D, K, WIDTH) added to the tokens of the tracks; 0 for nothing.
-        robot: (B, D, WIDTH) added to the robot's token; 0 for nothing.
-        hooks: one for each transformer layer, of B * D sequences.
+        episodes: (N,) number of the episode of each.
+        looks: (N,) number of the look at which it is made.
+    """
+
+    episodes: Tensor
+    looks: Tensor
+
+
+class MemoryOutput(NamedTuple):
+    """What a memory adds to the network at N decisions; K tracks.
+
+    Attributes:
+        tracks: (N, K, WIDTH) added to the tokens of the tracks; 0 for nothing.
+        robot: (N, WIDTH) added to the robot's token; 0 for nothing.
+        hooks: one for each transformer layer, of N sequences.
     """
 
     tracks: Tensor | float = 0.0
@@ -96,24 +108,23 @@ class LookMemory(nn.Module, ABC):
     """A memory of looks: one network, trained with the rest of the policy."""
 
     @abstractmethod
-    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
+    def forward(self, looks: EmbeddedLooks, decisions: Decisions) -> MemoryOutput:
         """Return what the memory adds to the network at decisions.
 
         What it says at a look depends on that look and those before it, never on later ones.
 
         Args:
             looks: of B episodes.
-            decisions: (B, D) the numbers of the looks at which decisions are made.
+            decisions: of these episodes.
         """
 
 
-def values_at_looks(values: Tensor, looks: Tensor) -> Tensor:
-    """Return values (B, T, …) at the looks whose numbers are given (B, D), as (B, D, …).
+def values_at_decisions(values: Tensor, decisions: Decisions) -> Tensor:
+    """Return values (B, T, …) of looks at those of N decisions, as (N, …).
 
-    Values [[a, b, c]] at looks [[2, 0]] are [[c, a]].
+    Values [[a, b, c]] of one episode with decisions at looks 2 and 0 are [c, a].
     """
-    episodes = torch.arange(len(values), device=values.device)[:, None]
-    return values[episodes, looks]
+    return values[decisions.episodes, decisions.looks]
 
 
 class MaskedTokens(NamedTuple):
@@ -123,25 +134,22 @@ class MaskedTokens(NamedTuple):
     mask: Tensor
 
 
-def tokens_at_looks(tokens: MaskedTokens, looks: Tensor) -> MaskedTokens:
-    """Return for each decision one sequence with the tokens of the looks that it may use.
+def tokens_at_looks(tokens: MaskedTokens, episodes: Tensor, looks: Tensor) -> MaskedTokens:
+    """Return for each of N decisions one sequence with the tokens of the looks that it may use.
 
-    B episodes with D decisions and T looks; a look has m tokens, and F looks belong to a decision.
+    A look has m tokens, and F looks belong to a decision.
 
     Args:
-        tokens: (B, T, m, width), and a mask (B, T, m).
-        looks: (B, D, F) numbers of looks; below 0 for none, which is masked.
+        tokens: (B, T, m, width), and a mask (B, T, m), of the T looks of B episodes.
+        episodes: (N,) number of the episode of each decision.
+        looks: (N, F) numbers of looks; below 0 for none, which is masked.
 
     Returns:
-        Tokens (B * D, F * m, width), and their mask (B * D, F * m).
+        Tokens (N, F * m, width), and their mask (N, F * m).
     """
-    batch, decisions, count = looks.shape
-    flat_looks = looks.clamp(min=0).flatten(1)
-    is_look = (looks >= 0).flatten(1)
-    mask = values_at_looks(tokens.mask, flat_looks) & is_look[..., None]
-    shape = batch * decisions, count * mask.shape[-1]
-    values = values_at_looks(tokens.values, flat_looks).reshape(*shape, -1)
-    return MaskedTokens(values, mask.reshape(shape))
+    place = episodes[:, None], looks.clamp(min=0)
+    mask = tokens.mask[place] & (looks >= 0)[..., None]
+    return MaskedTokens(tokens.values[place].flatten(1, 2), mask.flatten(1))
 
 
 class FrameTokens(nn.Module):
@@ -181,7 +189,7 @@ class FrameTokens(nn.Module):
 class NoMemory(LookMemory):
     """Remembers nothing; the last known positions of objects are part of the present look."""
 
-    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:  # noqa: ARG002
+    def forward(self, looks: EmbeddedLooks, decisions: Decisions) -> MemoryOutput:  # noqa: ARG002
         """Return an output that changes nothing."""
         return MemoryOutput()
 
@@ -226,8 +234,8 @@ class RecurrentMemory(LookMemory):
         self.nearness = nn.Parameter(torch.tensor(1.0))
         self.pool = nn.Linear(WIDTH, 1)
 
-    def forward(self, looks: EmbeddedLooks, decisions: Tensor) -> MemoryOutput:
-        """Return the states after the looks of decisions (B, D), stepping over new looks only.
+    def forward(self, looks: EmbeddedLooks, decisions: Decisions) -> MemoryOutput:
+        """Return the states after the looks of decisions, stepping over new looks only.
 
         The state after the looks of earlier calls is in ``looks.cache``, which is brought up to
         date.
@@ -240,12 +248,12 @@ class RecurrentMemory(LookMemory):
         cache.looks = looks.tracks.shape[1]
         cache.state = states[-1]
 
-        numbers = decisions - first_new + 1  # states[0] is before the new looks
+        # states[0] is before the new looks.
+        places = decisions._replace(looks=decisions.looks - first_new + 1)
         tracks = torch.stack([state.tracks for state in states], 1)
         scenes = torch.stack([state.scene for state in states], 1)
         return MemoryOutput(
-            tracks=values_at_looks(tracks, numbers),
-            robot=values_at_looks(scenes, numbers),
+            tracks=values_at_decisions(tracks, places), robot=values_at_decisions(scenes, places)
         )
 
     def _first_state(self, looks: EmbeddedLooks, cache: MemoryCache) -> RecurrentState:

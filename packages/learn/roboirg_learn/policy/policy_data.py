@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from roboirg.extension.sight import LOOK_EVERY, ExpertRecording
 from roboirg_learn.policy.body_net import EpisodeBatch
+from roboirg_learn.policy.memories import Decisions
 from roboirg_learn.policy.moves import NO_LABEL, LookDecision
 from roboirg_learn.policy.planner_history import SubgoalInputs
 from roboirg_learn.policy.sight import (
@@ -51,9 +52,10 @@ class LookArrays(NamedTuple):
 
 
 class EpisodeArrays(NamedTuple):
-    """An episode as input of the network, with labels; D decisions.
+    """An episode as input of the network, with labels (D,) of its D decisions.
 
-    Fields are as in `EpisodeBatch`, without B; `to_batch` makes one of several episodes.
+    `decisions` are the numbers of their looks; other fields are as in `EpisodeBatch`, without B.
+    `to_batch` makes one of several episodes.
     """
 
     looks: LookArrays
@@ -224,48 +226,50 @@ def _counted_looks(recorded: ExpertRecording, rng: np.random.Generator) -> set[i
 
 
 def to_batch(episodes: Sequence[EpisodeArrays]) -> EpisodeBatch:
-    """Return B episodes in one batch of tensors (B, …), padded to the longest.
-
-    Padding is 0, and `NO_LABEL` in labels, so that it is not learned from.
-    """
+    """Return B episodes in one batch: looks padded with zeros, decisions one after the other."""
     looks = {}
     for name in LookArrays._fields:
-        looks[name] = _pad([getattr(episode.looks, name) for episode in episodes], 0)
+        looks[name] = _pad([getattr(episode.looks, name) for episode in episodes])
     labels = {}
     for name in LABELS:
-        labels[name] = _pad([getattr(episode, name) for episode in episodes], NO_LABEL)
+        labels[name] = _join([getattr(episode, name) for episode in episodes])
     has_look = [np.ones(len(episode.looks.tool), bool) for episode in episodes]
+    numbers = []
+    for number, episode in enumerate(episodes):
+        numbers.append(np.full(len(episode.decisions), number))
     return EpisodeBatch(
         **looks,
-        has_look=_pad(has_look, 0),
+        has_look=_pad(has_look),
         goals=torch.from_numpy(np.stack([episode.goal for episode in episodes])),
-        decisions=_pad([episode.decisions for episode in episodes], 0),
+        decisions=Decisions(
+            episodes=_join(numbers), looks=_join([episode.decisions for episode in episodes])
+        ),
         **labels,
-        subgoal_inputs=_pad_subgoal_inputs(
+        subgoal_inputs=_join_subgoal_inputs(
             [episode.subgoal_inputs for episode in episodes if episode.subgoal_inputs is not None]
         ),
     )
 
 
-def _pad_subgoal_inputs(episodes: Sequence[SubgoalInputs]) -> SubgoalInputBatch | None:
-    """Return what hands or planners are given, padded; None for bodies without subgoals."""
+def _join_subgoal_inputs(episodes: Sequence[SubgoalInputs]) -> SubgoalInputBatch | None:
+    """Return what hands or planners are given at all decisions; None without subgoals."""
     if not episodes:
         return None
-    # 0 in padding is the first look; -1 everywhere would leave attention without any token.
-    return SubgoalInputBatch(
-        context=_pad([episode.context for episode in episodes], 0),
-        kept_looks=_pad([episode.kept_looks for episode in episodes], 0),
-        to_keep=_pad([episode.to_keep for episode in episodes], NO_LABEL),
-    )
+    return SubgoalInputBatch(*map(_join, zip(*episodes, strict=True)))
 
 
-def _pad(arrays: Sequence[NDArray[Any]], fill: int) -> torch.Tensor:
-    """Return n arrays as one tensor (n, …), each filled up to the greatest size along each axis.
+def _join(arrays: Sequence[NDArray[Any]]) -> torch.Tensor:
+    """Return arrays as one tensor, one after the other: [1, 2] and [3] → [1, 2, 3]."""
+    return torch.from_numpy(np.concatenate(arrays))
 
-    Example: [1, 2] and [3] with fill 0 → [[1, 2], [3, 0]].
+
+def _pad(arrays: Sequence[NDArray[Any]]) -> torch.Tensor:
+    """Return n arrays as one tensor (n, …), each padded to the greatest size along each axis.
+
+    Example: [1, 2] and [3] → [[1, 2], [3, 0]].
     """
     shape = np.max([array.shape for array in arrays], axis=0)
-    padded = np.full((len(arrays), *shape), fill, arrays[0].dtype)
+    padded = np.zeros((len(arrays), *shape), arrays[0].dtype)
     for row, array in zip(padded, arrays, strict=True):
         filled_part = tuple(slice(size) for size in array.shape)
         row[filled_part] = array

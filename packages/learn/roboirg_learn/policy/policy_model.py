@@ -158,17 +158,17 @@ class SeenEpisode:
         )
         # A batch of one episode with one decision.
         answer: BodyAnswer = net(to_batch([unlabeled]), self._cache_for(net, goal))
-        scores = answer.moves[0, 0].numpy()
+        scores = answer.moves[0].numpy()
         number = int(scores.argmax())
         if is_wait is not None:
             time_left = float(answer.time_left)
             number = timed_move(scores, is_wait, time_left, was_waiting=self._is_waiting)
             self._is_waiting = bool(is_wait[number])
-        track = int(answer.tracks[0, 0, number].argmax())
+        track = int(answer.tracks[0, number].argmax())
         is_there = track < self._history.tracks.count
         to_keep: tuple[int, ...] = ()
         if answer.keep_scores is not None:
-            to_keep = tuple(np.flatnonzero(answer.keep_scores[0, 0].numpy() > 0))
+            to_keep = tuple(np.flatnonzero(answer.keep_scores[0].numpy() > 0))
         return NetworkChoice(number, track if is_there else None, to_keep)
 
     def _cache_for(self, net: BodyNet, goal: NDArray[np.float32]) -> MemoryCache:

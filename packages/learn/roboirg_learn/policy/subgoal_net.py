@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from roboirg_learn.policy.body_layers import WIDTH
-from roboirg_learn.policy.memories import EmbeddedLooks, values_at_looks
+from roboirg_learn.policy.memories import Decisions, EmbeddedLooks
 from roboirg_learn.policy.planner_history import RECENT
 from roboirg_learn.policy.subgoals import POINT_NUMBERS
 
@@ -19,7 +19,10 @@ NEARNESS = 25.0
 
 
 class SubgoalInputBatch(NamedTuple):
-    """What networks with subgoals are given at decisions; fields as in `SubgoalInputs`, with B."""
+    """What networks with subgoals are given at N decisions of some episodes.
+
+    Fields are as in `SubgoalInputs`, with N in the place of D.
+    """
 
     context: Tensor
     kept_looks: Tensor
@@ -41,17 +44,17 @@ class ContextInput(nn.Module):
         self.pointed = nn.Linear(4, WIDTH, bias=False)
 
     def forward(self, context: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
-        """Return what is added to tokens: of the robot (B, D, WIDTH), of tracks (B, D, K, WIDTH).
+        """Return what is added to tokens: of the robot (N, WIDTH), of tracks (N, K, WIDTH).
 
         Tokens of tracks also get how far their object is from the point that a subgoal names, so
         that the one that is meant stands out.
 
         Args:
-            context: (B, D, numbers); the last `POINT_NUMBERS` are whether there is a point (1 or
-                0), and its x and y on the table, m.
-            positions: (B, D, K, 2) x and y of the objects on the table, m.
+            context: (N, numbers); the last `POINT_NUMBERS` are whether there is a point (1 or 0),
+                and its x and y on the table, m.
+            positions: (N, K, 2) x and y of the objects on the table, m.
         """
-        point = context[:, :, None, -POINT_NUMBERS:]  # (B, D, 1, 3): has_point, x, y
+        point = context[:, None, -POINT_NUMBERS:]  # (N, 1, 3): has_point, x, y
         has_point = point[..., :1]
         from_point = positions - point[..., 1:]
         distance = from_point.norm(dim=-1, keepdim=True)
@@ -59,7 +62,7 @@ class ContextInput(nn.Module):
         parts = [from_point * AWAY_SCALE, nearness, torch.ones_like(nearness)]
         numbers = torch.cat(parts, -1) * has_point
         to_all = self.every(context)
-        return to_all, to_all[:, :, None] + self.pointed(numbers)
+        return to_all, to_all[:, None] + self.pointed(numbers)
 
 
 class KeepScore(nn.Module):
@@ -69,23 +72,22 @@ class KeepScore(nn.Module):
         super().__init__()
         self.layers = nn.Sequential(nn.Linear(3 * WIDTH + 1, WIDTH), nn.ReLU(), nn.Linear(WIDTH, 1))
 
-    def forward(self, looks: EmbeddedLooks, decisions: Tensor, now: Tensor) -> Tensor:
-        """Return logits (B, D, RECENT) of keeping each of the `RECENT` looks up to a decision.
+    def forward(self, looks: EmbeddedLooks, decisions: Decisions, now: Tensor) -> Tensor:
+        """Return logits (N, RECENT) of keeping each of the `RECENT` looks up to a decision.
 
         The present look comes last. Looks before the first repeat it; callers ignore their scores.
 
         Args:
             looks: of the episodes.
-            decisions: (B, D) the numbers of the looks at which decisions are made.
-            now: (B, D, WIDTH) the robot's token after all transformer layers.
+            decisions: of these episodes.
+            now: (N, WIDTH) the robot's token after all transformer layers.
         """
-        present = decisions[..., None]
-        recent = present - torch.arange(RECENT - 1, -1, -1)  # (B, D, RECENT) numbers of looks
+        present = decisions.looks[:, None]
+        recent = present - torch.arange(RECENT - 1, -1, -1)  # (N, RECENT) numbers of looks
         visible_tracks = (looks.tracks * looks.visible[..., None]).mean(2)
         summaries = torch.cat([looks.tool, visible_tracks], -1)
-        flat_summaries = values_at_looks(summaries, recent.clamp(min=0).flatten(1))
-        recent_summaries = flat_summaries.reshape(*recent.shape, -1)
-        robot_token = now[:, :, None].expand(-1, -1, RECENT, -1)
+        recent_summaries = summaries[decisions.episodes[:, None], recent.clamp(min=0)]
+        robot_token = now[:, None].expand(-1, RECENT, -1)
         is_present = (recent == present).float()[..., None]
         scores: Tensor = self.layers(torch.cat([recent_summaries, robot_token, is_present], -1))
         return scores.squeeze(-1)
