@@ -123,7 +123,7 @@ class Source:
         plan = self._plan
         if plan is None or plan.stop is None or not self._jobs:
             return None
-        return find_stopping(plan.stop, plan.attempts, self._jobs, self.stored.newest)
+        return find_stopping(plan, self._jobs, self.stored.newest)
 
     @cached_property
     def frame_parts(self) -> FrameParts:
