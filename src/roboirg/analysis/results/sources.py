@@ -139,7 +139,12 @@ class Source:
         results = list(filter(stopping.needs, self.results))
         planned: list[Job] = []
         unneeded: list[Job] = []
-        for job in self.planned:
+        compared = list(self.planned)
+        for side, scenes in stopping.trials.items():
+            if side.policy == stopping.rule.against:  # not planned, as it is stored already
+                for jobs_of_scene in scenes.values():
+                    compared += self.wanted(jobs_of_scene)
+        for job in compared:
             jobs = planned if stopping.needs(job) else unneeded
             jobs.append(job)
         findings = tuple(compared.sentence for compared in stopping.compared)
