@@ -494,13 +494,19 @@ def test_a_dry_run_names_the_forms_of_instructions_whose_episodes_it_counts(
     assert caption in map(str.strip, result.out.splitlines())
 
 
-def check_refused_before_and_in_a_run(roboirg, out, sentence):
-    """Assert that a dry run and the run itself refuse an output folder in the same words."""
-    dry = roboirg(*RUN_RANDOM, "--out", out, "--dry-run")
+def check_refused_before_and_in_a_run(roboirg, out, sentence, *words):
+    """Assert that a dry run and the run itself refuse a folder or plan in the same words."""
+    dry = roboirg(*RUN_RANDOM, *words, "--out", out, "--dry-run")
 
     assert (dry.code, dry.err.count("\n")) == (2, 1)
     assert sentence in dry.err
-    assert roboirg(*RUN_RANDOM, "--out", out) == dry
+    assert roboirg(*RUN_RANDOM, *words, "--out", out) == dry
+
+
+def test_a_run_until_decided_of_one_setting_is_refused_before_and_in_a_run(roboirg, tmp_path):
+    sentence = "stop has nothing to compare"
+    words = ("--settings", "direct", "--until-decided")
+    check_refused_before_and_in_a_run(roboirg, tmp_path / "out", sentence, *words)
 
 
 @pytest.mark.parametrize("below", ["", "/deep/er"])

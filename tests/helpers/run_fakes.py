@@ -16,11 +16,14 @@ from made_records import make_record
 
 from roboirg.core.errors import RenderDeviceError
 from roboirg.records.record import NON_DETERMINISTIC_FIELDS, EventRecord, Job, Record
-from roboirg.records.store import RECORDS_FILE, read_records
+from roboirg.records.store import RECORDS_FILE, read_records, read_results
 from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_fields import SECTION_KEYS
+from roboirg.runs.plan.plan_sections import StopRule
+from roboirg.runs.plan.stopping import find_stopping
 from roboirg.runs.run.executor import InProcess, LocalProcesses
 from roboirg.runs.run.runner import RunSummary, run_plan
+from roboirg.stats.anytime import SequentialDecision
 
 
 def all_comparable(folder: Path) -> list[dict[str, object]]:
@@ -154,6 +157,34 @@ def changed(plan: Plan, **options: object) -> Plan:
         for key in options.keys() & keys:
             given[section] = {**given[section], key: options.pop(key)}
     return Plan.model_validate({**given, **options})
+
+
+SCENES = 50
+
+
+@dataclass(frozen=True)
+class Lucky:
+    """Plays nothing: the policy ``random`` wins 95 of 100 scenes, every other one 30."""
+
+    seconds: float = 0.0
+
+    def __call__(self, job: Job) -> Record:
+        time.sleep(self.seconds)
+        chance = 0.95 if job.policy == "random" else 0.3
+        luck = hashlib.sha256(job.slug.encode()).digest()[0] / 256
+        outcome = ("success",) if luck < chance else ("failure", "picked the wrong cube")
+        return make_record(job, *outcome, duration_s=self.seconds)
+
+
+def two_policies(episodes: int = SCENES, **options: object) -> Plan:
+    """Return a plan of two policies in direct words that stops when it is decided."""
+    plan = small_plan(episodes, policies=("random", "oracle"))
+    return changed(plan, settings="direct", **{"stop": StopRule(), **options})
+
+
+def found_in(folder: Path, plan: Plan) -> list[SequentialDecision]:
+    """Return the decisions that the results in a folder give."""
+    return find_stopping(plan, plan.jobs(), read_results(folder)).decisions
 
 
 if __name__ == "__main__":

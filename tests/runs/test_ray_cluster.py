@@ -9,11 +9,14 @@ from hosting_fakes import PatientRunner, fake_world_plan, fake_world_runner
 from ray_fakes import start_run, wait_until
 from run_fakes import (
     FakePlayer,
+    Lucky,
     all_comparable,
     changed,
+    found_in,
     is_alive,
     line_count,
     small_plan,
+    two_policies,
     worker_pids,
 )
 
@@ -82,6 +85,21 @@ def test_a_cluster_that_loses_a_machine_half_way_gives_the_same_records_as_one_p
     assert all_comparable(tmp_path) == records_of_one_process
     for record in read_records(tmp_path):
         assert (tmp_path / record.video).read_text() == record.slug
+
+
+def test_a_run_on_a_cluster_is_decided_at_the_same_scene_as_in_one_process(
+    cluster_with_one_cpu, tmp_path
+):
+    """Three workers play scenes ahead of the decision, and these count nowhere."""
+    cluster_with_one_cpu.add_node(num_cpus=2)
+    ray.init(address=cluster_with_one_cpu.address, log_to_driver=False)
+    plan = two_policies()
+    run_plan(plan, tmp_path / "alone", Lucky(), InProcess())
+
+    summary = run_plan(plan, tmp_path / "cluster", Lucky(seconds=0.05), RayCluster())
+
+    assert summary.spared > 0
+    assert found_in(tmp_path / "cluster", plan) == found_in(tmp_path / "alone", plan)
 
 
 def test_a_run_ends_if_no_machine_of_the_cluster_can_render(cluster_with_one_cpu, tmp_path):

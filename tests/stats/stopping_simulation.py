@@ -2,21 +2,35 @@
 
 python tests/stats/stopping_simulation.py
 python tests/stats/stopping_simulation.py --runs 500
+python tests/stats/stopping_simulation.py --packs results/scripted.roboirg.zip
 
 In every case two policies play the same scenes; a look follows each scene. Printed are how often a
 difference is found where there is none, how often the interval misses at some look, and how many
 scenes it takes. The whole takes some minutes of processor time.
+
+With `--packs` the results are those of stored runs: every gap of a policy to explicit and every
+pair of policies is decided alone, with its scenes in 100 random orders. A gap stands there as a
+policy compared to itself.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import itertools
+from collections import Counter
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.stats.anytime import p_path, winnings_above
+from roboirg.analysis.measures.comparison import compare, compare_settings
+from roboirg.analysis.results.reading import read_frame
+from roboirg.analysis.results.sources import opened_sources
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import options_label
+from roboirg.stats.anytime import PairedScenes, decide, p_path, winnings_above
 from roboirg.stats.intervals import ALPHA
 from roboirg.stats.paired_tests import sign_flip_test
 
@@ -26,6 +40,8 @@ RUNS = 10_000
 MARGIN = 0.1
 AT_ONCE = 250
 """Runs in memory at a time."""
+ORDERS = 100
+"""Of the scenes of stored runs."""
 EVEN = (50,) * 11
 UNEVEN = (3, 5, 10, 20, 20, 50, 50, 50, 100, 100, 142)
 """Scenes of each task, 550 in all."""
@@ -110,17 +126,9 @@ def simulate(case: Case, runs: int, rng: np.random.Generator) -> Found:
     for begin in range(0, runs, AT_ONCE):
         parts.append(_play(case, min(AT_ONCE, runs - begin), rng))
     columns = np.concatenate(parts, axis=1)
-    first, second, within, missed, played, fixed, unpaired, unpaired_played = columns
-    return Found(
-        first=float(first.mean()),
-        second=float(second.mean()),
-        within=float(within.mean()),
-        missed=float(missed.mean()),
-        played=float(np.median(played)),
-        fixed=float(fixed.mean()),
-        unpaired=float(unpaired.mean()),
-        unpaired_played=float(np.median(unpaired_played)),
-    )
+    means = Found._make(columns.mean(axis=1).tolist())
+    medians = Found._make(np.median(columns, axis=1).tolist())
+    return means._replace(played=medians.played, unpaired_played=medians.unpaired_played)
 
 
 def _play(case: Case, runs: int, rng: np.random.Generator) -> Numbers:
@@ -210,20 +218,57 @@ def _has_missed(weighted: Weighted) -> NDArray[np.bool_]:
     return np.asarray(is_above | is_below)
 
 
+def show_runs(paths: Sequence[str], rng: np.random.Generator) -> None:
+    """Print when comparisons of stored runs are decided, and for which side, in random orders."""
+    with opened_sources(paths) as sources:
+        frame = read_frame(sources)
+    _show("| comparison | found, % | wrong side, % | undecided, % | played, % |")
+    _show("| --- | ---: | ---: | ---: | ---: |")
+    for first, second in itertools.combinations_with_replacement(frame.names, 2):
+        with contextlib.suppress(InvalidValueError):  # they have no scene in common
+            if first == second:
+                comparison = compare_settings(frame.where(run=first))
+            else:
+                comparison = compare(frame.where(run=first), frame.where(run=second))
+            for average, figures in zip(comparison.averages, comparison.anytime, strict=True):
+                name = f"{options_label(average.key.options)}, {first.policy} to {second.policy}"
+                _show_row(name, _in_random_orders(figures.pairs, rng))
+
+
+def _in_random_orders(pairs: PairedScenes, rng: np.random.Generator) -> list[float]:
+    """Return shares of orders: found, for the wrong side, undecided; and the median of scenes."""
+    findings: Counter[str] = Counter()
+    played = []
+    for _ in range(ORDERS):
+        order = rng.permutation(pairs.known)
+        shuffled = PairedScenes(pairs.differences[order], pairs.weights[order])
+        (decision,) = decide([shuffled], ALPHA, MARGIN)
+        findings[decision.finding] += 1
+        played.append(decision.places / pairs.known)
+    worse = "second" if pairs.better == "first" else "first"
+    found = findings["first"] + findings["second"]
+    counts = np.array([found, findings[worse], findings["undecided"]])
+    return [*(counts / ORDERS), np.median(played)]
+
+
 def main() -> None:
-    """Print the two tables of the page, in Markdown."""
+    """Print the two tables of the page, or the one of stored runs, in Markdown."""
     parser = argparse.ArgumentParser(description="Simulate runs that stop when they are decided.")
     parser.add_argument("--runs", type=int, default=RUNS)
     parser.add_argument("--seed", type=int, default=94)
+    parser.add_argument("--packs", nargs="+", metavar="RUN", help="complete runs")
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
+    if options.packs:
+        show_runs(options.packs, rng)
+        return
     _show("| no difference | found, % | interval missed, % | within 10 points, % | played, % |")
     _show("| --- | ---: | ---: | ---: | ---: |")
     for case in SAME:
         found = simulate(case, options.runs, rng)
         either = found.first + found.second
         numbers = [either, found.missed, found.within, found.played]
-        _show(f"| {case.name} | {' | '.join(_percent(number) for number in numbers)} |")
+        _show_row(case.name, numbers)
     _show("")
     _show(
         "| difference | found, % | wrong side, % | within 10 points, % | played, % | fixed test, % "
@@ -234,15 +279,15 @@ def main() -> None:
         found = simulate(case, options.runs, rng)
         numbers = [found.first, found.second, found.within, found.played]
         numbers += [found.fixed, found.unpaired, found.unpaired_played]
-        _show(f"| {case.name} | {' | '.join(_percent(number) for number in numbers)} |")
+        _show_row(case.name, numbers)
 
 
 def _show(line: str) -> None:
     print(line, flush=True)  # noqa: T201 - it is a script
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.1f}"
+def _show_row(name: str, shares: Sequence[float]) -> None:
+    _show(" | ".join([f"| {name}", *(f"{100 * share:.1f}" for share in shares)]) + " |")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from roboirg.stats.anytime import (
@@ -16,7 +16,6 @@ from roboirg.stats.anytime import (
     p_path,
     sign_winnings,
     winnings_above,
-    within_path,
 )
 
 SIGNS = st.lists(st.sampled_from([-1.0, 0.0, 1.0]), min_size=1, max_size=40)
@@ -75,12 +74,9 @@ def test_swapping_the_sides_changes_no_p_value(differences):
 @given(st.lists(st.sampled_from([-1.0, 1.0]), min_size=3, max_size=9))
 def test_nobody_wins_on_average_if_the_sides_can_be_swapped(differences):
     """All choices of signs are equally likely then: over all of them the mean winnings are 1."""
-    size = len(differences)
-    every = 2.0 * np.array(
-        [[number >> bit & 1 for bit in range(size)] for number in range(2**size)]
-    )
+    every = np.array(list(itertools.product([-1.0, 1.0], repeat=len(differences))))
 
-    winnings = sign_winnings(every - 1)[:, -1]
+    winnings = sign_winnings(every)[:, -1]
 
     assert winnings.mean() == pytest.approx(1.0, rel=0.01)
 
@@ -95,18 +91,13 @@ def test_nobody_wins_on_average_who_bets_against_the_true_mean(shares):
     assert winnings.mean() == pytest.approx(1.0, rel=1e-6)
 
 
-@given(SIGNS)
-def test_the_interval_of_all_scenes_is_their_mean(differences):
-    """When every scene of the plan is known, nothing is left that could change the difference."""
-    low, high = mean_bounds(scenes_of(differences))
-
-    assert low == pytest.approx(np.mean(differences), abs=1e-5)
-    assert high == pytest.approx(np.mean(differences), abs=1e-5)
-
-
 @given(SIGNS, st.integers(0, 60))
+@example([1.0, -1.0, 1.0], 0)
 def test_the_interval_holds_what_the_unknown_scenes_can_make_of_the_mean_so_far(differences, more):
-    """It is never outside of what is possible: all scenes that are left lost, or all won."""
+    """It is never outside of what is possible: all scenes that are left lost, or all won.
+
+    When every scene of the plan is known (0 more), it is their mean.
+    """
     planned = len(differences) + more
 
     low, high = mean_bounds(scenes_of(differences, planned))
@@ -127,33 +118,6 @@ def test_a_task_of_few_scenes_counts_as_much_as_one_of_many():
 
     assert low == pytest.approx(0, abs=1e-5)
     assert high == pytest.approx(0, abs=1e-5)
-
-
-def test_scenes_of_tasks_of_different_sizes_do_not_count_alike():
-    """The p-value is then of the sum over scenes, and the difference of the mean over tasks."""
-    same = PairedScenes(np.zeros(2), np.array([1.0, 1.0, 1.0, 1.0]))
-    different = PairedScenes(np.zeros(2), np.array([2.0, 2 / 3, 2 / 3, 2 / 3]))
-
-    assert same.is_even
-    assert not different.is_even
-
-
-def test_a_clear_difference_is_decided_long_before_the_last_scene():
-    """20 wins in a row would come up once in half a million games of two equal sides."""
-    (decision,) = decide([scenes_of(20 * [1.0], planned=550)])
-
-    assert decision.finding == "first"
-    assert decision.scenes < 12
-
-
-def test_a_decision_does_not_change_when_more_scenes_are_known():
-    """What comes after the stop counts nowhere, even if it speaks for the other side."""
-    before = decide([scenes_of(12 * [1.0], planned=550)])
-
-    after = decide([scenes_of(12 * [1.0] + 100 * [-1.0], planned=550)])
-
-    assert before[0].finding == "first"
-    assert after == before
 
 
 def test_equal_sides_are_closed_when_the_difference_is_surely_within_the_margin():
@@ -194,22 +158,3 @@ def test_two_comparisons_need_more_evidence_than_one():
     together, _ = decide([clear, tied])
 
     assert together.scenes > alone.scenes
-
-
-def test_a_scene_that_is_left_out_has_a_place_but_no_result():
-    """It stands as NaN, because a side ended in an error there."""
-    (decision,) = decide([scenes_of([math.nan] + 12 * [1.0], planned=50)])
-
-    assert decision.finding == "first"
-    assert decision.places == decision.scenes + 1
-
-
-def test_a_path_within_a_margin_stays_within():
-    """Whoever looked when the difference was surely small may rely on it later."""
-    rng = np.random.default_rng(94)
-    differences = rng.choice([-1.0, 0.0, 1.0], size=550, p=[0.1, 0.8, 0.1])
-
-    path = within_path(scenes_of(differences), margin=0.1)
-
-    assert path[-1]
-    assert (np.diff(path.astype(int)) >= 0).all()

@@ -118,13 +118,13 @@ def run(
     if made.video != "off":
         check_video_support()
     if out is None:
-        _print_counts(made, None)
+        _print_counts(made, None, against)
         return
     # Absolute: a policy in this process may change the working directory.
     folder = run_folder(out).absolute()
     check_run(made, folder)
     if dry_run:
-        _print_counts(made, folder)
+        _print_counts(made, folder, against)
         return
     if against is not None:
         made = against_stored(made, against, folder)
@@ -290,25 +290,32 @@ def _executor(plan: Plan, name: str, workers: int | None) -> Executor:
     return choose_executor(workers, plan.attempts.episode_timeout_s)
 
 
-def _print_counts(plan: Plan, folder: Path | None) -> None:
+def _print_counts(plan: Plan, folder: Path | None, against: str | None) -> None:
     """Print what ``--dry-run`` shows: how many episodes there are and are stored, and calls.
 
     Args:
         plan: what would be played.
         folder: of the run, which may not exist yet; None if it was not named.
+        against: a stored policy, whose results are copied before the plan is played; or None.
+
+    Raises:
+        InvalidValueError: the plan stops when it is decided and has nothing to compare.
     """
     from rich.console import Console
 
     from roboirg.records.record_codec import identity_key
     from roboirg.records.store import read_index
+    from roboirg.runs.plan.stopping import find_stopping
 
     console = Console()
     jobs = plan.jobs()
+    played = {} if folder is None else read_index(folder)
+    if plan.stop is not None and against is None:
+        find_stopping(plan, jobs, played.values())
     settings = _print_sizes(plan, jobs, console)
     for arm, count in plan.left_out(jobs).items():
         console.print(f"{arm}: {counted(count, 'episode')} left out.", highlight=False)
     _print_prompt_shares(plan, jobs, settings, console)
-    played = {} if folder is None else read_index(folder)
     todo = [job for job in jobs if identity_key(job) not in played]
     stored = len(jobs) - len(todo)
     console.print(f"{counted(len(jobs), 'episode')}, {stored:,} already stored.", highlight=False)

@@ -57,10 +57,20 @@ class PairedScenes(NamedTuple):
         return int(np.count_nonzero(self.weights))
 
     @property
+    def known(self) -> int:
+        """The number of scenes with results of both sides."""
+        return int(np.isfinite(self.differences).sum())
+
+    @property
     def is_even(self) -> bool:
         """Whether all planned scenes count alike, as tasks have equally many."""
         planned = self.weights[self.weights > 0]
         return not len(planned) or bool(np.allclose(planned, planned[0]))
+
+    @property
+    def better(self) -> Literal["first", "second"]:
+        """The side with more successes, which the test is about; the second if they are equal."""
+        return "first" if np.nansum(self.differences) > 0 else "second"
 
     def first(self, places: int) -> PairedScenes:
         """Return what was known after so many places of the order."""
@@ -74,14 +84,13 @@ class SequentialDecision(NamedTuple):
         finding: which side is better, if any.
         places: of the random order that count; while it is open, those that were looked at.
         scenes: of these, how many have results of both sides.
-        p_value: of the hypothesis that the two could be swapped in every scene; holds at any time.
-        p_holm: the same after Holm's correction over all decisions of the plan.
+        p_holm: p-value of the hypothesis that the two could be swapped in every scene, after Holm's
+            correction over all decisions of the plan; holds at any time.
     """
 
     finding: Finding
     places: int
     scenes: int
-    p_value: float
     p_holm: float
 
 
@@ -114,12 +123,8 @@ def decide(
 
     decisions = []
     for contrast, corrected in zip(watched, p_holm, strict=True):
-        scenes = int(np.isfinite(contrast.pairs.differences[: contrast.places]).sum())
-        decisions.append(
-            SequentialDecision(
-                contrast.finding, contrast.places, scenes, contrast.p_value, corrected
-            )
-        )
+        scenes = contrast.pairs.first(contrast.places).known
+        decisions.append(SequentialDecision(contrast.finding, contrast.places, scenes, corrected))
     return decisions
 
 
@@ -160,16 +165,11 @@ class _WatchedContrast:
             is_last: whether no scene is left.
         """
         if is_shown:
-            self.finding = _better(self.pairs.first(self.places))
+            self.finding = self.pairs.first(self.places).better
         elif self.within_path[self.places - 1]:
             self.finding = "within"
         elif is_last:
             self.finding = "undecided"
-
-
-def _better(seen: PairedScenes) -> Finding:
-    """Return the side with more successes; the sign test can only decide if there is one."""
-    return "first" if np.nansum(seen.differences) > 0 else "second"
 
 
 def scene_weights(sizes: Mapping[str, int]) -> dict[str, float]:
@@ -185,7 +185,11 @@ def scene_weights(sizes: Mapping[str, int]) -> dict[str, float]:
 
 
 def mean_difference(seen: PairedScenes) -> float:
-    """Return the weighted mean of the differences that are known; 0 without any."""
+    """Return the weighted mean of the differences that are known, -1 to 1; 0 without any.
+
+    A task of which half as many scenes are known as of another one counts half as much. So it may
+    differ from the mean over tasks, which would leave out a task without a known scene.
+    """
     has_result = np.isfinite(seen.differences)
     if not has_result.any():
         return 0.0

@@ -12,6 +12,8 @@ from decimal import ROUND_HALF_UP, Decimal
 from fractions import Fraction
 from typing import NamedTuple
 
+from roboirg.core.plain_text import counted
+from roboirg.stats.anytime import PairedScenes
 from roboirg.stats.intervals import TOO_FEW, Interval
 from roboirg.stats.paired_tests import Gap
 
@@ -81,6 +83,28 @@ def bounds_text(interval: Interval) -> str:
 def p_text(p_value: float) -> str:
     """Return a p-value with its sign, rounded half up: ``p = 0.012``, ``p < 0.001``."""
     return f"p < {_SMALLEST_P}" if p_value < _SMALLEST_P else f"p = {half_up(p_value, 3)}"
+
+
+def anytime_text(p_value: float, pairs: PairedScenes, interval: Interval | None) -> str:
+    """Return a p-value that holds at any time, and of an unfinished plan what was played.
+
+    For example ``p = 0.21 after 84 of 550 scenes (over all of them between −2.0 and +30.1 points,
+    95 %)``.
+
+    Args:
+        p_value: of the sum over scenes, which is said if the mean over tasks is another.
+        pairs: the scenes that were looked at.
+        interval: of the difference over all planned scenes; None if it is not known.
+    """
+    words = p_text(p_value)
+    if not pairs.is_even:
+        words += " (of the sum over scenes, as tasks differ in size)"
+    if pairs.known == pairs.planned:
+        return words
+    words += f" after {pairs.known} of {counted(pairs.planned, 'scene')}"
+    if interval is None:
+        return words
+    return f"{words} (over all of them {bounds_text(interval)}, 95 %)"
 
 
 class GapWords(NamedTuple):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -10,13 +11,12 @@ from numpy.typing import NDArray
 
 from roboirg.analysis.measures.measure import Measured
 from roboirg.analysis.results.policy_run import PolicyRun
-from roboirg.core.plain_text import counted
 from roboirg.runs.plan.stopping import PlanScene, scene_order
 from roboirg.stats.anytime import PairedScenes, mean_bounds, p_in_any_order, p_path, scene_weights
 from roboirg.stats.cells import ByTask, Cell
 from roboirg.stats.intervals import Interval
 from roboirg.stats.paired_tests import holm, paired_episodes
-from roboirg.stats.rates import bounds_text, p_text
+from roboirg.stats.rates import anytime_text
 
 
 class AnytimeFigures(NamedTuple):
@@ -26,29 +26,17 @@ class AnytimeFigures(NamedTuple):
         p_holm: p-value, corrected over all that are tested together.
         interval: 95 %, of the mean difference over all planned scenes; None if those that were
             played are no random part of these, as in a run that plays task by task.
-        scenes: how many have results of both sides.
-        planned: how many both sides are planned to have.
+        pairs: the scenes with results of both sides.
     """
 
     p_holm: float
     interval: Interval | None
-    scenes: int
-    planned: int
+    pairs: PairedScenes
 
     @property
     def text(self) -> str:
-        """The p-value, and of an unfinished plan where its difference will lie, if known.
-
-        For example ``p = 0.21 after 84 of 550 scenes (over all of them between −2.0 and +30.1
-        points, 95 %)``.
-        """
-        words = p_text(self.p_holm)
-        if self.scenes == self.planned:
-            return words
-        words += f" after {self.scenes} of {counted(self.planned, 'scene')}"
-        if self.interval is None:
-            return words
-        return f"{words} (over all of them {bounds_text(self.interval)}, 95 %)"
+        """The p-value, and of an unfinished plan where its difference will lie, if known."""
+        return anytime_text(self.p_holm, self.pairs, self.interval)
 
 
 def anytime_figures(
@@ -74,7 +62,7 @@ def anytime_figures(
             intervals.append(None)
     figures = []
     for pairs, interval, p_holm in zip(every, intervals, holm(p_values), strict=True):
-        figures.append(AnytimeFigures(p_holm, interval, len(pairs.differences), pairs.planned))
+        figures.append(AnytimeFigures(p_holm, interval, pairs))
     return figures
 
 
@@ -105,11 +93,11 @@ def paired_scenes(cells: ByTask, others: ByTask, split: str) -> PairedScenes:
     """
     differences: dict[PlanScene, float] = {}
     planned = {}
+    first_planned = _planned_episodes(cells)
+    second_planned = _planned_episodes(others)
     for task in cells.keys() & others.keys():
-        found = _differences(cells[task], others[task])
-        if found:
-            planned[task] = min(_planned_episodes(cells[task]), _planned_episodes(others[task]))
-        for episode, difference in found.items():
+        planned[task] = min(first_planned[task], second_planned[task])
+        for episode, difference in _differences(cells[task], others[task]).items():
             differences[PlanScene(task, episode)] = difference
     order = scene_order(differences, split)
     ordered = np.array([differences[scene] for scene in order], dtype=np.float64)
@@ -124,13 +112,10 @@ def _weights(order: Sequence[PlanScene], planned: Mapping[str, int]) -> NDArray[
         planned: of each task, how many scenes there are.
     """
     weight_of = scene_weights(planned)
-    unknown = dict(planned)
-    weights = []
-    for scene in order:
-        weights.append(weight_of[scene.task])
-        unknown[scene.task] -= 1
-    for task, count in unknown.items():
-        weights += [weight_of[task]] * count
+    weights = [weight_of[scene.task] for scene in order]
+    known = Counter(scene.task for scene in order)
+    for task, count in planned.items():
+        weights += [weight_of[task]] * (count - known[task])
     return np.array(weights)
 
 
@@ -144,9 +129,14 @@ def _differences(first: Cell, second: Cell) -> dict[int, float]:
     return differences
 
 
-def _planned_episodes(cell: Cell) -> int:
-    """Return how many episodes a cell is planned to have, with those that have no verdict."""
-    counts = cell.counts
-    unknown = counts.errors + counts.missing + counts.spared
-    trials_per_episode = max(counts.trials / max(counts.episodes, 1), 1.0)
-    return counts.episodes + round(unknown / trials_per_episode)
+def _planned_episodes(cells: ByTask) -> dict[str, int]:
+    """Return how many episodes each task is planned to have, with those that have no verdict."""
+    seeds: set[int] = set()
+    for cell in cells.values():
+        seeds.update(trial.policy_seed for trial in cell.verdicts)
+    planned = {}
+    for task, cell in cells.items():
+        counts = cell.counts
+        trials = counts.trials + counts.errors + counts.missing + counts.spared
+        planned[task] = max(counts.episodes, round(trials / len(seeds)))
+    return planned

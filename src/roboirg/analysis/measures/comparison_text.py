@@ -11,6 +11,7 @@ from roboirg.analysis.measures.comparison import Compared, Comparison
 from roboirg.core.instruction_options import options_label
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.language.settings import EXPLICIT
+from roboirg.stats.anytime import mean_difference
 from roboirg.stats.intervals import ALPHA
 from roboirg.stats.paired_tests import Gap
 from roboirg.stats.power import (
@@ -86,12 +87,13 @@ def _until_decided(comparison: Comparison, first: str, second: str) -> Iterator[
     yield ""
     for average, figures in zip(comparison.averages, comparison.anytime, strict=True):
         result = _Result.of(comparison, average, first, second)
-        gap = result.gap.value
+        gap = points(mean_difference(figures.pairs), 1)
         finding = "no clear difference"
         if figures.p_holm <= ALPHA:
-            finding = f"{result.better} is better"
+            better = result.first if figures.pairs.better == "first" else result.second
+            finding = f"{better} is better"
         label = options_label(average.key.options)
-        yield f"{label}: {finding}, {points(gap, 1)} points, {figures.text}."
+        yield f"{label}: {finding}, {gap} points, {figures.text}."
     yield ""
     yield (
         "p-values and intervals hold however often one looked, after Holm's correction over these "
@@ -245,26 +247,35 @@ class _Result:
 def _left_out(averages: Iterable[Compared]) -> Iterator[str]:
     """Yield a sentence for trials that the averages leave out, if there are any.
 
-    These have no counterpart of the other policy, or no verdict (an error, or not yet played).
+    These have no counterpart of the other policy, or no verdict.
     """
     unpaired = 0
     unjudged = 0
+    spared = 0
     for average in averages:
         for cell in (*average.cells.values(), *average.others.values()):
             unpaired += len(cell.verdicts)
-            unjudged += cell.errors + cell.missing + cell.spared
+            unjudged += cell.errors + cell.missing
+            spared += cell.spared
         if average.gap is not None:
             unpaired -= average.gap.trials  # paired trials, counted for both policies
     if unpaired:
         verb = verb_for(unpaired, "are")
         yield f"{counted(unpaired, 'trial')} without a counterpart {verb} left out."
+    yield from incomplete_notes(unjudged, spared)
+
+
+def incomplete_notes(unjudged: int, spared: int) -> Iterator[str]:
+    """Yield a sentence for trials without a verdict, if there are any.
+
+    Args:
+        unjudged: trials that ended in an error or are still to be played.
+        spared: trials that need not be played.
+    """
     if unjudged:
-        yield incomplete_note(unjudged)
-
-
-def incomplete_note(trials: int) -> str:
-    """Return a sentence on trials that are left out, as they have no verdict."""
-    return (
-        f"Incomplete: {counted(trials, 'trial')} without a verdict (an error, or still to be "
-        f"played) {verb_for(trials, 'are')} left out."
-    )
+        yield (
+            f"Incomplete: {counted(unjudged, 'trial')} without a verdict (an error, or still to be "
+            f"played) {verb_for(unjudged, 'are')} left out."
+        )
+    if spared:
+        yield f"{counted(spared, 'trial')} need not be played: what is compared was decided before."

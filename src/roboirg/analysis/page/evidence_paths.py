@@ -50,7 +50,7 @@ def _path(compared: ComparedSides) -> EvidencePath:
     for scene, value in enumerate(evidence, 1):
         left = WIDTH * scene / max(compared.planned, 1)
         corners.append(f"{left:.1f},{_height(float(value)):.1f}")
-    return EvidencePath(compared.sentence, " ".join(corners), _height(1 / compared.alpha))
+    return EvidencePath(compared.sentence, " ".join(corners), _height(1 / compared.rule.alpha))
 
 
 def _height(evidence: float) -> float:

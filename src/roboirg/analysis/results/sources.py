@@ -123,7 +123,7 @@ class Source:
         plan = self._plan
         if plan is None or plan.stop is None or not self._jobs:
             return None
-        return find_stopping(plan.stop, plan.attempts, self._jobs, self.stored.newest)
+        return find_stopping(plan, self._jobs, self.stored.newest)
 
     @cached_property
     def frame_parts(self) -> FrameParts:
@@ -139,7 +139,12 @@ class Source:
         results = list(filter(stopping.needs, self.results))
         planned: list[Job] = []
         unneeded: list[Job] = []
-        for job in self.planned:
+        compared = list(self.planned)
+        for side, scenes in stopping.trials.items():
+            if side.policy == stopping.rule.against:  # not planned, as it is stored already
+                for jobs_of_scene in scenes.values():
+                    compared += self.wanted(jobs_of_scene)
+        for job in compared:
             jobs = planned if stopping.needs(job) else unneeded
             jobs.append(job)
         findings = tuple(compared.sentence for compared in stopping.compared)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple, cast
 
 from roboirg.analysis.measures.breakdowns import Breakdown, LabelKey, break_down
-from roboirg.analysis.measures.comparison_text import incomplete_note
+from roboirg.analysis.measures.comparison_text import incomplete_notes
 from roboirg.analysis.measures.failure_rates import (
     EndRates,
     ShareBounds,
@@ -478,9 +478,8 @@ def _gap_notes(found: Iterable[Measured[LabelKey]], frame: Frame) -> Iterator[st
     """Yield sentences on what a breakdown lacks: gaps of some rows, or verdicts of trials."""
     if any(row.gap is None and row.key.options != REFERENCE_OPTIONS for row in found):
         yield f"{NOT_APPLICABLE} without explicit on the same episodes."
-    without_verdict = sum(outcome not in _WITH_VERDICT for outcome in frame["outcome"])
-    if without_verdict:
-        yield incomplete_note(without_verdict)
+    outcomes = Counter(frame["outcome"])
+    yield from incomplete_notes(outcomes["error"] + outcomes["missing"], outcomes["spared"])
 
 
 def _rate(measured: Measured[Any]) -> Entry:

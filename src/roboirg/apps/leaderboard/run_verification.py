@@ -146,7 +146,7 @@ def _spared(plans: Iterable[Plan], entries: Sequence[Summary]) -> set[RecordKey]
         if plan.stop is None:
             continue
         jobs = plan.jobs()
-        stopping = find_stopping(plan.stop, plan.attempts, jobs, entries)
+        stopping = find_stopping(plan, jobs, entries)
         spared.update(identity_key(job) for job in jobs if not stopping.needs(job))
     return spared
 

@@ -7,7 +7,7 @@ page and a resumed run find the same, whatever order episodes finished in.
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -18,11 +18,11 @@ import numpy as np
 from roboirg.core.arms import TOLD
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions, options_label
-from roboirg.core.plain_text import counted
 from roboirg.language.settings import EXPLICIT
 from roboirg.records.record import Job, Summary
 from roboirg.records.record_codec import RecordKey, identity_key
-from roboirg.runs.plan.plan_sections import Attempts, StopRule
+from roboirg.runs.plan.plan import Plan
+from roboirg.runs.plan.plan_sections import StopRule
 from roboirg.stats.anytime import (
     PairedScenes,
     SequentialDecision,
@@ -31,7 +31,7 @@ from roboirg.stats.anytime import (
     mean_difference,
     scene_weights,
 )
-from roboirg.stats.rates import bounds_text, p_text, points
+from roboirg.stats.rates import anytime_text, points
 from roboirg.util.short_hash import short_hash
 
 _SIDES = 2
@@ -79,15 +79,13 @@ class ComparedSides(NamedTuple):
         contrast: the two sides.
         pairs: their results by scene.
         decision: what these say.
-        alpha: level of the decision.
-        margin: points.
+        rule: when it is decided.
     """
 
     contrast: Contrast
     pairs: PairedScenes
     decision: SequentialDecision
-    alpha: float
-    margin: float
+    rule: StopRule
 
     @property
     def name(self) -> str:
@@ -104,36 +102,28 @@ class ComparedSides(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """What was found: ``direct, mine to pi0: mine is better, +14.3 points, p = 0.021, …``.
+        """What was found: ``direct, mine to pi0: mine is better, +14.3 points, p = 0.021 …``.
 
-        Behind it come how many scenes counted, and where the difference over all of them lies.
+        If not all scenes were needed, how many counted follows, and where the difference over all
+        of them lies.
         """
         seen = self.pairs.first(self.decision.places)
-        better = {side: self._side_name(side) for side in ("first", "second")}
+        better = self.contrast.first
+        if self.decision.finding == "second":
+            better = self.contrast.second
+        better_name = options_label(better.options) if self.contrast.is_gap else better.policy
+        is_better = f"{better_name} is better"
         findings = {
-            "first": f"{better['first']} is better",
-            "second": f"{better['second']} is better",
-            "within": f"they differ by less than {self.margin:g} points",
+            "first": is_better,
+            "second": is_better,
+            "within": f"they differ by less than {self.rule.margin:g} points",
             "undecided": "not decided",
             "open": "not decided yet",
         }
         finding = findings[self.decision.finding]
         gap = points(mean_difference(seen), 1)
-        words = f"{self.name}: {finding}, {gap} points, {p_text(self.decision.p_holm)}"
-        if not self.pairs.is_even:
-            words += " of the sum over scenes, as tasks differ in size"
-        scenes = self.decision.scenes
-        if scenes == self.planned:
-            return f"{words}, all {counted(scenes, 'scene')}."
-        bounds = bounds_text(mean_bounds(seen))
-        return (
-            f"{words}, {scenes} of {counted(self.planned, 'scene')}; over all of them {bounds} "
-            "(95 %)."
-        )
-
-    def _side_name(self, side: str) -> str:
-        chosen = self.contrast.first if side == "first" else self.contrast.second
-        return options_label(chosen.options) if self.contrast.is_gap else chosen.policy
+        figures = anytime_text(self.decision.p_holm, seen, mean_bounds(seen))
+        return f"{self.name}: {finding}, {gap} points, {figures}."
 
 
 Trials = Mapping[Side, Mapping[PlanScene, Sequence[Job]]]
@@ -157,55 +147,27 @@ class Stopping:
     """What is compared in a run, and what its results say so far.
 
     Attributes:
-        rule: of the plan, when a comparison is closed.
-        attempts: of the plan, how often an episode is played that ends in an error.
+        rule: when a comparison is closed.
+        plan: that has the rule.
         trials: planned jobs by side and scene; of a side that is stored already, its results.
         results: the newest result of each job.
+        contrasts: what is compared.
     """
 
     rule: StopRule
-    attempts: Attempts
+    plan: Plan
     trials: Trials
     results: Mapping[RecordKey, Summary]
-
-    @cached_property
-    def contrasts(self) -> list[Contrast]:
-        """What is compared: each instruction of two policies, or each one of a policy to explicit.
-
-        Raises:
-            InvalidValueError: there is nothing to compare, or there are more than two policies.
-        """
-        policies = list(dict.fromkeys(side.policy for side in self.trials))
-        if len(policies) > _SIDES:
-            raise InvalidValueError(
-                f"stop compares two policies, or the settings of one; this plan has "
-                f"{len(policies)}: {', '.join(policies)}."
-            )
-        contrasts = []
-        for side in self.trials:
-            other = Side(policies[-1], side.options)
-            if len(policies) < _SIDES:
-                other = Side(side.policy, InstructionOptions(EXPLICIT))
-            if side.policy == policies[0] and other != side and other in self.trials:
-                contrasts.append(Contrast(side, other))
-        if not contrasts:
-            raise InvalidValueError(
-                "stop has nothing to compare: it takes two policies in the same settings, or one "
-                "policy in explicit and another setting."
-            )
-        return contrasts
+    contrasts: Sequence[Contrast]
 
     @cached_property
     def order(self) -> list[PlanScene]:
         """The scenes of all sides that are compared, in the order in which they are looked at."""
         scenes: set[PlanScene] = set()
-        split = ""
         for contrast in self.contrasts:
             for side in contrast:
                 scenes.update(self.trials[side])
-                for jobs in self.trials[side].values():
-                    split = jobs[0].split
-        return scene_order(scenes, split)
+        return scene_order(scenes, self.plan.split)
 
     @cached_property
     def places(self) -> Mapping[PlanScene, int]:
@@ -229,9 +191,7 @@ class Stopping:
         for contrast, pairs, decision in zip(
             self.contrasts, self.pairs, self.decisions, strict=True
         ):
-            found.append(
-                ComparedSides(contrast, pairs, decision, self.rule.alpha, self.rule.margin)
-            )
+            found.append(ComparedSides(contrast, pairs, decision, self.rule))
         return found
 
     @cached_property
@@ -295,25 +255,28 @@ class Stopping:
             if result is None:
                 return None
             # The errors of a stored policy stay, as this run does not play it.
-            if self.attempts.has_left(result) and result.policy != self.rule.against:
+            if self.plan.attempts.has_left(result) and result.policy != self.rule.against:
                 return None
             is_error = result.outcome == "error"
             verdicts.append(np.nan if is_error else float(result.outcome == "success"))
         return float(np.mean(verdicts))
 
 
-def find_stopping(
-    rule: StopRule, attempts: Attempts, jobs: Iterable[Job], results: Iterable[Summary]
-) -> Stopping:
+def find_stopping(plan: Plan, jobs: Iterable[Job], results: Iterable[Summary]) -> Stopping:
     """Return what a run's results say about the sides that its plan compares.
 
     Args:
-        rule: of the plan.
-        attempts: of the plan.
+        plan: with a stop rule.
         jobs: of the plan.
         results: the newest of each job; and those of the policy that is stored already, if the
             rule names one.
+
+    Raises:
+        InvalidValueError: there is no rule, nothing to compare, or more than two policies.
     """
+    rule = plan.stop
+    if rule is None:
+        raise InvalidValueError("The plan has no stop rule.")
     newest = {identity_key(result): result for result in results}
     compared: list[Job] = [*jobs]
     planned = {key_without_policy(job) for job in compared}
@@ -327,7 +290,34 @@ def find_stopping(
     for job in compared:
         if job.arm == TOLD:
             trials[side_of(job)][scene_of(job)].append(job)
-    return Stopping(rule, attempts, trials, newest)
+    return Stopping(rule, plan, trials, newest, _find_contrasts(trials))
+
+
+def _find_contrasts(sides: Collection[Side]) -> list[Contrast]:
+    """Return each instruction of two policies, or each one of a policy to explicit.
+
+    Raises:
+        InvalidValueError: there is nothing to compare, or there are more than two policies.
+    """
+    policies = list(dict.fromkeys(side.policy for side in sides))
+    if len(policies) > _SIDES:
+        raise InvalidValueError(
+            f"stop compares two policies, or the settings of one; this plan has "
+            f"{len(policies)}: {', '.join(policies)}."
+        )
+    contrasts = []
+    for side in sides:
+        other = Side(policies[-1], side.options)
+        if len(policies) < _SIDES:
+            other = Side(side.policy, InstructionOptions(EXPLICIT))
+        if side.policy == policies[0] and other != side and other in sides:
+            contrasts.append(Contrast(side, other))
+    if not contrasts:
+        raise InvalidValueError(
+            "stop has nothing to compare: it takes two policies in the same settings, or one "
+            "policy in explicit and another setting."
+        )
+    return contrasts
 
 
 def key_without_policy(job: Job) -> RecordKey:

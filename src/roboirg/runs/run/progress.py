@@ -177,7 +177,9 @@ def _progress_of(compared: ComparedSides) -> str:
     if not compared.is_open:
         return f"{line}, closed"
     left = compared.planned - decision.scenes
-    return f"{line}, {p_text(decision.p_holm)} (decided at {compared.alpha}); at most {left} left"
+    return (
+        f"{line}, {p_text(decision.p_holm)} (decided at {compared.rule.alpha}); at most {left} left"
+    )
 
 
 def _summary(record: Record) -> str:

@@ -6,7 +6,6 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from roboirg.core.errors import InvalidValueError
 from roboirg.records.record import Job
 from roboirg.records.record_codec import identity_key
 from roboirg.records.store import RecordStore
@@ -36,11 +35,9 @@ class StopWatch:
     def __init__(
         self, plan: Plan, jobs: Iterable[Job], store: RecordStore, reporter: Reporter
     ) -> None:
-        if plan.stop is None:
-            raise InvalidValueError("The plan has no stop rule.")
         self._store = store
         self._reporter = reporter
-        self._found = find_stopping(plan.stop, plan.attempts, jobs, store.stored.values())
+        self._found = find_stopping(plan, jobs, store.stored.values())
         self.unneeded: list[Job] = []
         reporter.compare(self._found)
 
