@@ -270,7 +270,7 @@ def mean_bounds(pairs: PairedScenes, alpha: float = ALPHA) -> Interval:
     """
     shares, scale = _shares(pairs)
     low = _lowest_mean(shares, pairs.planned, alpha / 2)
-    high = 1 - _lowest_mean(1 - shares, pairs.planned, alpha / 2)
+    high = max(low, 1 - _lowest_mean(1 - shares, pairs.planned, alpha / 2))
     return Interval(scale * (2 * low - 1), scale * (2 * high - 1))
 
 

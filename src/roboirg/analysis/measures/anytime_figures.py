@@ -130,7 +130,10 @@ def _differences(first: Cell, second: Cell) -> dict[int, float]:
 
 
 def _planned_episodes(cells: ByTask) -> dict[str, int]:
-    """Return how many episodes each task is planned to have, with those that have no verdict."""
+    """Return how many episodes each task is planned to have, with those that have no verdict.
+
+    All tasks are played under the same seeds; before any verdict, one is taken to be planned.
+    """
     seeds: set[int] = set()
     for cell in cells.values():
         seeds.update(trial.policy_seed for trial in cell.verdicts)
@@ -138,5 +141,5 @@ def _planned_episodes(cells: ByTask) -> dict[str, int]:
     for task, cell in cells.items():
         counts = cell.counts
         trials = counts.trials + counts.errors + counts.missing + counts.spared
-        planned[task] = max(counts.episodes, round(trials / len(seeds)))
+        planned[task] = max(counts.episodes, round(trials / max(len(seeds), 1)))
     return planned
