@@ -9,8 +9,7 @@ difference is found where there is none, how often the interval misses at some l
 scenes it takes. The whole takes some minutes of processor time.
 
 With `--packs` the results are those of stored runs: every gap of a policy to explicit and every
-pair of policies is decided alone, with its scenes in 100 random orders. A gap stands there as a
-policy compared to itself.
+pair of policies is decided alone, with its scenes in 100 random orders.
 """
 
 from __future__ import annotations
@@ -224,15 +223,20 @@ def show_runs(paths: Sequence[str], rng: np.random.Generator) -> None:
         frame = read_frame(sources)
     _show("| comparison | found, % | wrong side, % | undecided, % | played, % |")
     _show("| --- | ---: | ---: | ---: | ---: |")
+    rows = []
     for first, second in itertools.combinations_with_replacement(frame.names, 2):
         with contextlib.suppress(InvalidValueError):  # they have no scene in common
             if first == second:
                 comparison = compare_settings(frame.where(run=first))
+                compared = f"gap of {first.policy}"
             else:
                 comparison = compare(frame.where(run=first), frame.where(run=second))
+                compared = f"{first.policy} to {second.policy}"
             for average, figures in zip(comparison.averages, comparison.anytime, strict=True):
-                name = f"{options_label(average.key.options)}, {first.policy} to {second.policy}"
-                _show_row(name, _in_random_orders(figures.pairs, rng))
+                row = _in_random_orders(figures.pairs, rng)
+                _show_row(f"{options_label(average.key.options)}, {compared}", row)
+                rows.append(row)
+    _show_row(f"mean of {len(rows)}", np.mean(rows, axis=0).tolist())
 
 
 def _in_random_orders(pairs: PairedScenes, rng: np.random.Generator) -> list[float]:
