@@ -5,15 +5,12 @@ from __future__ import annotations
 import functools
 import operator
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.field_types import LABEL, LABEL_RULE, MOST_NAME_LETTERS, NAME
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.policy_ref import PolicyRef
 from roboirg.records.record import IDENTITY, SCHEMA_VERSION, Record, Summary
 from roboirg.records.run_files import RELATIVE_PATH
 
@@ -45,8 +42,15 @@ class _Version(msgspec.Struct):
     schema_version: int
 
 
-_SHARED = {"options": InstructionOptions, "environment": EnvironmentOptions, "ref": PolicyRef}
-"""Fields that have few values in a run and take long to decode, each with its type."""
+_TYPES = {field.name: field.type for field in msgspec.structs.fields(Summary)}
+_SHARED = ("options", "environment", "ref")
+"""Fields that have few values in a run and take long to decode."""
+_NAMES = (
+    "policy", "task", "split", "arm", "difficulty", "server_version", "language_version", "words",
+    "package_version", "code", "verdict_code", "plan", "robot", "render_device",
+)  # fmt: skip
+"""Fields of text that have few values in a run, together too, and take long to check."""
+_read_names = operator.attrgetter(*_NAMES)
 
 
 class _SharingDecoder(Generic[Stored]):
@@ -54,19 +58,24 @@ class _SharingDecoder(Generic[Stored]):
 
     def __init__(self, kind: type[Stored]) -> None:
         self._kind = kind
-        # Like the kind of record, but with the shared fields as they are in the line.
-        fields = [(name, msgspec.Raw, msgspec.Raw()) for name in _SHARED]
+        # Like the kind of record, but with the shared fields as they are in the line, and names
+        # unchecked.
+        fields: list[Any] = [(name, msgspec.Raw, msgspec.Raw()) for name in _SHARED]
+        fields += [(name, str | None, None) for name in _NAMES]
         line = msgspec.defstruct("_Line", fields, bases=(kind,), kw_only=True, gc=False)
         self._decode = msgspec.json.Decoder(line).decode
 
     def decode(self, line: bytes) -> Stored:
         """Return the record in a line of JSON; raises like the decoders of msgspec.
 
-        Reads the line with the shared fields left undecoded, and decodes each of their texts once.
+        Reads the line with the shared fields left undecoded, and decodes each of their texts once;
+        the names of a record are checked once for all that have the same.
         If that fails, the plain decoder reads the line, whose error names what is wrong.
         """
         try:
-            fields = msgspec.structs.asdict(self._decode(line))
+            read = self._decode(line)
+            fields = msgspec.structs.asdict(read)
+            fields.update(_checked_names(_read_names(read)))
             for name in _SHARED:
                 fields[name] = _shared_value(name, bytes(fields[name]))
         except msgspec.MsgspecError:
@@ -78,7 +87,14 @@ class _SharingDecoder(Generic[Stored]):
 @functools.lru_cache(maxsize=4096)
 def _shared_value(name: str, text: bytes) -> object:
     """Return the value of one of the shared fields, decoded from JSON."""
-    return msgspec.json.decode(text, type=_SHARED[name])
+    return msgspec.json.decode(text, type=_TYPES[name])
+
+
+@functools.lru_cache(maxsize=4096)
+def _checked_names(values: tuple[object, ...]) -> dict[str, object]:
+    """Return the values of `_NAMES` by field; raises like the decoders of msgspec."""
+    names = zip(_NAMES, values, strict=True)
+    return {name: msgspec.convert(value, _TYPES[name]) for name, value in names}
 
 
 _encoder = msgspec.json.Encoder()

@@ -315,7 +315,7 @@ class Frame(Mapping[str, Any]):
         """Return the label of a policy run with options: ``listener, relational``."""
         return f"{self.names[policy_run]}, {options_label(options)}"
 
-    @property
+    @cached_property
     def names_as_played(self) -> RunNames:
         """Labels of the policy runs, in the order of their first records."""
         policy_runs = self["run"][np.argsort(self["place"])]
