@@ -3,7 +3,7 @@
 python scripts/measure_floors.py [--scenes 400]
 
 Writes the file of the installed version of the language, with the settings that count for the
-headline number, and the tables of docs/floors.md. With --tables only the tables, from that file.
+headline number, and the tables of docs/controls.md. With --tables only the tables, from that file.
 Tasks without words are left out.
 """
 
@@ -35,7 +35,7 @@ from roboirg.shortcuts.surface_rules import SURFACE_RULES
 from roboirg.tasks import all_tasks
 from roboirg.util.csv_text import csv_lines
 
-PAGE = Path(__file__).parent.parent / "docs" / "floors.md"
+PAGE = Path(__file__).parent.parent / "docs" / "controls.md"
 SCENES = 400
 """Random scenes of each task that are tested."""
 

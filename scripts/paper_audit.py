@@ -2,7 +2,7 @@
 
 python scripts/paper_audit.py [WORD of the items to check]
 
-An item holds, fails, or is a limit: it stands under its name on docs/paper.md, with the reason.
+An item holds, fails, or is a limit: it stands under its name on docs/comparability.md, with the reason.
 To add items, write a function with `@item(...)`: it raises `AssertionError` where the program
 differs, and returns what it found.
 """
@@ -26,7 +26,7 @@ from roboirg.policies.planners.systems import all_systems, find_system
 from roboirg.tasks import LEFT_OUT, every_task, find_tasks
 
 ROOT = Path(__file__).parents[1]
-LIMITS = ROOT / "docs" / "paper.md"
+LIMITS = ROOT / "docs" / "comparability.md"
 
 Check = Callable[[], str]
 
@@ -105,10 +105,10 @@ def _() -> str:
 def _() -> str:
     paper = {"pi0.5", "TTT-Expert", "FrameS-Modul", "GroundSG-QwenVL", "GroundSG-Gemini", "MemER"}
     same(set(all_systems()), paper | {"GroundSG-oracle"})
-    for page in ("README.md", "docs/policies.md", "docs/systems.md", "CHANGELOG.md"):
+    for page in ("README.md", "docs/policies.md", "docs/planners.md", "CHANGELOG.md"):
         if "seven systems" in read(page):
             raise AssertionError(f"{page} speaks of seven systems")
-    return says("docs/systems.md", "GroundSG with the oracle is RoboMME's.")
+    return says("docs/planners.md", "GroundSG with the oracle is RoboMME's.")
 
 
 @item("left-out", "five tasks of RoboMME are left out, because they have nothing to refer to")
@@ -153,7 +153,7 @@ def _() -> str:
 def _() -> str:
     before = read("README.md").partition("An independent implementation")[0]
     same(before, "# RoboIRGBench *")
-    return says("docs/paper.md", "this is an independent implementation")
+    return says("docs/comparability.md", "this is an independent implementation")
 
 
 @item("introductions", "no page says what the paper's unpublished introductions name")
@@ -286,7 +286,7 @@ def main(word: str = "") -> int:
     of_page = limits()
     for name, reason in of_page:
         if word in name:
-            print(f"limit  {name}: {reason}\n       docs/paper.md")
+            print(f"limit  {name}: {reason}\n       docs/comparability.md")
     print(f"{failed} of {len(ITEMS)} items fail; {len(of_page)} limits")
     return int(failed > 0)
 

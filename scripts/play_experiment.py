@@ -3,7 +3,7 @@
 python scripts/play_experiment.py
 python scripts/play_experiment.py hear play --memories recurrent --seeds 0 --tasks PickXtimes
 
-Whatever is killed goes on with the same command. docs/paper-experiment.md describes the study.
+Whatever is killed goes on with the same command. docs/learned-policy.md describes the study.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ Scenes in which the command alone leaves one goal, so that nothing needs to be r
 
 ### Ratings and readings
 
-[Validity](validity.md#how-natural-the-words-are) says how natural the texts were rated, and how
+[Another page](references.md#how-natural-the-words-are) says how natural the texts were rated, and how
 often readers named the goal. Authors, raters and readers are language models."""
 
 

@@ -219,7 +219,7 @@ def test_a_planned_policy_without_a_result_has_a_row_with_its_missing_episode():
 
 def test_the_documentation_lists_every_column_of_the_results():
     """As rows of a table: name, kind, meaning, and when it is missing."""
-    page = (Path(__file__).parents[2] / "docs" / "own-tables.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "report.md").read_text(encoding="utf-8")
 
     for column in (*COLUMNS.values(), *record_columns().values()):
         missing = column.missing or "never"

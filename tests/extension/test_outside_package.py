@@ -16,8 +16,8 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 RECIPES = {
     "task": ("add-task.md", "Add a task"),
-    "setting": ("add-setting.md", "Add a setting"),
-    "protocol": ("add-protocol.md", "Add a protocol"),
+    "setting": ("add-task.md", "Add a setting"),
+    "protocol": ("extend.md", "Add a protocol"),
 }
 PYPROJECT = """\
 [build-system]
@@ -37,8 +37,8 @@ outside = "roboirg_outside.setting:SETTING"
 [project.entry-points."roboirg.protocols"]
 outside = "roboirg_outside.protocol"
 """
-LAB = ROOT / "docs" / "add-package.md"
-SETTING_PAGE = ROOT / "docs" / "add-setting.md"
+LAB = ROOT / "docs" / "extend.md"
+SETTING_PAGE = ROOT / "docs" / "add-task.md"
 """A task of the benchmark to which the recipe's setting applies."""
 CHECK_EPISODES_AND_WORDS = """\
 import sys
@@ -160,7 +160,7 @@ def test_an_episode_of_the_packages_task_and_setting_is_played_and_shown(roboirg
 
 
 def test_a_function_of_the_page_s_package_is_a_command(roboirg):
-    """The fixture has installed the package of docs/add-package.md. Its entry point *lab* is a
+    """The fixture has installed the package of docs/extend.md. Its entry point *lab* is a
     function that prints *hello* some times and whose docstring is *Greet the lab.*"""
     assert roboirg("lab", "--times", "2") == "hello hello\n"
     assert "Greet the lab." in roboirg("--help")
@@ -168,7 +168,7 @@ def test_a_function_of_the_page_s_package_is_a_command(roboirg):
 
 @pytest.mark.sim
 def test_the_plan_of_the_page_s_package_plays_its_task_setting_and_kind_of_policy(roboirg):
-    """The fixture has installed the package of docs/add-package.md, with the task LabPick, the
+    """The fixture has installed the package of docs/extend.md, with the task LabPick, the
     setting *lab* and the kind of policies *lab:*, which acts at random. Its plan *lab-quick* has an
     episode of this task in two settings, for the oracle, which succeeds, and for *lab:any*."""
     roboirg("run", "--plan", "lab-quick", "--max-steps", "400", "--out", "lab")

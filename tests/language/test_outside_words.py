@@ -87,7 +87,7 @@ TASK_PAGE = (DOCS / "add-task.md").read_text()
 TASK, *_ = re.findall(r"```python\n(.*?)```", TASK_PAGE, re.DOTALL)
 TASK_PROJECT, *_ = re.findall(r"```toml\n(.*?)```", TASK_PAGE, re.DOTALL)
 (TASK_WORDS,) = blocks("add-task.md", "Words")
-COLORED, COLORED_PROJECT, COLORED_WORDS = blocks("add-setting.md", "Add a setting")
+COLORED, COLORED_PROJECT, COLORED_WORDS = blocks("add-task.md", "Add a setting")
 
 
 class InstalledPackage:
@@ -172,7 +172,7 @@ def package(tmp_path_factory):
 
 
 def test_the_setting_of_the_documentation_page_speaks_the_words_of_its_own_file(package):
-    """`package` is an installed package with the code of docs/add-setting.md; the program runs in a
+    """`package` is an installed package with the code of docs/add-task.md; the program runs in a
     process that imports it. The page's file of words has the scenarios "new coat" for training and
     "loan" for tests, for two tasks. An instruction names the digest of the words."""
     found = package.run("""
@@ -191,7 +191,7 @@ for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
 
 
 def test_the_setting_of_the_documentation_page_means_the_goal(package):
-    """`package` is an installed package with the code of docs/add-setting.md; the program runs in a
+    """`package` is an installed package with the code of docs/add-task.md; the program runs in a
     process that imports it, and notes whether what the setting *colored* says leaves exactly the
     goal of the episode, in two tasks and both pools of words."""
     found = package.run("""
@@ -207,7 +207,7 @@ for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
 def test_the_setting_of_the_documentation_page_ends_with_the_explicit_command_when_resolved(
     package,
 ):
-    """`package` is an installed package with the code of docs/add-setting.md; the program runs in a
+    """`package` is an installed package with the code of docs/add-task.md; the program runs in a
     process that imports it. The resolved form of the setting *colored* has the same introduction as
     the implicit one, and then the command of the setting *explicit*."""
     (turns,) = package.run("""
@@ -221,7 +221,7 @@ found.append([resolved, instruct(episode, "colored").turns, instruct(episode).te
 
 
 def test_the_words_of_the_setting_of_the_documentation_page_break_no_rule(package):
-    """`package` is an installed package with the code of docs/add-setting.md; the program runs in a
+    """`package` is an installed package with the code of docs/add-task.md; the program runs in a
     process that imports it. The checker for authors collects the rules that the page's words break
     in every 20th scene."""
     found = package.run("""

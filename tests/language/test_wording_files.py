@@ -38,9 +38,9 @@ from roboirg.language.scenarios.wording_store import register_wordings
 from roboirg.shortcuts.command_chance import blind_goals, goals_of_command, understood_goals
 from roboirg.tasks.splits.splits import get_episode
 
-PAGE = (Path(__file__).parents[2] / "docs/wording-files.md").read_text()
+PAGE = (Path(__file__).parents[2] / "docs/add-scenario.md").read_text()
 COMMAND_FILE_OF_THE_PAGE, SENTENCE_FILE_OF_THE_PAGE = re.findall(
-    r"```toml\n(.*?)```", PAGE, re.DOTALL
+    r"```toml\n(name = .*?)```", PAGE, re.DOTALL
 )
 """The page's examples: a command and scenarios; a whole sentence."""
 each_pool = pytest.mark.parametrize("pool", POOLS)
@@ -226,7 +226,7 @@ def run_check(text, folder, *options):
 
 
 def test_the_example_file_of_the_documentation_passes_the_check(tmp_path):
-    """docs/wording-files.md shows a file with a command, for *explicit*, and the scenarios "fresh
+    """docs/add-scenario.md shows a file with a command, for *explicit*, and the scenarios "fresh
     paint" and "photos", for *direct*."""
     checked = run_check(COMMAND_FILE_OF_THE_PAGE, tmp_path, "--seeds", "0")
 
@@ -258,7 +258,7 @@ def test_the_example_file_passes_the_check_where_no_tokenizer_is_installed(
 
 
 def test_the_identity_of_an_open_file_is_its_name_and_a_digest(tmp_path):
-    """docs/wording-files.md shows a file with the line `name = "workshop"`. The identity has this
+    """docs/add-scenario.md shows a file with the line `name = "workshop"`. The identity has this
     name, and not that of the file."""
     file = tmp_path / "mine.toml"
     file.write_text(COMMAND_FILE_OF_THE_PAGE)
@@ -266,7 +266,7 @@ def test_the_identity_of_an_open_file_is_its_name_and_a_digest(tmp_path):
 
 
 def test_the_text_that_the_documentation_quotes_is_said_in_a_training_episode():
-    """docs/wording-files.md shows a file with the scenarios "fresh paint" and "photos", and quotes
+    """docs/add-scenario.md shows a file with the scenarios "fresh paint" and "photos", and quotes
     a text of the first, *We have just painted the red cube. …*. One of the 100 published training
     episodes must say this very text; both scenarios must be said in some."""
     (quoted,) = re.findall(r"\*(We have just\spainted the red cube\.[^*]*)\*", PAGE)
@@ -282,7 +282,7 @@ def test_the_text_that_the_documentation_quotes_is_said_in_a_training_episode():
 
 
 def test_the_example_commands_of_the_documentation_state_every_goal(tmp_path):
-    """docs/wording-files.md has a table with commands for four tasks, as here. In a file, they must
+    """docs/add-scenario.md has a table with commands for four tasks, as here. In a file, they must
     pass the check, which reports a goal that a command does not state; it prints a line *explicit
     (TASK)* for each task with commands."""
     commands = """
@@ -309,7 +309,7 @@ def commands_of_the_page():
 
 
 def test_goals_without_a_sentence_are_listed_but_are_no_error(tmp_path):
-    """docs/wording-files.md shows a file with sentences for the first two of the five visits of
+    """docs/add-scenario.md shows a file with sentences for the first two of the five visits of
     StopCube; three are left."""
     checked = run_check(SENTENCE_FILE_OF_THE_PAGE, tmp_path, "--seeds", "0")
 
@@ -326,7 +326,7 @@ def test_at_most_ten_goals_without_a_sentence_are_listed(tmp_path):
 
 
 def test_the_check_reports_a_sentence_for_an_impossible_goal(tmp_path):
-    """docs/wording-files.md shows a file with a sentence for the second visit of StopCube's cube.
+    """docs/add-scenario.md shows a file with a sentence for the second visit of StopCube's cube.
     Here it is for visit 99, and the cube makes at most five."""
     text = SENTENCE_FILE_OF_THE_PAGE.replace("visit = 2", "visit = 99")
 

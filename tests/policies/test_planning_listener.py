@@ -411,7 +411,7 @@ def test_requests_to_models_are_equal_to_the_stored_ones(provider, shown, steps)
 def test_the_page_of_listeners_shows_a_stored_request_and_a_reply():
     answer = '{"reasoning": "The first one is meant.", "color": "red", "placement": 1}'
     request = json.loads((CAPTURES / "listener-openai-none.json").read_text())
-    check_sample("vlm-listeners.md", request, answer)
+    check_sample("only-vlm.md", request, answer)
 
 
 @pytest.mark.sim

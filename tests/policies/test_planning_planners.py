@@ -7,9 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from planning_fakes import (
-    CAPTURES,
     check_capture,
-    check_sample,
     decoded,
     fake_vlm,
     golden,
@@ -623,12 +621,6 @@ def test_requests_of_planners_are_equal_to_the_stored_ones(
 
     first, second = server.requests
     check_capture(f"planner-{kind}-{subgoals}", [golden(first), golden(second)])
-
-
-def test_the_page_of_planners_shows_a_stored_request_and_a_reply():
-    """It is the second request, which names the first subgoal."""
-    _, request = json.loads((CAPTURES / "planner-qwen-grounded.json").read_text())
-    check_sample("planners.md", request, REPLY)
 
 
 def test_the_stateless_planner_labels_frames_of_the_video_and_of_the_past_with_their_steps(

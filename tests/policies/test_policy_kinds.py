@@ -1,4 +1,4 @@
-"""Kinds of policies that other packages add: the recipe of docs/add-protocol.md, as it stands."""
+"""Kinds of policies that other packages add: the recipe of docs/extend.md, as it stands."""
 
 import subprocess
 import sys
@@ -19,7 +19,7 @@ def installed_recipe(tmp_path, monkeypatch):
     for cached in (policy_kinds.find_kind, policy_kinds.known_kinds):
         cached.cache_clear()
     gone = "gone = no_such_module\n"
-    install(tmp_path, "add-protocol", "policy_kinds", gone)
+    install(tmp_path, "extend", "policy_kinds", gone)
     monkeypatch.syspath_prepend(tmp_path)
     yield
     sys.modules.pop("lab_kind", None)
@@ -39,7 +39,7 @@ def test_the_documentation_s_new_kind_of_policy_works_in_its_own_process():
 @pytest.mark.usefixtures("installed_recipe")
 def test_a_broken_kind_of_policy_is_reported_only_when_it_is_named():
     make_policy("lab:walk", 0)
-    with pytest.raises(InvalidValueError, match=r"'gone' .* of add-protocol .* cannot be loaded"):
+    with pytest.raises(InvalidValueError, match=r"'gone' .* of extend .* cannot be loaded"):
         make_policy("gone:anything", 0)
 
 

@@ -29,8 +29,8 @@ def _fresh_registry():
 
 @pytest.fixture
 def _installed_recipe(tmp_path, monkeypatch, _fresh_registry):
-    """The protocol `tiny` of docs/add-protocol.md, installed as a package of its own."""
-    install(tmp_path, "add-protocol", "protocols")
+    """The protocol `tiny` of docs/extend.md, installed as a package of its own."""
+    install(tmp_path, "extend", "protocols")
     monkeypatch.syspath_prepend(tmp_path)
     yield
     sys.modules.pop("tiny_protocol", None)

@@ -165,7 +165,7 @@ def test_a_word_such_as_not_or_except_never_changes_the_goal_unnoticed(task, wor
     assert found.goals in ((), (episode.goal,)) or found.not_understood
 
 
-DOCUMENTATION = Path(__file__).parents[2] / "docs" / "interpreter.md"
+DOCUMENTATION = Path(__file__).parents[2] / "docs" / "references.md"
 TEXTS_WITH_COMPLAINTS = re.findall(
     r"^\| \*(.+?)\*.*? \| `(.+?)`", DOCUMENTATION.read_text(), flags=re.MULTILINE
 )
@@ -174,7 +174,7 @@ TEXTS_WITH_COMPLAINTS = re.findall(
 
 @pytest.mark.parametrize(("text", "complaint"), TEXTS_WITH_COMPLAINTS)
 def test_the_complaints_quoted_by_the_documentation_are_real(text, complaint):
-    """Each row of a table in docs/interpreter.md has a text and the complaint about it."""
+    """Each row of a table in docs/references.md has a text and the complaint about it."""
     assert complaint in interpret(text, PICK_SCENE, "PickXtimes").not_understood
 
 
@@ -183,8 +183,8 @@ def test_the_documentation_quotes_eight_complaints_or_more():
     assert len(TEXTS_WITH_COMPLAINTS) >= 8
 
 
-def test_the_verb_that_the_documentation_teaches_is_unknown_before():
-    """The page shows how a package teaches the interpreter the verb *hoist*."""
-    page = DOCUMENTATION.with_name("teach-words.md").read_text()
-    (command,) = re.findall(r'"(Hoist .*)", "red 2"', page)
-    assert interpret(command, PICK_SCENE, "PickXtimes").unknown_words == ("hoist",)
+def test_the_words_that_the_documentation_teaches_are_unknown_before():
+    """The page shows how a package teaches the interpreter *hoist* and *crimson*."""
+    page = DOCUMENTATION.with_name("extend.md").read_text()
+    (command,) = re.findall(r'interpret\("(Hoist .*?)"', page)
+    assert interpret(command, PICK_SCENE, "PickXtimes").unknown_words == ("hoist", "crimson")

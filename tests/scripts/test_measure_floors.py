@@ -86,7 +86,7 @@ def test_the_shipped_floors_of_learners_are_near_those_that_learn_from_fewer_sce
 
 
 def table_of_page(first_column):
-    """Return the cells of a table of docs/floors.md, by column and then by row.
+    """Return the cells of a table of docs/controls.md, by column and then by row.
 
     The table is the one whose columns begin with this one, after that of the names of rules.
     """
@@ -120,9 +120,10 @@ def cells_of(row, rules):
     ],
 )
 def test_the_documentation_has_how_often_each_rule_is_right_in_a_setting(setting, options, column):
-    """docs/floors.md has a table with a row for each rule that names a goal without understanding,
-    and a column for each setting; its first one is *direct*. All instructions of the test split in
-    one setting are scored anew, which must give the cells of its column."""
+    """docs/controls.md has a table of rules that name a goal without understanding it.
+
+    It has a row for each rule and a column for each setting; the first one is *direct*. All
+    instructions of the test split in one setting are scored anew, which must give its column."""
     (row,) = shortcut_rows(tuple(all_tasks()), ("test",), (setting,), InstructionOptions(**options))
 
     rules = ("chance", "first-mention", "last-mention", "elimination", "surface")
@@ -130,9 +131,10 @@ def test_the_documentation_has_how_often_each_rule_is_right_in_a_setting(setting
 
 
 def test_the_documentation_has_how_often_each_rule_is_right_in_each_reasoning_pattern():
-    """docs/floors.md has a table with a row for each rule that names a goal without understanding,
-    and a column for each pattern by which the setting *reasoning* hides a goal; its first one is
-    *color exclusion*. All instructions of the test split in this setting are scored anew."""
+    """docs/controls.md has a table of rules that name a goal without understanding it.
+
+    It has a row for each rule and a column for each pattern by which the setting *reasoning* hides
+    a goal; the first one is *color exclusion*. All instructions of the test split are scored anew."""
     scored = shortcut_rows(
         tuple(all_tasks()), ("test",), ("reasoning",), InstructionOptions(), by="pattern"
     )

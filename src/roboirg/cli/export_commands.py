@@ -19,7 +19,7 @@ def export_episodes(
     split: AnySplit = "test",
     tasks: Tasks = "all",
 ) -> None:
-    """Export a line per episode: objects, motions, video and goal (keys: see docs/splits.md).
+    """Export a line per episode: objects, motions, video and goal (keys: see docs/robomme.md).
 
     Example: roboirg export episodes --split val --out episodes.jsonl
     """

@@ -1,4 +1,4 @@
-"""An instruction as a row of plain JSON values; docs/instruction-data.md explains the columns."""
+"""An instruction as a row of plain JSON values; docs/grounding.md explains the columns."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _RIVAL = ("rival", "rival_slot", "rival_position", "rival_reference")
 def row(episode: Episode, instruction: Instruction) -> ExportRow:
     """Return an instruction as a row of plain JSON values by column.
 
-    `docs/instruction-data.md` explains the columns. All rows have the same columns and types.
+    `docs/grounding.md` explains the columns. All rows have the same columns and types.
     """
     metadata: Mapping[str, Any] = instruction.metadata
     return {

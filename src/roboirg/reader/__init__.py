@@ -1,7 +1,7 @@
 """The interpreter: read a command about a scene, and find the goals of the task that fit it.
 
 It reads commands that state their values, in our words or in other people's. It does not read what
-comes before a command. `docs/interpreter.md` says more.
+comes before a command. `docs/references.md` says more.
 
 A text is split into sentences (`tokens`). Each is parsed into clauses, a verb with its arguments,
 and the words that no rule reads (`command`). The last sentences that are commands make up the

@@ -1,6 +1,6 @@
 """Read what a model replied: its answer without thoughts, a JSON object, a letter, numbers.
 
-These are the only rules for replies; whatever queries a model reads with them. `docs/models.md`
+These are the only rules for replies; whatever queries a model reads with them. `docs/only-vlm.md`
 explains them to users.
 """
 

@@ -39,7 +39,7 @@ _FLOORS_NOTE = (
     "Rows without a policy are expected success. chance: a guess among the goals that fit the "
     "command; first-mention, last-mention, elimination (a value that is not named), surface (key "
     "words): rules for the words alone; text-only, scene-only: learners that see the words or the "
-    "scene alone; union: for each value the better of these two (docs/floors.md)."
+    "scene alone; union: for each value the better of these two (docs/controls.md)."
 )
 _TWIN_NOTE = f"{TWIN_MARK.strip()}: the study's twin, in simulation, not on a robot."
 

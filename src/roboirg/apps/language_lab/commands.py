@@ -40,7 +40,7 @@ def export_instructions(
     settings: Settings = "all",
     plan: PlanName = None,
 ) -> None:
-    """Export a row per episode, setting and form (columns: see docs/instruction-data.md).
+    """Export a row per episode, setting and form (columns: see docs/grounding.md).
 
     Example: roboirg export instructions --split val --out words.parquet
     """

@@ -1,7 +1,7 @@
 """Export of instructions: one row for each episode, setting and form, in JSON lines or Parquet.
 
 All rows have the same columns and types, so that pandas and Hugging Face `datasets` load them
-directly; `docs/instruction-data.md` explains the columns.
+directly; `docs/grounding.md` explains the columns.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A wording file: words of a user's own. `docs/wording-files.md` explains it to authors."""
+"""A wording file: words of a user's own. `docs/add-scenario.md` explains it to authors."""
 
 from __future__ import annotations
 
