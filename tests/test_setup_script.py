@@ -231,6 +231,7 @@ def test_an_unknown_argument_of_set_up_is_refused():
         ("test-slow", "scripts/setup dev"),
         ("test-all", "scripts/setup dev"),
         ("docs", "scripts/setup dev"),
+        ("dist", "scripts/setup dev"),
         ("card", "scripts/setup dev"),
     ],
 )
