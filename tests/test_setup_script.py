@@ -203,7 +203,6 @@ def test_setup_installs_nothing_after_setup_dev(checkout):
     extras_installed_by(checkout, "dev")
 
     assert extras_installed_by(checkout) == []
-    assert extras_installed_by(checkout, "dev") == []
 
 
 def test_setup_installs_again_after_the_requirements_have_changed(checkout):
