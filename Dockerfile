@@ -3,8 +3,11 @@
 #   docker build -t roboirg .                                    the processor renders
 #   docker build -t roboirg:gpu --build-arg VARIANT=gpu .        an NVIDIA GPU renders
 #   mkdir -p runs
-#   docker run --rm --user "$(id -u)" -v "$PWD/runs:/runs" roboirg run --plan demo --out /runs/demo
-#   docker run --rm --gpus all -v "$PWD/runs:/runs" roboirg:gpu doctor
+#   docker run --rm --user "$(id -u)" -v roboirg-models:/models -v "$PWD/runs:/runs" roboirg run --plan demo --out /runs/demo
+#   docker run --rm --gpus all -v roboirg-models:/models -v "$PWD/runs:/runs" roboirg:gpu doctor
+#
+# The model files are not in the image, as their license differs (docs/licenses.md). A container fetches
+# them when it starts, if they are not in /models; the volume keeps them.
 ARG VARIANT=cpu
 
 FROM python:3.12-slim-trixie AS wheel
@@ -39,13 +42,14 @@ RUN mkdir -p /etc/vulkan/icd.d /usr/share/glvnd/egl_vendor.d \
 
 # hadolint ignore=DL3006
 FROM ${VARIANT}
-ENV ROBOIRG_MODEL_FILES=/opt/roboirg/models
+ENV ROBOIRG_MODEL_FILES=/models
 RUN --mount=from=wheel,source=/wheels,target=/wheels \
     pip install --no-cache-dir "$(echo /wheels/*.whl)[sim,report,remote]" \
-    && roboirg fetch-models \
     && useradd --create-home --uid 1000 player \
-    && install -d -o player /runs
+    && install -d -o player /runs \
+    && install -d -m 1777 /models
 USER 1000
 WORKDIR /runs
-ENTRYPOINT ["roboirg"]
+# A container without a network still makes tables: only what plays needs the model files, and says so.
+ENTRYPOINT ["sh", "-c", "roboirg fetch-models >/dev/null; exec roboirg \"$@\"", "roboirg"]
 CMD ["doctor"]

@@ -2,9 +2,10 @@
 
 PYTHON := .venv/bin/python
 CFFCONVERT := build/citation/bin/cffconvert
+DIST_TOOLS := build/dist-tools/bin/twine
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev learn style types test fast-tests test-slow test-all test-learn every-test net integrations lint docs demo play card clean
+.PHONY: help setup dev learn style types test fast-tests test-slow test-all test-learn every-test net integrations lint docs dist try-dist demo play card clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 21
@@ -64,6 +65,17 @@ integrations: ## the plug-ins in the real LeRobot, vla-eval and Inspect, in envi
 
 docs: dev ## the documentation site, in build/site; a warning or dead link is an error
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict
+
+dist: dev $(DIST_TOOLS) ## what can be published, in dist/: distributions, site, hub files, licenses, checksums
+	@scripts/dist
+
+# Their versions are written into wheels, or change what is checked.
+$(DIST_TOOLS): | dev
+	$(PYTHON) -m venv build/dist-tools
+	build/dist-tools/bin/pip install --quiet --disable-pip-version-check build==1.6.1 hatchling==1.33.0 twine==7.0.0
+
+try-dist: ## install and play what is in dist/, in a new environment; with another Python: TRY_WITH=python3.12
+	@scripts/try-dist $(TRY_WITH)
 
 demo: setup ## the main job: three policies, every task and setting; ends with a table and a page
 	.venv/bin/roboirg run --plan demo --out runs/demo

@@ -2,7 +2,7 @@
 
 python scripts/paper_audit.py [WORD of the items to check]
 
-An item holds, fails, or is a limit: it stands under its name on docs/comparability.md, with the reason.
+An item holds, fails, or is a limit, which docs/comparability.md has under its name with the reason.
 To add items, write a function with `@item(...)`: it raises `AssertionError` where the program
 differs, and returns what it found.
 """

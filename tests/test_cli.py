@@ -90,7 +90,6 @@ def check_refused(roboirg, words, sentence):
         (("--settings", "implicit"), "'implicit' is a form of the instruction"),
         (("--episodes", "9" * 5000), "…' is not a valid episode; write numbers and ranges"),
         (("--stages", "5-1"), "the possible lists are 1,5;"),
-        (("--out", ""), "The run's folder is ''; it must be a path"),
         (("--policy", "../../x=random"), "is '../../x' (in '../../x=random')"),
     ],
 )
@@ -219,17 +218,6 @@ def test_a_run_prints_a_line_and_stores_a_record_for_each_episode(roboirg, tmp_p
 
     assert result.code == 0, result.err
     assert "[1/10] random PickXtimes test/0 direct: success" in result.out
-    assert len((tmp_path / "records.jsonl").read_text().splitlines()) == 10
-
-
-@pytest.mark.usefixtures("play_without_simulator")
-def test_the_same_run_command_plays_nothing_twice(roboirg, tmp_path):
-    """Two episodes in each of five settings, ten in all, are stored by the first call."""
-    roboirg(*RUN_TEN_EPISODES, tmp_path)
-
-    again = roboirg(*RUN_TEN_EPISODES, tmp_path)
-
-    assert "10 of 10 episodes already stored." in again.out
     assert len((tmp_path / "records.jsonl").read_text().splitlines()) == 10
 
 
@@ -432,19 +420,6 @@ def test_a_run_with_missing_episodes_has_exit_code_2_and_asks_for_the_same_comma
         report_problems(summary, Path("out"))
 
     assert "3 of 10 episodes were not played; run the same command" in capsys.readouterr().err
-
-
-@pytest.mark.usefixtures("play_without_simulator")
-def test_an_option_on_the_command_line_replaces_that_of_the_plan_file(roboirg, tmp_path):
-    """The plan's file has three episodes, and the command line two, 0 and 1. What only the file
-    has, the task, stays."""
-    plan = tmp_path / "plan.yaml"
-    plan.write_text("policies: [random]\ntasks: StopCube\nsettings: explicit\nepisodes: 3\n")
-
-    roboirg("run", "--plan", plan, "--episodes", "2", "--workers", "0", "--out", tmp_path)
-
-    made = read_plan(tmp_path)
-    assert (made.tasks, made.episodes) == (("StopCube",), (0, 1))
 
 
 def test_a_dry_run_prints_episodes_and_model_calls(roboirg):

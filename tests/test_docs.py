@@ -1,8 +1,9 @@
-"""The documents are true: links lead somewhere, dependencies are explained, policies act."""
+"""The documents are true: links lead somewhere, policies act, licenses and tools agree."""
 
 import csv
 import itertools
 import re
+import subprocess
 import tomllib
 from collections import defaultdict
 from pathlib import Path
@@ -17,6 +18,7 @@ from roboirg.analysis.measures.chance import floor_level
 from roboirg.analysis.published import published_rows
 from roboirg.core.actions import check_chunk
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.licenses import PICTURE_LICENSE
 from roboirg.records.record import Job, Record
 from roboirg.tasks import find_tasks
 
@@ -109,13 +111,36 @@ def test_every_dependency_is_explained_once_on_the_page_of_dependencies():
 
 
 def test_the_version_is_the_same_in_all_files_that_name_it():
-    """The package's own is compared with that of its metadata, the change log, the file for
-    citations, and the BibTeX entry in README."""
-    project = project_of("pyproject.toml")
-    assert project["version"] == roboirg.__version__
+    """The package's own is compared with those of the three distributions, the change log, the file
+    for citations, and the BibTeX entry in README."""
+    for folder in (".", "packages/learn", "integrations/lerobot_env_roboirg"):
+        assert project_of(f"{folder}/pyproject.toml")["version"] == roboirg.__version__
     assert f"## {roboirg.__version__}" in text_of("CHANGELOG.md")
     assert f"\nversion: {roboirg.__version__}\n" in text_of("CITATION.cff")
     assert f"version = {{{roboirg.__version__}}}" in README
+
+
+@pytest.mark.parametrize("page", ["docs/licenses.md", "NOTICE", "mkdocs.yml"])
+def test_page_notice_and_footer_of_the_site_name_the_license_of_exported_pictures(page):
+    """As its owner writes it, "CC BY-NC 4.0"; in exports it is `cc-by-nc-4.0`."""
+    assert PICTURE_LICENSE in text_of(page).lower().replace(" ", "-")
+
+
+def test_every_action_of_the_workflows_is_pinned_by_a_commit_and_names_its_version():
+    """A tag can be moved to other code."""
+    workflows = text_of(".github/workflows/ci.yml") + text_of(".github/workflows/release.yml")
+    for action in re.findall("uses: (.+)", workflows):
+        assert re.fullmatch(r"[\w./-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+", action)
+
+
+def test_the_hooks_of_commits_run_what_make_lint_runs():
+    """Make prints what it would run; the environment and cffconvert count as made already."""
+    command = "make -n --no-print-directory -o dev -o build/citation/bin/cffconvert lint"
+
+    wanted = subprocess.check_output(command.split(), cwd=ROOT, text=True)
+
+    hooks = re.findall("entry: (.+)", text_of(".pre-commit-config.yaml"))
+    assert hooks == wanted.splitlines()
 
 
 def policy_on(page, name, most_lines):

@@ -48,19 +48,14 @@ def test_the_proxy_of_an_address_is_named_with_its_variable_and_without_its_pass
     assert proxy_of(url).words == f" through the proxy {proxy}"
 
 
-@pytest.mark.usefixtures("_environment_with_proxies")
-@pytest.mark.parametrize(
-    "host",
-    ["localhost", "127.1.2.3", "[::1]", "localhost.", "[::ffff:127.0.0.1]", "[::]"],
-)
-def test_an_address_of_this_machine_has_no_proxy(host):
-    assert proxy_of(f"http://{host}:1/v1").words == ""
+THIS_MACHINE = ["localhost", "127.1.2.3", "[::1]", "localhost.", "[::ffff:127.0.0.1]", "[::]"]
+LISTED_IN_NO_PROXY = ["a.lab", "10.0.0.1", "[fd00::1]"]
 
 
 @pytest.mark.usefixtures("_environment_with_proxies")
-@pytest.mark.parametrize("host", ["a.lab:80", "10.0.0.1", "[fd00::1]:80"])
-def test_an_address_that_no_proxy_lists_has_no_proxy(host):
-    assert proxy_of(f"http://{host}").words == ""
+@pytest.mark.parametrize("host", THIS_MACHINE + LISTED_IN_NO_PROXY)
+def test_this_machine_and_what_no_proxy_lists_have_no_proxy(host):
+    assert proxy_of(f"http://{host}:80/v1").words == ""
 
 
 @pytest.mark.parametrize(

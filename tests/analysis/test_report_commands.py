@@ -174,28 +174,19 @@ def test_a_policy_of_a_folder_and_one_of_its_pack_are_shown_as_the_whole_run_is(
     assert sorted(lines) == sorted(whole)
 
 
-@pytest.mark.parametrize("command", ["tables FIRST SECOND", "compare FIRST SECOND"])
-def test_a_command_on_two_runs_warns_if_they_were_rendered_on_different_devices(tmp_path, command):
+def test_commands_on_two_runs_warn_if_these_were_rendered_on_different_devices(tmp_path):
     """A software renderer (llvmpipe) and a graphics card draw slightly different pictures, so that
     results of the two may differ for this reason alone.
     """
     first = write_run(tmp_path / "listener", ("listener",), device="llvmpipe")
     second = write_run(tmp_path / "forgetful", ("forgetful",), device="NVIDIA H100")
-    words = command.replace("FIRST", str(first)).replace("SECOND", str(second)).split()
-
-    assert "Mixed render devices: NVIDIA H100, llvmpipe. Their pictures" in call(*words)
-
-
-def test_merging_runs_and_the_page_of_the_merged_run_warn_of_different_devices(tmp_path):
-    """A software renderer (llvmpipe) and a graphics card draw slightly different pictures, so that
-    results of the two may differ for this reason alone.
-    """
-    first = write_run(tmp_path / "listener", ("listener",), device="llvmpipe")
-    second = write_run(tmp_path / "forgetful", ("forgetful",), device="NVIDIA H100")
+    merged = tmp_path / "merged"
     warning = "Mixed render devices: NVIDIA H100, llvmpipe. Their pictures"
 
-    assert warning in call("records", "merge", first, second, "--out", tmp_path / "merged")
-    assert warning in call("report", tmp_path / "merged")
+    assert warning in call("tables", first, second)
+    assert warning in call("compare", first, second)
+    assert warning in call("records", "merge", first, second, "--out", merged)
+    assert warning in call("report", merged)
 
 
 def test_a_run_whose_device_is_not_known_fits_any_other(run_of_two_policies, tmp_path):

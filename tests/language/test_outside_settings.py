@@ -259,18 +259,6 @@ def registered_file_of_a_user(words):
     return register_wordings(parse_wordings(text, "mine.toml"))
 
 
-def test_a_setting_s_own_file_gives_it_introduction_command_and_phrase_for_a_value(add_lab):
-    """LAB_FILE has the words of the setting *lab*: the introduction *The lab says four times*, the
-    command *Lab: lift …* and the phrase *the lab's blue cube*. Our words would be *Grab the blue
-    cube …*"""
-    add_lab(LAB_FILE)
-
-    said = instruct(HARD_EPISODE, "lab")
-
-    assert said.turns[0] == "The lab says four times."
-    assert said.command.startswith("Lab: lift the lab's blue cube ")
-
-
 @pytest.mark.parametrize(
     ("words_of_user", "introduction", "command"),
     [

@@ -185,7 +185,6 @@ def test_a_wrong_policy_name_is_refused_with_what_would_be_right(spec, error, wo
         ("actions", "way_point", r"no action space 'way_point'.*Did you mean 'waypoint'\?"),
         ("demonstration_frames", "some", "demonstration_frames is 'some'; it must be 'all', 'no"),
         ("observe_every", -1, "observe_every is -1; it must be a whole number from 1"),
-        ("depth", 1, "depth is 1; it must be True or False"),
     ],
 )
 def test_a_policy_that_declares_a_wrong_need_is_refused_when_it_is_looked_up(

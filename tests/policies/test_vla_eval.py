@@ -207,7 +207,6 @@ def test_a_server_with_another_action_space_is_used_if_the_url_agrees(server):
             {"actions": [[1.0], [2.0, 3.0]]},
             "numbers, got rows of different lengths",
         ),
-        ({"other": 1}, "without 'actions'; it holds 'other'"),
         ({"status": "error", "message": "no memory"}, "replied with an error: no memory"),
     ],
 )

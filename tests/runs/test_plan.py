@@ -450,20 +450,9 @@ def test_name_equals_spec_gives_a_policy_a_name():
     assert (policy.name, policy.spec) == ("pi0.5", spec)
 
 
-@pytest.mark.parametrize(
-    ("policies", "error", "words"),
-    [
-        (
-            ["a=oracle", "a=random"],
-            InvalidValueError,
-            "Two policies are named 'a': oracle and random",
-        ),
-        (["mine=listner"], UnknownNameError, "Did you mean 'listener'"),
-    ],
-)
-def test_a_name_given_twice_or_to_an_unknown_policy_is_refused(policies, error, words):
-    with pytest.raises(error, match=words):
-        make_plan(policies)
+def test_a_name_given_twice_is_refused():
+    with pytest.raises(InvalidValueError, match="Two policies are named 'a': oracle and random"):
+        make_plan(["a=oracle", "a=random"])
 
 
 @pytest.mark.parametrize("policy", ["-x=oracle", "=cmd|' /C calc'!A0"])

@@ -98,25 +98,6 @@ def test_a_policy_may_give_its_version_as_text_number_or_path_when_made_or_reset
     assert policy_opened_here(**parts).version == version
 
 
-def test_a_run_does_not_go_on_with_another_checkpoint_of_its_policy(
-    write_policy_module, tmp_path, monkeypatch
-):
-    """A policy gives the value of the variable CKPT, the name of a checkpoint, as its version.
-
-    Its run has played the one episode of its plan with 7. The same command is refused with 8, as
-    results of two checkpoints would stand under one name, and the record stays.
-    """
-    write_policy_module(made='self.version = os.environ["CKPT"]')
-    monkeypatch.setenv("CKPT", "7")
-    play_one_episode(tmp_path)
-
-    monkeypatch.setenv("CKPT", "8")
-
-    with pytest.raises(StoreError, match="mine whose policy version is 7, but now it is 8"):
-        play_one_episode(tmp_path)
-    assert [record.policy_version for record in read_records(tmp_path)] == ["7"]
-
-
 def test_a_run_does_not_go_on_with_a_policy_whose_version_cannot_be_read(
     write_policy_module, tmp_path
 ):

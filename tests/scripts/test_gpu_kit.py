@@ -140,16 +140,35 @@ def test_differences_are_counted_by_pixel_and_motion_by_bit():
     assert difference({"a": black}, {"b": black}) == {"only in one": ["a", "b"]}
 
 
+def test_a_container_fetches_the_models_when_it_starts_and_then_runs_its_command(tmp_path):
+    """A stand-in for `roboirg` prints the number of its arguments and these. The image itself has
+    no models: no step before its entry point fetches them."""
+    text = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+    steps, start, _ = re.split(r"ENTRYPOINT (.+)", text)
+    (tmp_path / "roboirg").write_text('#!/bin/sh\necho "$# $*" >&2\n')
+    (tmp_path / "roboirg").chmod(0o755)
+
+    done = subprocess.run(
+        [*json.loads(start), "run", "two words"],
+        env={"PATH": f"{tmp_path}:/bin"},
+        capture_output=True,
+        check=True,
+    )
+
+    assert done.stderr == b"1 fetch-models\n2 run two words\n"
+    assert "fetch-models" not in steps
+
+
 def test_the_container_shows_the_driver_to_vulkan_and_to_egl():
     """The Dockerfile writes two files with `printf` that tell where the graphics driver is, one for
     Vulkan and one for EGL. Both are JSON and name libraries of NVIDIA's driver, which the host
     brings."""
     text = (ROOT / "Dockerfile").read_text(encoding="utf-8")
-    files = {
-        path: json.loads(content.removesuffix(r"\n"))
-        for content, path in re.findall(r"printf '(\{.*?)' \\\n\s+> (\S+)", text)
-    }
-    assert {path: content["ICD"]["library_path"] for path, content in files.items()} == {
+    written = re.findall(r"printf '(\{.*?)\\n' \\\n\s+> (\S+)", text)
+
+    libraries = {path: json.loads(content)["ICD"]["library_path"] for content, path in written}
+
+    assert libraries == {
         "/etc/vulkan/icd.d/nvidia_icd.json": "libGLX_nvidia.so.0",
         "/usr/share/glvnd/egl_vendor.d/10_nvidia.json": "libEGL_nvidia.so.0",
     }

@@ -134,7 +134,7 @@ def test_the_documentation_has_how_often_each_rule_is_right_in_each_reasoning_pa
     """docs/controls.md has a table of rules that name a goal without understanding it.
 
     It has a row for each rule and a column for each pattern by which the setting *reasoning* hides
-    a goal; the first one is *color exclusion*. All instructions of the test split are scored anew."""
+    a goal; the first is *color exclusion*. All instructions of the test split are scored anew."""
     scored = shortcut_rows(
         tuple(all_tasks()), ("test",), ("reasoning",), InstructionOptions(), by="pattern"
     )

@@ -484,8 +484,6 @@ def test_a_row_of_fewer_than_50_texts_has_no_interval():
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("--by", "colour"), "colour"),
-        (("--split", "tset"), "tset"),
         (("--settings", "spatial"), "no spatial setting in StopCube"),
         (("--split", "none"), "nothing to score"),
         (("--seeds", "-1"), "seeds is -1; it must be a whole number from 0"),

@@ -22,6 +22,7 @@ from roboirg.apps.demonstrations.export_plan import recording_jobs
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import OPTION_NAMES
+from roboirg.core.licenses import OWN_LICENSE, PICTURE_LICENSE, TERMS
 
 HERE = Path(__file__).parent
 
@@ -402,8 +403,18 @@ def test_an_export_without_pictures_has_no_columns_of_them(export):
     info = json.loads((root / "meta/info.json").read_text())
 
     assert not [name for name in info["features"] if "image" in name]
-    assert "There are no pictures." in (root / "README.md").read_text()
+    card = (root / "README.md").read_text()
+    assert "There are no pictures." in card
+    assert f"license: {OWN_LICENSE}" in card
     assert len(list(read_dataset(root))) == 4
+
+
+def test_the_card_has_the_license_of_pictures(export):
+    """They show models of others."""
+    card = (export() / "README.md").read_text()
+
+    assert f"license: {PICTURE_LICENSE}" in card
+    assert TERMS in card
 
 
 def test_the_card_names_the_files_of_frames_to_who_loads_the_dataset(export):

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis.extra.numpy import array_shapes, arrays
 from made_items import SETTINGS, items_of
-from typer.testing import CliRunner
 
 from roboirg.apps.grounding import dataset_export
 from roboirg.apps.grounding.dataset_export import CARD, export_grounding
@@ -34,7 +33,6 @@ from roboirg.core.version import __version__
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.language import FORMS, instruct_with
 from roboirg.language.settings import all_settings
-from roboirg.main import app
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.reader import interpret
 from roboirg.shortcuts.command_chance import goals_of_command, understood_goals
@@ -408,12 +406,6 @@ def test_the_card_says_what_the_dataset_holds(tmp_path, monkeypatch, snapshot):
 
     card = (tmp_path / CARD).read_text().replace(digest, "SHA-256")
     assert card.replace(__version__, "VERSION") == snapshot
-
-
-def test_a_setting_that_a_task_lacks_is_refused(tmp_path):
-    words = ["--tasks", "StopCube", "--settings", "spatial", "--out", str(tmp_path / "set")]
-    with pytest.raises(InvalidValueError, match="no spatial setting in StopCube"):
-        CliRunner().invoke(app, ["export", "grounding", *words], catch_exceptions=False)
 
 
 def test_a_folder_of_something_else_is_not_touched(tmp_path):

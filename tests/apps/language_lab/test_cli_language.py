@@ -55,12 +55,6 @@ def test_exported_instructions_in_words_of_a_user_s_file_are_those_of_its_tasks(
     assert {row["whole_sentence"] for row in rows} == {"own"}
 
 
-def test_a_task_that_a_user_s_file_lacks_is_refused(stopcube_wordings):
-    """The file serves StopCube only."""
-    with pytest.raises(InvalidValueError, match="has no words of BinFill"):
-        call("show", "BinFill", "0", "--words", "--wordings", stopcube_wordings)
-
-
 def test_two_exports_of_instructions_have_the_same_bytes_and_leave_nothing_else(tmp_path):
     """Words are drawn by the number of the episode, not at random; no temporary file stays."""
     first = tmp_path / "one.jsonl"

@@ -339,11 +339,12 @@ def test_a_plan_of_900_000_jobs_is_read(run):
         "split of half a character": planned(split="\ud800"),
         "deep nesting": replaced(PLAN_FILE, lambda path: path.write_text("[" * 200_000)),
         "pipe": replaced(PLAN_FILE, os.mkfifo),
+        "none": lambda run: (run / PLAN_FILE).unlink(),
         "3 GB": replaced(PLAN_FILE, sparse(3 << 30)),
     },
 )
 def test_a_stored_plan_that_cannot_be_counts_as_missing(change, run):
-    """The plan of a run is spoiled or too large; its two records then come from no plan."""
+    """The plan of a run is gone, spoiled or too large; its two records then come from no plan."""
     change(run)
 
     assert read_plans(run) == ()

@@ -190,7 +190,6 @@ def test_all_arrangements_are_there_once(task, number):
         ("aa", {}, "'a' is given twice"),
         ("a", {"tasks": ("PickXtimes",)}, "PickXtimes is not a task for a real robot"),
         ("a", {"settings": ("direct", "spatail")}, "no setting of PutInBox 'spatail'"),
-        (("NA",), {}, "Policy 'NA' has no valid name for records"),
         ("a", {"trials": 0}, "trials is 0; it must be a whole number from 1"),
     ],
 )

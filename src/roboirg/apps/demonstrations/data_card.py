@@ -10,6 +10,7 @@ from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.apps.demonstrations.picture_coding import LOSSY_QUALITY
 from roboirg.apps.demonstrations.trajectory import TrajectoryFacts
 from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.licenses import OWN_LICENSE, PICTURE_LICENSE, TERMS
 from roboirg.core.version import __version__
 from roboirg.util.media import CONTROL_RATE
 
@@ -33,8 +34,9 @@ def card_text(plan: ExportPlan, facts: Sequence[TrajectoryFacts], root: Path) ->
         facts: on all trajectories, those that are left out, too.
         root: folder of the dataset.
     """
+    card_license = OWN_LICENSE if plan.pictures == "none" else PICTURE_LICENSE
     # The head, between two lines of dashes, is YAML.
-    lines = ["---", "license: apache-2.0", "task_categories: [robotics]"]
+    lines = ["---", f"license: {card_license}", "task_categories: [robotics]"]
     lines.append("tags: [LeRobot, RoboIRGBench]")
     if plan.file_format.has_frame_tables:
         # Without them, Hugging Face takes the tables of facts for frames.
@@ -74,7 +76,7 @@ def _words_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator
 
 
 def _content_lines(plan: ExportPlan) -> Iterator[str]:
-    """Yield the card's lines on what a frame holds: state, action, video and pictures."""
+    """Yield the card's lines on what a frame holds: state, action, video, pictures, licenses."""
     yield "State: seven joint angles (rad) and the first finger (m)."
     origin = "exactly what was executed"
     if plan.disturbed:
@@ -89,3 +91,4 @@ def _content_lines(plan: ExportPlan) -> Iterator[str]:
         return
     yield f"Cameras: {', '.join(plan.cameras)}; {plan.size} × {plan.size} pixels."
     yield f"Pictures are stored {_STORED[plan.pictures]}."
+    yield TERMS

@@ -15,6 +15,7 @@ from roboirg.apps.grounding.items.grounding_item import (
     write_items,
 )
 from roboirg.apps.grounding.items.question_set import ExportRequest, Progress, collect_items
+from roboirg.core.licenses import PICTURE_LICENSE, TERMS
 from roboirg.core.version import __version__
 from roboirg.util.atomic_write import write_atomically
 
@@ -22,7 +23,7 @@ CARD = "README.md"
 _MIB = 2**20
 _CARD = """\
 ---
-license: apache-2.0
+license: {picture_license}
 language: [en]
 task_categories: [visual-question-answering, multiple-choice]
 configs:
@@ -39,7 +40,7 @@ RoboIRGBench {package}, language {first.language_version}, environment \
 {first.environment_version}. Each item has the answer as slots, as a choice, and as pixels with \
 masks.
 
-- License: Apache-2.0 (`apache-2.0`), as RoboIRGBench's.
+- {terms}
 - {facts.items:,} items; {facts.pictures:,} pictures and {facts.videos:,} videos, each stored once.
 - Size of all files: {size:.1f} MiB.
 - SHA-256 of `{items_file}`, which names every file by its content: `{facts.sha256}`.
@@ -146,4 +147,6 @@ def _card(request: ExportRequest, items: Sequence[GroundingItem], facts: Dataset
         items_file=ITEMS_FILE,
         frames=request.frames,
         every=request.frames_every,
+        picture_license=PICTURE_LICENSE,
+        terms=TERMS,
     )
