@@ -24,20 +24,17 @@ def train_missing(study: Study) -> None:
     """Train the bodies and readers that the results lack; each is there when it is finished.
 
     All share recordings and detector, which are made first. Then every worker trains one network at
-    a time. An interrupted training goes on after its last pass.
+    a time; a reader learns with the last body that it is wanted for. An interrupted training goes
+    on after its last pass.
     """
-    bodies = {row.body: row for row in study.rows() if not row.body.exists()}
+    rows = study.rows()
+    bodies = {row.body: row for row in rows if not row.body.exists()}
     if bodies:
-        first = next(iter(bodies.values()))
-        prepare_bodies(_body_plan(study, first), study.work, study.workers, show)
-    for _ in parallel_map(partial(_train_body, study), list(bodies.values()), study.workers):
-        pass
-    readers = {}
-    for row in study.rows():
-        if row.heard != TRUTH and not row.reader.exists():
-            readers.setdefault(row.reader, row)
-    for _ in parallel_map(partial(_train_reader, study), list(readers.values()), study.workers):
-        pass
+        prepare_bodies(_body_plan(study, rows[0]), study.work, study.workers, show)
+    list(parallel_map(partial(_train_body, study), list(bodies.values()), study.workers))
+    heard = [row for row in rows if row.heard != TRUTH]
+    readers = {row.reader: row for row in heard if not row.reader.exists()}
+    list(parallel_map(partial(_train_reader, study), list(readers.values()), study.workers))
 
 
 def _body_plan(study: Study, row: Row) -> BodyPlan:
