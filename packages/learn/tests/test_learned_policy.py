@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -474,6 +475,27 @@ def folder_of_policy(tmp_path_factory):
     assert done.exit_code == 0, done.output
     assert PolicyFiles(folder / BODY, folder / READER).spec in done.output
     return folder
+
+
+@pytest.mark.parametrize(("moved", "looks"), [(0, 1), (1, 2)])
+def test_a_robot_that_waits_looks_again_if_anything_else_has_moved(moved, looks):
+    """Joints and gripper are as before; a cube that moves by itself changes the picture alone."""
+    from roboirg_learn.policy.learned_policy import LearnedPolicy
+
+    policy = LearnedPolicy(MagicMock())
+    policy.seen = MagicMock()
+    before = {
+        "joint_positions": np.zeros(7),
+        "gripper": np.zeros(2),
+        "end_effector": np.zeros(6),
+        "front_rgb": np.zeros((256, 256, 3), np.uint8),
+    }
+    now = {**before, "front_rgb": before["front_rgb"] + moved}
+
+    policy.watch({**now, "history": [before]})
+
+    pictures, _tools = policy.seen.look.call_args.args
+    assert len(pictures) == looks
 
 
 @pytest.mark.sim

@@ -192,6 +192,18 @@ def test_any_memory_lets_the_same_objects_be_chosen_in_sight_or_not(memory):
     assert can_be_chosen.tolist() == [True, True, True, False, True]
 
 
+def test_tracks_of_padding_do_not_change_which_looks_a_planner_keeps():
+    """An episode with objects 0 to 2 scores its recent looks as it does with two empty tracks."""
+    body = body_of("keyframes")
+    padded = with_one_kept_look(batch_of(seed=1, decisions=(11,)))
+    padded.visible[:, :, 3:] = False  # (episode, look, object)
+    padded.confirmed[:, :, 3:] = False
+
+    short = first_looks_of(padded, LOOKS, things=3)
+
+    assert torch.allclose(body(padded).keep_scores, body(short).keep_scores, atol=1e-5)
+
+
 def fast_numbers(seed, tokens=3, size=2):
     torch.manual_seed(seed)
     fast = FastWeights(torch.randn(1, 1, size, size), torch.randn(1, 1, 1, size))

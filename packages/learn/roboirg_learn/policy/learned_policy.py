@@ -96,6 +96,9 @@ def tool_of(observation: Mapping[str, Any]) -> NDArray[np.float64]:
 
 
 def _is_same_moment(first: Mapping[str, Any], second: Mapping[str, Any]) -> bool:
-    """Return whether two observations are of the same moment: joints and gripper are equal."""
-    names = ("joint_positions", "gripper")
+    """Return whether two observations are of the same moment.
+
+    A robot that waits stands still, so that the picture has to be equal, too.
+    """
+    names = ("joint_positions", "gripper", "front_rgb")
     return all(np.array_equal(first[name], second[name]) for name in names)

@@ -84,7 +84,9 @@ class KeepScore(nn.Module):
         """
         present = decisions.looks[:, None]
         recent = present - torch.arange(RECENT - 1, -1, -1)  # (N, RECENT) numbers of looks
-        visible_tracks = (looks.tracks * looks.visible[..., None]).mean(2)
+        # The mean of what is in sight, which must not depend on how many tracks are padding.
+        is_visible = looks.visible[..., None].float()
+        visible_tracks = (looks.tracks * is_visible).sum(2) / is_visible.sum(2).clamp(min=1)
         summaries = torch.cat([looks.tool, visible_tracks], -1)
         recent_summaries = summaries[decisions.episodes[:, None], recent.clamp(min=0)]
         robot_token = now[:, None].expand(-1, RECENT, -1)
