@@ -141,7 +141,7 @@ def _() -> str:
     robomme = cff["references"][0]
     authors = [f"{author['family-names']}, {author['given-names']}" for author in paper["authors"]]
     same(authors, PAPER_AUTHORS)
-    says("README.md", " and ".join(authors), "Aernaer Akelijiang, Jiannan Li")
+    says("README.md", "Aernaer Akelijiang, Jiannan Li")
     same([len(robomme["authors"]), robomme["authors"][0]["family-names"]], [9, "Dai"])
     same(paper["identifiers"][0]["value"], "arXiv:2609.34384")
     same(robomme["identifiers"][0]["value"], "arXiv:2603.04639")
