@@ -223,17 +223,6 @@ def test_a_run_prints_a_line_and_stores_a_record_for_each_episode(roboirg, tmp_p
 
 
 @pytest.mark.usefixtures("play_without_simulator")
-def test_the_same_run_command_plays_nothing_twice(roboirg, tmp_path):
-    """Two episodes in each of five settings, ten in all, are stored by the first call."""
-    roboirg(*RUN_TEN_EPISODES, tmp_path)
-
-    again = roboirg(*RUN_TEN_EPISODES, tmp_path)
-
-    assert "10 of 10 episodes already stored." in again.out
-    assert len((tmp_path / "records.jsonl").read_text().splitlines()) == 10
-
-
-@pytest.mark.usefixtures("play_without_simulator")
 def test_report_prints_the_results_then_the_path_of_the_page_that_it_writes(roboirg, tmp_path):
     """The run has ten episodes of PickXtimes, which the fixture has succeed without a simulator."""
     roboirg(*RUN_TEN_EPISODES, tmp_path)
@@ -287,21 +276,6 @@ def test_show_words_prints_the_utterances_of_an_instruction(roboirg):
 
 def test_show_words_prints_the_instructions_in_each_setting_by_default(roboirg, snapshot):
     assert roboirg("show", "VideoUnmask", "0", "--words").out == snapshot
-
-
-def test_run_and_report_list_ten_failures_and_count_the_others(
-    roboirg, tmp_path, play_without_simulator
-):
-    """Three episodes in five settings."""
-    play_without_simulator("failure", cause="pressed the button too early")
-
-    result = roboirg(*RUN_RANDOM, "--episodes", "3", "--workers", "0", "--out", tmp_path)
-
-    assert result.code == 0
-    assert "random: 15 episodes without success" in result.out
-    assert "  PickXtimes test/0 explicit: pressed the button too early\n" in result.out
-    assert "and 5 more" in result.out
-    assert "and 5 more" in roboirg("report", tmp_path).out
 
 
 @pytest.fixture
@@ -432,19 +406,6 @@ def test_a_run_with_missing_episodes_has_exit_code_2_and_asks_for_the_same_comma
         report_problems(summary, Path("out"))
 
     assert "3 of 10 episodes were not played; run the same command" in capsys.readouterr().err
-
-
-@pytest.mark.usefixtures("play_without_simulator")
-def test_an_option_on_the_command_line_replaces_that_of_the_plan_file(roboirg, tmp_path):
-    """The plan's file has three episodes, and the command line two, 0 and 1. What only the file
-    has, the task, stays."""
-    plan = tmp_path / "plan.yaml"
-    plan.write_text("policies: [random]\ntasks: StopCube\nsettings: explicit\nepisodes: 3\n")
-
-    roboirg("run", "--plan", plan, "--episodes", "2", "--workers", "0", "--out", tmp_path)
-
-    made = read_plan(tmp_path)
-    assert (made.tasks, made.episodes) == (("StopCube",), (0, 1))
 
 
 def test_a_dry_run_prints_episodes_and_model_calls(roboirg):

@@ -233,29 +233,6 @@ def test_records_of_another_plan_than_the_stored_one_do_not_hold(forged):
     assert verify_run(forged, sample=0.0).faults == ("2 records from no plan that is kept.",)
 
 
-def test_a_run_without_a_plan_does_not_hold(forged):
-    """The plan is removed, so both records come from a plan that nobody kept."""
-    (forged / PLAN_FILE).unlink()
-
-    found = verify_run(forged, sample=0.0)
-
-    assert found.faults == ("2 records from no plan that is kept.",)
-    assert not found.holds
-
-
-def test_words_of_another_part_of_the_discourse_are_found_in_records_that_are_not_played(forged):
-    """The forgery changes which part of the discourse a record's first utterance is.
-
-    Nothing is played again (a sample of 0), as the words follow from the episode alone.
-    """
-    forgery, words = FORGERIES["other stage"]
-    forge(forged, forgery)
-
-    (check,) = verify_run(forged, sample=0.0).checks
-
-    assert words in check.findings[0]
-
-
 OTHER_PROCESSOR = {"processor": "x86_64 OtherMaker 1"}
 
 
