@@ -6,6 +6,8 @@ A setting is a way to leave values of a goal unsaid, such as *direct*, which say
 import dataclasses
 
 import pytest
+import seed_selection
+from seed_selection import EpisodeSlot, check_words
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
@@ -101,6 +103,19 @@ def test_the_reason_why_a_setting_refuses_a_scene_is_in_the_error(register):
     complaint = "dummy setting cannot express .*the scene is too easy"
     with pytest.raises(InvalidValueError, match=complaint):
         instruct(EASY_EPISODE, "dummy")
+
+
+def test_an_episode_that_one_of_our_settings_refuses_would_not_be_published(register, monkeypatch):
+    """A seed becomes an episode only if each of ACCEPTANCE_SETTINGS can express it. DUMMY, whose
+    name is "dummy", refuses easy scenes; it is made one of them here. So the seed of an easy
+    episode is rejected, with the reason that DUMMY gives."""
+    register(DUMMY)
+    monkeypatch.setattr(seed_selection, "ACCEPTANCE_SETTINGS", ("direct", "dummy"))
+
+    rejection = check_words(EpisodeSlot("PickXtimes", "test", 0), EASY_EPISODE.seed)
+
+    assert rejection.reason == "not expressible"
+    assert rejection.cause == "dummy: the scene is too easy"
 
 
 def test_exported_rows_include_a_registered_setting_in_both_forms(register):
