@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import replace
 from typing import Any
 
 from roboirg.core.delivery import SpokenInstruction
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.extension.sight import LOOK_EVERY, shown_to_policy
-from roboirg.language import instruct_with
 from roboirg.policies.by_name.policy_kinds import namer_of
 from roboirg.policies.contract.goal_naming import SaidAndShown
+from roboirg.policies.resolving.resolving_policy import explicit_command
 from roboirg.policies.resolving.rewriting import Rewriting
 from roboirg.records.record import Job
 from roboirg.runs.job_instruction import PreparedJob, episode_policy_seed, instruct_job
@@ -46,5 +44,5 @@ def rewrite(namer: str, seed: int, job: Job) -> dict[str, Any]:
     goal = made.name_goal(SaidAndShown(job.task, text, shown, lambda: picture))
     if goal is None:
         return {"heard": text}
-    command = instruct_with(replace(episode, goal=goal), InstructionOptions(wordings=KNOWN_WORDS))
-    return {"heard": command.text, "understood": dict(goal.as_mapping())}
+    command = explicit_command(episode, goal, KNOWN_WORDS)
+    return {"heard": command, "understood": dict(goal.as_mapping())}
