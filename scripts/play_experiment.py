@@ -1,4 +1,4 @@
-"""Train, hear and play the paper's experiment on the small body, and write its tables.
+"""Train, hear and play the paper's experiment on the small body, and write its numbers and pages.
 
 python scripts/play_experiment.py
 python scripts/play_experiment.py hear play --memories recurrent --seeds 0 --tasks PickXtimes
@@ -17,6 +17,7 @@ import yaml
 from experiment.frame import prove, write_frame
 from experiment.hearing import hear_missing
 from experiment.playing import play_missing
+from experiment.results import write_results
 from experiment.study import Study
 from experiment.weights import train_missing
 
@@ -30,6 +31,7 @@ STEPS = {
     "play": play_missing,
     "frame": write_frame,
     "prove": prove,
+    "results": write_results,
 }
 PLAN = Path(__file__).parent / "experiment" / "study.yaml"
 
