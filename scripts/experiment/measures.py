@@ -103,7 +103,7 @@ def _compared(trials: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(compared)
 
 
-def _measured(scope: str, about: tuple[str, ...], trials: pd.DataFrame) -> Measure:
+def _measured(scope: str, about: tuple[str, str, str, str], trials: pd.DataFrame) -> Measure:
     """Return what trials that are about the same give, sorted by task, seed and episode."""
     tasks = []
     for _, rows in trials.groupby("task", sort=False):

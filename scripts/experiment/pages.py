@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -91,7 +91,7 @@ def read_numbers(path: Path) -> pd.DataFrame:
 
 def _text(line: Mapping[str, float]) -> str:
     """Return a rate as ``78 (74–82)``, in percent; a difference as ``−3 (−8 to +2)``, in points."""
-    show = whole_percent
+    show: Callable[[float], str] = whole_percent
     between = "–"
     if OVER in str(line["number"]):
         show = points

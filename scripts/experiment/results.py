@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
+from typing import cast
 
 import pandas as pd
 
-from experiment.measures import SUCCESS, Measure, measure_frame
+from experiment.measures import ABOUT, SUCCESS, measure_frame
 from experiment.pages import FACTS, NUMBERS, write_pages
 from experiment.study import Study, body_of, reader_of, text_of
 from roboirg.analysis.measures.chance import floor_level
 from roboirg.analysis.measures.measure import ALL_TASKS
 from roboirg.analysis.published import published_rows
 from roboirg.analysis.results.frame import suite
+from roboirg.core.word_pools import PoolName
 from roboirg.language.scenarios.identity import language_label
 from roboirg.language.word_sampler import LANGUAGE_VERSION
 from roboirg.records.record import Job
@@ -48,41 +50,39 @@ def write_results(study: Study) -> None:
     first_row = study.rows()[0]
     jobs = [trial.job for trial in study.trials() if trial.row == first_row]
     measures = measure_frame(frame[frame["split"] == study.split])
-    numbers = pd.DataFrame([*measures, *_without_plays(jobs)])
+    numbers = pd.concat([pd.DataFrame(measures), _without_plays(jobs)])
     numbers.to_csv(study.results / NUMBERS, index=False)
     facts = json.dumps(_facts(study, jobs), indent=1)
     write_atomically(study.results / FACTS, facts + "\n")
     write_pages(study.results)
 
 
-def _without_plays(jobs: Sequence[Job]) -> list[Measure]:
+def _without_plays(jobs: Sequence[Job]) -> pd.DataFrame:
     """Return the success of `FLOORS` in the words of jobs, and that of the paper's systems."""
+    rates = []
+    for row in published_rows("main"):
+        about = (PUBLISHED[row.model], "published", row.options.setting)
+        for task, percent in row.rates.items():
+            if percent is not None:
+                rates.append((task, *about, float(percent) / 100))
     by_task: defaultdict[tuple[str, str], list[Job]] = defaultdict(list)
     for job in jobs:
         by_task[job.task, job.setting].append(job)
-    values: defaultdict[tuple[str, ...], list[float]] = defaultdict(list)
     for (task, setting), same in by_task.items():
         for name, floor in FLOORS.items():
             level = floor_level(floor, same, LANGUAGE_VERSION)
             if level is not None:
-                for scope in (ALL_TASKS, str(suite(task))):
-                    values[scope, name, NOT_APPLICABLE, setting].append(float(level))
-    for row in published_rows("main"):
-        for task, rate in row.rates.items():
-            if rate is not None:
-                for scope in (ALL_TASKS, str(suite(task))):
-                    key = (scope, PUBLISHED[row.model], "published", row.options.setting)
-                    values[key].append(float(rate) / 100)
-    measures = []
-    for about, of_tasks in values.items():
-        mean = sum(of_tasks) / len(of_tasks)
-        measures.append(Measure(*about, SUCCESS, round(mean, 6)))
-    return measures
+                rates.append((task, name, NOT_APPLICABLE, setting, float(level)))
+    of_tasks = pd.DataFrame(rates, columns=["task", *ABOUT[:3], "value"])
+    of_all = of_tasks.assign(scope=ALL_TASKS)
+    of_suites = of_tasks.assign(scope=of_tasks["task"].map(suite))
+    alike = pd.concat([of_all, of_suites]).groupby(["scope", *ABOUT[:3]], sort=False)
+    return alike["value"].mean().round(6).reset_index().assign(number=SUCCESS)
 
 
 def _facts(study: Study, jobs: Sequence[Job]) -> dict[str, str]:
     """Return what a page of the study says besides rates."""
-    label = language_label(find_tasks(study.tasks.split(",")), study.wordings)
+    label = language_label(find_tasks(study.tasks.split(",")), cast("PoolName", study.wordings))
     found = {
         "trainings of each row": str(len(study.seeds)),
         "version of the words, and digest": f"{LANGUAGE_VERSION}, `{short_hash(label)}`",
