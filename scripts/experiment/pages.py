@@ -58,7 +58,9 @@ PARTS = {
     "differences": Part(
         "number.str.startswith('success over') and setting == @MEAN", _POLICY, "number"
     ),
-    "gap": Part("number.str.endswith('over explicit words')", [*_POLICY, "setting"], "number"),
+    "gap": Part(
+        "number.str.endswith('over explicit words') and setting == @MEAN", _POLICY, "number"
+    ),
 }
 """By name of the part: ``results`` of all tasks, ``results counting`` of a suite."""
 
