@@ -60,10 +60,13 @@ class Measure(NamedTuple):
 def measure_frame(frame: pd.DataFrame) -> list[Measure]:
     """Return what the trials of a frame give, without resolved forms and chosen stages.
 
+    A trial that stands there several times, as parts of the study may share it, counts once.
+
     Raises:
         RoboIRGError: a policy lacks trials that another one has in the same setting.
     """
     usual = frame[frame["instruction_options"] == frame["setting"]].sort_values(EPISODE)
+    usual = usual.drop_duplicates(["policy", "setting", *EPISODE, "outcome"])
     played = usual.groupby(["setting", "policy", "policy_seed"]).size()
     if (played.groupby("setting").nunique() > 1).any():
         raise RoboIRGError(f"Trials are missing; hear and play them:\n{played.to_string()}")

@@ -109,6 +109,13 @@ def test_with_one_training_intervals_are_those_of_measure(frame):
     assert (gap.low, gap.high) == pytest.approx(expected.gap.interval, abs=1e-6)
 
 
+def test_trials_that_two_parts_of_a_study_share_count_once(frame):
+    """Both parts have played explicit words."""
+    explicit = frame[frame["setting"] == "explicit"]
+
+    assert measure_frame(pd.concat([frame, explicit])) == measure_frame(frame)
+
+
 def test_a_policy_that_lacks_trials_is_refused(frame):
     """Its mean would be over other episodes than that of the others."""
     with pytest.raises(RoboIRGError, match="Trials are missing"):
