@@ -1,4 +1,4 @@
-"""Train, hear and play the paper's experiment on the small body, and write its tables.
+"""Train, hear and play the paper's experiment on the small body, and write its numbers and pages.
 
 python scripts/play_experiment.py
 python scripts/play_experiment.py hear play --memories recurrent --seeds 0 --tasks PickXtimes
@@ -18,6 +18,7 @@ from experiment.frame import prove, write_frame
 from experiment.hearing import hear_missing
 from experiment.packs import write_pack
 from experiment.playing import play_missing
+from experiment.results import write_results
 from experiment.study import Study
 from experiment.weights import train_missing
 
@@ -32,6 +33,7 @@ STEPS = {
     "frame": write_frame,
     "prove": prove,
     "pack": write_pack,
+    "results": write_results,
 }
 USUAL = ("train", "hear", "play", "frame", "prove")
 PLAN = Path(__file__).parent / "experiment" / "study.yaml"

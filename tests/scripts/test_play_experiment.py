@@ -154,6 +154,34 @@ def study(tmp_path):
     )  # fmt: skip
 
 
+def test_results_of_a_study_go_into_the_page_next_to_their_folder(study):
+    """The only trial succeeds. Facts and what needs no play are there, too: in explicit words a
+    guess is always right, and somebody has noted two looks at the split."""
+    import pandas as pd
+    from experiment.results import write_results
+
+    save_random_policy(study, "recurrent")
+    trial = {
+        "policy": "recurrent-all", "policy_seed": 0, "setting": "explicit",
+        "instruction_options": "explicit", "task": "PickXtimes", "suite": "counting",
+        "split": "val", "episode": 0, "outcome": "success", "failure_kind": None,
+    }  # fmt: skip
+    pd.DataFrame([trial]).to_csv(study.results / "small.csv.xz", index=False)
+    (study.results / "looks.csv").write_text("split,why\nval,an epoch\nval,a table\n")
+    page = study.results.parent / "README.md"
+    parts = [f"<!-- {name} -->\n\n\n\n<!-- end of {name} -->" for name in ("results", "facts")]
+    page.write_text("\n\n".join(parts))
+
+    write_results(study)
+
+    written = page.read_text()
+    assert "| recurrent | all | 1 | 100 |" in written
+    assert "| *guess* | – | – | 100 |" in written
+    assert "| looks at `val` | 2 |" in written
+    assert re.search(r"\| parameters of `recurrent` \| detector [\d,]+, body [\d,]+ \|", written)
+    assert re.search(r"\| unknown to the reader of `all`, % \| explicit \d+ \|", written)
+
+
 @pytest.fixture
 def play_key(study, monkeypatch):
     """Return the key of a play after some changes of what it depends on."""
