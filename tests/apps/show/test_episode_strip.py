@@ -45,7 +45,6 @@ def moments(count, caption="done"):
 
 
 LIGHT = palette().light
-DARK = palette().dark
 
 
 def drawn(count, caption="done", colors=LIGHT):
@@ -100,7 +99,7 @@ def test_no_word_is_drawn_over_another(caption):
 
 @pytest.mark.parametrize(
     ("text", "color"),
-    [("direct", "#0072B2"), ("0.0 s, video", LIGHT["accent"]), ("0.5 s", LIGHT["edge"])],
+    [("direct", "#0072B2"), ("0.0 s, video", "#2b5c8a"), ("0.5 s", "#8d877b")],
     ids=["setting", "time in the video", "time of the policy"],
 )
 def test_a_strip_names_settings_and_times_in_their_colors(text, color):
@@ -124,8 +123,8 @@ def test_the_first_picture_says_where_the_robots_left_is():
 
 def test_black_text_is_drawn_in_another_color_on_dark():
     """The setting *explicit* is black, which would not be seen."""
-    texts = {found.get_text(): found for found in drawn(3, colors=DARK).texts}
-    assert texts["explicit"].get_color() == DARK["ink"]
+    texts = {found.get_text(): found for found in drawn(3, colors=palette().dark).texts}
+    assert texts["explicit"].get_color() == palette().dark["ink"]
 
 
 @pytest.mark.parametrize(
