@@ -2,6 +2,7 @@
 
 import csv
 import itertools
+import json
 import re
 import subprocess
 import tomllib
@@ -12,6 +13,7 @@ import msgspec
 import numpy as np
 import pytest
 from msgspec import inspect
+from PIL import ExifTags, Image
 
 import roboirg
 from roboirg.analysis.measures.chance import floor_level
@@ -19,8 +21,10 @@ from roboirg.analysis.published import published_rows
 from roboirg.core.actions import check_chunk
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.licenses import PICTURE_LICENSE
+from roboirg.language import instruct
 from roboirg.records.record import Job, Record
 from roboirg.tasks import find_tasks
+from roboirg.tasks.splits import get_episode
 
 ROOT = Path(__file__).parent.parent
 
@@ -50,6 +54,17 @@ def test_every_link_to_a_file_leads_to_one(page):
     for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text()):
         if "://" not in target:
             assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("name", ["scene.png", "film.webp"])
+def test_a_picture_of_readme_shows_the_words_that_are_said_today(name):
+    """`scripts/readme-pictures` stores in a picture's file what it wrote into the picture."""
+    with Image.open(ROOT / "docs/images" / name) as picture:
+        drawn = json.loads(picture.getexif()[ExifTags.Base.ImageDescription])
+
+    episode = get_episode(drawn["task"], "test", drawn["episode"])
+    for setting, words in drawn["said"].items():
+        assert words == instruct(episode, setting).text
 
 
 def test_the_page_about_records_lists_exactly_the_keys_of_a_record():

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections import defaultdict
 from itertools import combinations
+from pathlib import Path
 
 import pytest
 from flat_jobs import make_result, make_results
@@ -12,7 +14,9 @@ from msgspec.structs import replace
 from page_text import played
 from published_results import like_published
 
-from roboirg.analysis.figures import draw_figure, failures, write_figures
+from roboirg.analysis import palette
+from roboirg.analysis.figures import draw_figure, write_figures
+from roboirg.analysis.figures.failures import failure_colors
 from roboirg.analysis.figures.gaps import WORDS
 from roboirg.analysis.figures.rates import Rate, RateRow, draw_rates
 from roboirg.analysis.measures.run_data import RunData
@@ -169,7 +173,7 @@ def test_each_part_of_a_bar_is_as_long_as_its_share_of_the_played_episodes():
     figure = drawn_figure("failures", run_data(results))
 
     (panel,) = figure.axes
-    expected = {failures.COLORS["wrong_object"]: 45, failures.COLORS["dropped"]: 5}
+    expected = {failure_colors()["wrong_object"]: 45, failure_colors()["dropped"]: 5}
     assert bar_widths_by_color(panel) == pytest.approx(expected)
 
 
@@ -350,3 +354,11 @@ def test_results_of_one_setting_are_drawn_as_rates_without_a_gap(setting, rates)
 
     assert {title for title, _ in shown} == {setting}
     assert [*shown.values()] == rates
+
+
+def test_colors_of_the_page_and_of_figures_stand_in_the_palette_alone():
+    """Would find a color of its own, which the page or a figure has beside the palette."""
+    files = Path(palette.__file__).parent.rglob("*.*[sy2l]")
+    color = rb"#[0-9a-fA-F]{6}\b"
+
+    assert [file.name for file in files if re.search(color, file.read_bytes())] == ["palette.toml"]

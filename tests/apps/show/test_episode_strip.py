@@ -5,7 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from roboirg.analysis.figures.figure_style import DARK_STYLE, STYLE
+from roboirg.analysis.figures.figure_style import style
+from roboirg.analysis.palette import palette
 from roboirg.apps.show.episode_strip import SpokenSetting, StripMoment, draw_strip
 from roboirg.apps.show.episode_text import describe_motions, describe_video, fact_words
 from roboirg.apps.show.playthrough import (
@@ -43,9 +44,12 @@ def moments(count, caption="done"):
     return found
 
 
-def drawn(count, caption="done", style=STYLE):
+LIGHT = palette().light
+
+
+def drawn(count, caption="done", colors=LIGHT):
     """Draw a strip of so many moments with two instructions, and return the figure."""
-    with mpl.rc_context(style):
+    with mpl.rc_context(style(colors)):
         figure = draw_strip("A title", SAID, moments(count, caption))
         FigureCanvasAgg(figure).draw()
     return figure
@@ -95,7 +99,7 @@ def test_no_word_is_drawn_over_another(caption):
 
 @pytest.mark.parametrize(
     ("text", "color"),
-    [("direct", "#0072B2"), ("0.0 s, video", "#E69F00"), ("0.5 s", "#8a8a8a")],
+    [("direct", "#0072B2"), ("0.0 s, video", "#2b5c8a"), ("0.5 s", "#8d877b")],
     ids=["setting", "time in the video", "time of the policy"],
 )
 def test_a_strip_names_settings_and_times_in_their_colors(text, color):
@@ -119,8 +123,8 @@ def test_the_first_picture_says_where_the_robots_left_is():
 
 def test_black_text_is_drawn_in_another_color_on_dark():
     """The setting *explicit* is black, which would not be seen."""
-    texts = {found.get_text(): found for found in drawn(3, style=DARK_STYLE).texts}
-    assert texts["explicit"].get_color() == DARK_STYLE["text.color"]
+    texts = {found.get_text(): found for found in drawn(3, colors=palette().dark).texts}
+    assert texts["explicit"].get_color() == palette().dark["ink"]
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,13 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, NamedTuple
 
 from roboirg.analysis.figures.failures import draw_failures
-from roboirg.analysis.figures.figure_style import STYLE, check_figure_support, save
+from roboirg.analysis.figures.figure_style import check_figure_support, save, style
 from roboirg.analysis.figures.gaps import draw_next_to_reference
 from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.palette import palette
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.util.discovery import with_entries
 
@@ -83,6 +84,5 @@ def draw_figure(name: str, content: RunData, *, published: bool = False) -> Figu
     check_figure_support()
     import matplotlib as mpl
 
-    # A cast, because matplotlib's type for styles knows only the keys of one version.
-    with mpl.rc_context(cast("Any", STYLE)):
+    with mpl.rc_context(style(palette().light)):
         return figure_kinds()[name].draw(content.without_control_arms, published)

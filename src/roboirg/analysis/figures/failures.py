@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from roboirg.analysis.figures.figure_style import paper
+from roboirg.analysis.figures.figure_style import SMALL_POINTS, paper
 from roboirg.analysis.figures.panels import Panel, RowLabel, panels
 from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.palette import palette
 from roboirg.analysis.results.option_labels import options_sort_key
 from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.analysis.tables.diagnostic_tables import (
@@ -30,30 +32,14 @@ HEIGHT = 1.55
 """Of a bar, of the two lines of a row."""
 MIN_LABELED_PERCENT = 6.0
 """Smallest part with room for its number, percent."""
-_ORANGE = (
-    "#7f2704", "#a63603", "#c0510a", "#dd6a1c", "#ee8130", "#fbb477", "#fddfbf", "#fff1e3",
-)  # fmt: skip
-_BLUE = (
-    "#08306b", "#20578f", "#3271a8", "#4b90c4", "#74b0d8", "#a9d0e8", "#c4dff0", "#d9ebf6",
-    "#edf5fb",
-)  # fmt: skip
-_GRAY = ("#5f5f5f", "#858585", "#ababab", "#cfcfcf")
-_DARK = frozenset((*_ORANGE[:4], *_BLUE[:4], *_GRAY[:2]))
 NOTE = "n: trials with a verdict; the rest of a bar succeeded."
 
 
-def _color_failures() -> dict[str, str]:
+@functools.cache
+def failure_colors() -> Mapping[str, str]:
     """Return a color by name of the failure; if a kind has more names, its colors come again."""
-    shades = {
-        "grounding": itertools.cycle(_ORANGE),
-        "execution": itertools.cycle(_BLUE),
-        "undecided": itertools.cycle(_GRAY),
-        "": itertools.cycle(["#eeeeee"]),
-    }
-    return {name: next(shades[kind]) for name, kind in FAILURE_KINDS.items()}
-
-
-COLORS = _color_failures()
+    shades = {kind: itertools.cycle(colors) for kind, colors in palette().failures.items()}
+    return {name: next(shades[kind or "undecided"]) for name, kind in FAILURE_KINDS.items()}
 
 
 def draw_failures(content: RunData) -> Figure | None:
@@ -116,7 +102,7 @@ def _keys(causes: Iterable[str]) -> dict[str, Artist]:
         label = name.replace("_", " ")
         if FAILURE_KINDS[name]:
             label = f"{FAILURE_KINDS[name]}: {label}"
-        keys[label] = Patch(facecolor=COLORS[name], edgecolor=paper())
+        keys[label] = Patch(facecolor=failure_colors()[name], edgecolor=paper())
     return keys
 
 
@@ -129,6 +115,7 @@ def _draw_bar(axes: Axes, place: float, counts: Counter[str], causes: Sequence[s
         counts: trials with a verdict, and failures by cause.
         causes: the parts of the bar from left to right.
     """
+    colors = failure_colors()
     trials = counts["trials"]
     left = 0.0
     for name in causes:
@@ -138,7 +125,7 @@ def _draw_bar(axes: Axes, place: float, counts: Counter[str], causes: Sequence[s
             width,
             left=left,
             height=HEIGHT,
-            color=COLORS[name],
+            color=colors[name],
             edgecolor=paper(),
             linewidth=0.5,
         )
@@ -149,9 +136,11 @@ def _draw_bar(axes: Axes, place: float, counts: Counter[str], causes: Sequence[s
                 str(counts[name]),
                 ha="center",
                 va="center",
-                fontsize=6.5,
-                color="white" if COLORS[name] in _DARK else "black",
+                fontsize=SMALL_POINTS,
+                color="white" if colors[name] in palette().below_white else "black",
             )
         left += width
     text = f"n = {trials}" if trials else "–"
-    axes.text(1.02, place, text, transform=axes.get_yaxis_transform(), va="center", fontsize=6.5)
+    axes.text(
+        1.02, place, text, transform=axes.get_yaxis_transform(), va="center", fontsize=SMALL_POINTS
+    )

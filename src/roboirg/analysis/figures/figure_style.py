@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
+from roboirg.analysis.palette import Colors, palette
 from roboirg.core.extras import extra_needed
 from roboirg.util.atomic_write import replacing
 
@@ -14,48 +15,45 @@ if TYPE_CHECKING:
 
 PAGE_INCHES = 7.0
 """Width of a page; figures are drawn at final size."""
-TITLE_POINTS = 8.5
+TITLE_POINTS = 9
 """Usual size of a panel's title."""
+SMALL_POINTS = 7
+"""Smallest letters: 11 pixels where a figure is as wide as a README."""
 DOTS_PER_INCH = 300
-STYLE = {
-    "font.size": 7.5,
+_SETTINGS = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8,
     "axes.linewidth": 0.6,
-    "axes.edgecolor": "#999999",
     "axes.titlesize": TITLE_POINTS,
     "axes.titleweight": "bold",
-    "lines.color": "#0072B2",
-    "grid.color": "#dddddd",
     "grid.linewidth": 0.5,
     "legend.frameon": False,
-    "legend.fontsize": 7,
+    "legend.fontsize": 7.5,
+    "pdf.fonttype": 42,  # letters, not outlines, which some venues refuse
+    "svg.hashsalt": "roboirg",  # the ids in an SVG file are random without it
 }
-DARK_PAPER = "#0d1117"
-DARK_INK = "#e6edf3"
-DARK_STYLE = {
-    **STYLE,
-    "figure.facecolor": DARK_PAPER,
-    "savefig.facecolor": DARK_PAPER,
-    "axes.facecolor": DARK_PAPER,
-    "axes.edgecolor": "#6e7681",
-    "lines.color": "#56B4E9",
-    "grid.color": "#30363d",
-    **dict.fromkeys(
-        ("text.color", "axes.labelcolor", "xtick.color", "ytick.color", "axes.titlecolor"), DARK_INK
-    ),
-}
-"""For pages with a dark background."""
+_SHEETS = ("figure.facecolor", "savefig.facecolor", "axes.facecolor")
+_INKS = ("text.color", "axes.labelcolor", "axes.titlecolor", "xtick.color", "ytick.color")
 _METADATA = {
     "svg": {"Date": None},
     "pdf": {"CreationDate": None},
     "png": None,
 }
-_SAME_FILES = {
-    "font.family": "DejaVu Sans",
-    "pdf.fonttype": 42,  # letters, not outlines, which some venues refuse
-    "svg.hashsalt": "roboirg",  # the ids in an SVG file are random without it
-}
-GHOST = "#8a8a8a"
-"""Of what is published and of what only explains."""
+
+
+def style(colors: Colors) -> dict[Any, Any]:
+    """Return matplotlib's settings for our figures in some colors of `palette`.
+
+    A figure has a background of its own, so that it is legible on any page.
+    """
+    return {
+        **_SETTINGS,
+        **dict.fromkeys(_SHEETS, colors["sheet"]),
+        **dict.fromkeys(_INKS, colors["ink"]),
+        "axes.edgecolor": colors["edge"],
+        "lines.color": colors["accent"],
+        "grid.color": colors["line"],
+    }
 
 
 def check_figure_support() -> None:
@@ -81,10 +79,10 @@ def save(
         formats: extensions; no PDF is written for dark pages.
     """
     check_figure_support()
-    paths = _save_in_style(draw, folder, name, STYLE, formats)
+    paths = _save_in_style(draw, folder, name, style(palette().light), formats)
     if paths:
         on_dark = [ending for ending in formats if ending != "pdf"]
-        paths += _save_in_style(draw, folder, f"{name}-dark", DARK_STYLE, on_dark)
+        paths += _save_in_style(draw, folder, f"{name}-dark", style(palette().dark), on_dark)
     return tuple(paths)
 
 
@@ -92,7 +90,7 @@ def _save_in_style(
     draw: Callable[[], Figure | None],
     folder: Path,
     stem: str,
-    style: Mapping[str, object],
+    settings: dict[Any, Any],
     formats: Sequence[str],
 ) -> list[Path]:
     """Draw a figure with some settings of matplotlib, write it, and return the files.
@@ -101,12 +99,12 @@ def _save_in_style(
         draw: makes the figure; None if there is nothing to draw.
         folder: of the files.
         stem: of their names.
-        style: settings such as colors.
+        settings: of matplotlib, such as colors.
         formats: extensions, one file for each.
     """
     import matplotlib as mpl
 
-    with mpl.rc_context(cast("Any", {**_SAME_FILES, **style})):
+    with mpl.rc_context(settings):
         figure = draw()
         if figure is None:
             return []
@@ -148,6 +146,13 @@ def first_color() -> str:
     return str(mpl.rcParams["lines.color"])
 
 
+def ghost() -> str:
+    """Return the color of what is published and of what only explains."""
+    import matplotlib as mpl
+
+    return str(mpl.rcParams["axes.edgecolor"])
+
+
 def new_figure(width: float, height: float, below: float = 0) -> Figure:
     """Return an empty figure of the given size in inches, with a share of it left free below."""
     # Without pyplot, which keeps every figure and looks for a display.
@@ -155,6 +160,6 @@ def new_figure(width: float, height: float, below: float = 0) -> Figure:
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     engine = ConstrainedLayoutEngine(
-        w_pad=0.03, h_pad=0.03, wspace=0.04, rect=(0, below, 1, 1 - below)
+        w_pad=0.08, h_pad=0.08, wspace=0.02, rect=(0, below, 1, 1 - below)
     )
     return Figure(figsize=(width, height), layout=engine)

@@ -11,7 +11,12 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from roboirg.analysis.figures.figure_style import PAGE_INCHES, TITLE_POINTS, new_figure
+from roboirg.analysis.figures.figure_style import (
+    PAGE_INCHES,
+    SMALL_POINTS,
+    TITLE_POINTS,
+    new_figure,
+)
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -20,19 +25,19 @@ if TYPE_CHECKING:
 
 COLUMN_INCHES = 3.4
 """Width of a column of a page."""
-ROW_LINE_INCHES = 0.115
-NOTE_LINE_INCHES = 0.11
-KEY_LINE_INCHES = 0.16
-TITLE_LINE_INCHES = 0.14
+ROW_LINE_INCHES = 0.12
+NOTE_LINE_INCHES = 0.125
+KEY_LINE_INCHES = 0.17
+TITLE_LINE_INCHES = 0.15
 """Heights of a line of a row's label, a note, the legend and a panel's title."""
-AXIS_INCHES = 0.4
+AXIS_INCHES = 0.45
 """Height of what is below a panel."""
 MOST_ROW_LETTERS = 28
 """Letters of a line of a row's label."""
-ROW_LETTERS = 14
+ROW_LETTERS = 13
 TITLE_LETTERS = 10
-NOTE_LETTERS = 21
-KEY_LETTERS = 19
+NOTE_LETTERS = 18
+KEY_LETTERS = 18
 """Letters that fit into an inch of a row's label, a panel's title, a note and the legend."""
 MOST_TITLE_SHRINKING = 1.4
 """By which factor a panel's title may be smaller so that its longest word fits."""
@@ -63,7 +68,7 @@ class Panel(NamedTuple):
         """
         self.axes.set_xlim(-margin * end, (1 + margin) * end)
         self.axes.set_xticks(range(0, end + 1, tick))
-        self.axes.set_xlabel(label, fontsize=6.5)
+        self.axes.set_xlabel(label, fontsize=SMALL_POINTS)
 
 
 class RowLabel(NamedTuple):
@@ -253,7 +258,8 @@ class _Footer(NamedTuple):
             borderaxespad=0,
             borderpad=0,
         )
-        figure.text(0.01, 0.5 * NOTE_LINE_INCHES / height, self.notes, fontsize=6, va="bottom")
+        bottom = 0.5 * NOTE_LINE_INCHES / height
+        figure.text(0.012, bottom, self.notes, fontsize=SMALL_POINTS, va="bottom")
 
 
 def _folded(text: str, letters: float) -> str:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from roboirg.analysis.figures.figure_style import GHOST, first_color, paper
+from roboirg.analysis.figures.figure_style import first_color, ghost, paper
 from roboirg.analysis.figures.panels import Panel, RowLabel, panels
 from roboirg.stats.intervals import Interval
 from roboirg.stats.rates import points
@@ -92,7 +92,7 @@ def draw_rates(
     tick = TICK if len(columns) < MOST_COLUMNS else 2 * TICK
     for panel, (column, below) in zip(drawn, columns.items(), strict=True):
         _draw_column(panel, column, rows)
-        panel.set_scale(end, tick, below, margin=0.04)  # for the dots at both ends
+        panel.set_scale(end, tick, below, margin=0.06)  # for the dots at both ends
     return figure
 
 
@@ -113,8 +113,8 @@ def _draw_column(panel: Panel, column: str, rows: Sequence[RateRow]) -> None:
     color = first_color()
     for place, row in zip(panel.places, rows, strict=True):
         if not row.rates:
-            color = GHOST
-            panel.axes.axhline(place - 1, color=GHOST, linewidth=0.6)
+            color = ghost()
+            panel.axes.axhline(place - 1, color=color, linewidth=0.6)
         if column in row.rates:
             _draw_rate(panel.axes, place, row.rates[column], color)
 
@@ -137,7 +137,7 @@ def _draw_rate(axes: Axes, place: float, rate: Rate, color: str) -> None:
         axes.plot(reference, place, "o", color=color, markersize=DOT, markerfacecolor=paper())
         difference = points(rate.value - rate.reference)
         right = axes.get_yaxis_transform()  # the text is to the right of the panel
-        axes.text(1.02, place, difference, transform=right, va="center", fontsize=7)
+        axes.text(1.02, place, difference, transform=right, va="center")
     axes.plot(value, place, "o", color=color, markersize=DOT)
 
 
@@ -160,11 +160,11 @@ def _keys(rates: Sequence[Rate], words: RateWords) -> dict[str, Artist]:
     keys: dict[str, Artist] = {}
     if is_compared:
         keys[f"{words.reference}, %"] = _key_dot(paper())
-        keys[f"{words.compared}; number: difference"] = _key_dot(GHOST)
+        keys[f"{words.compared}; number: difference"] = _key_dot(ghost())
     else:
-        keys["success, %"] = _key_dot(GHOST)
+        keys["success, %"] = _key_dot(ghost())
     if interval_label:
-        keys[interval_label] = Line2D([], [], color=GHOST, **BAND)
+        keys[interval_label] = Line2D([], [], color=ghost(), **BAND)
     return keys
 
 
@@ -174,7 +174,7 @@ def _key_dot(filling: str) -> Line2D:
     return Line2D(
         [],
         [],
-        color=GHOST,
+        color=ghost(),
         marker="o",
         linestyle="none",
         markersize=DOT,

@@ -17,6 +17,7 @@ from roboirg.analysis.page.episodes import JsonObject, PageEpisodes
 from roboirg.analysis.page.evidence_paths import evidence_paths
 from roboirg.analysis.page.matrix import make_matrix
 from roboirg.analysis.page.run_warnings import comparisons, facts_of, run_warnings
+from roboirg.analysis.palette import palette
 from roboirg.analysis.results.frame import Frame
 from roboirg.analysis.results.reading import with_words
 from roboirg.analysis.results.sources import Source
@@ -156,6 +157,7 @@ def _render(
     details.lines.clear()  # to free the memory
     return template.generate(
         styles=STYLES,
+        palette=palette(),
         scripts=SCRIPTS,
         name=" against ".join(episodes.runs),
         facts=facts_of(episodes),

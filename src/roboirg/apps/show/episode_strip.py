@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from roboirg.analysis.figures.figure_style import PAGE_INCHES
+from roboirg.analysis.figures.figure_style import PAGE_INCHES, first_color, ghost
 from roboirg.core.observations import Pixels
 from roboirg.util.media import CONTROL_RATE
 
@@ -40,8 +40,6 @@ _CAPTION_LETTERS = 24 / 1.09
 """Letters of an inch of a caption."""
 _SPACING = 1.15
 """Distance of lines, in heights of the letters."""
-_VIDEO = "#E69F00"
-_PALE = "#8a8a8a"
 _BLACK = "#000000"
 _SIDE: Mapping[str, Any] = {"fontsize": 5.5, "color": "white"}
 
@@ -192,10 +190,10 @@ def _draw_moment(figure: Figure, x: float, y: float, moment: StripMoment, side: 
     axes.set_axis_off()
 
     when = f"{moment.step / CONTROL_RATE:.1f} s"
-    color = _PALE
+    color = ghost()
     if moment.is_demonstration:
         when += ", video"
-        color = _VIDEO
+        color = first_color()
     y += side + _GAP
     _write(figure, x, y, when, fontsize=6, color=color, fontweight="bold")
     caption = "\n".join(_caption_lines(moment, side))
