@@ -37,7 +37,7 @@ def card_text(plan: ExportPlan, facts: Sequence[TrajectoryFacts], root: Path) ->
     card_license = OWN_LICENSE if plan.pictures == "none" else PICTURE_LICENSE
     # The head, between two lines of dashes, is YAML.
     lines = ["---", f"license: {card_license}", "task_categories: [robotics]"]
-    lines.append("tags: [LeRobot, RoboIRGBench]")
+    lines.append('tags: [LeRobot, robotics, RoboIRGBench, "arxiv:2609.34384"]')
     if plan.file_format.has_frame_tables:
         # Without them, Hugging Face takes the tables of facts for frames.
         lines.append("configs: [{config_name: default, data_files: data/*/*.parquet}]")
