@@ -46,7 +46,6 @@ def hub_results(frame: Frame, dataset: str) -> str:
         entry = {
             "dataset": {"id": dataset, "task_id": task},
             "value": round(100 * rate, 1),
-            "evaluation_framework": "roboirgbench",
             "notes": f"language {run.language}",
         }
         entries.append(entry)
