@@ -1,6 +1,7 @@
 """Examples of what is said, in Markdown, for the pages about the settings.
 
-`write_language_card.py` writes them into docs/language.md and docs/harder-settings.md.
+`write_language_card.py` writes them into docs/language.md and docs/harder-settings.md, and the
+words that point back into docs/scenario-marks.md.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import find_refusal, instruct
 from roboirg.language.instruction import Described, Instruction, Mention
 from roboirg.language.meaning import field_values
+from roboirg.language.scenarios.scenario_file import pointer_table
 from roboirg.language.settings import all_settings, plain_settings
 from roboirg.tasks.splits.splits import get_episode, split_episodes
 
@@ -49,6 +51,16 @@ def harder_page(page: str) -> str:
     """Return the page of the harder settings with its examples."""
     page = with_part(page, "rivals", _rivals())
     return with_part(page, "seen", _seen())
+
+
+def marks_page(page: str) -> str:
+    """Return the page of marks with all words that point back, in the order of their file."""
+    rows = []
+    for row in pointer_table():
+        words = row.words.replace("|", r"\|")
+        rows.append((", ".join(row.of), row.operation, row.kind, f"`{words}`"))
+    heads = ("stands for", "follows by", "class", "words")
+    return with_part(page, "pointers", table(heads, rows))
 
 
 def walk() -> dict[str, Instruction]:

@@ -92,8 +92,8 @@ Scenes in which the command alone leaves one goal, so that nothing needs to be r
 
 ### Ratings and readings
 
-[Another page](references.md#how-natural-the-words-are) says how natural the texts were rated, and
-how often readers named the goal. Authors, raters and readers are language models."""
+[How the words are made](references.md#how-natural-the-words-are) says how natural the texts were
+rated, and how often readers named the goal. Authors, raters and readers are language models."""
 
 
 def scenario_part() -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from language_examples import harder_page, language_page, marked
+from language_examples import harder_page, language_page, marked, marks_page
 from scenario_tables import scenario_part
 from written_parts import table
 
@@ -31,6 +31,7 @@ PAGE = DOCS / "language-card.md"
 EXAMPLES: Mapping[Path, Callable[[str], str]] = {
     DOCS / "language.md": language_page,
     DOCS / "harder-settings.md": harder_page,
+    DOCS / "scenario-marks.md": marks_page,
 }
 """Pages with examples, and how each is written."""
 

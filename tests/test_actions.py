@@ -129,11 +129,6 @@ each_space = pytest.mark.parametrize("space", ACTION_SPACES.values(), ids=ACTION
 
 
 @each_space
-def test_an_action_space_is_found_by_its_name(space):
-    assert find_action_space(space.name) is space
-
-
-@each_space
 def test_the_lowest_values_of_an_action_space_are_an_action_below_its_highest(space):
     assert np.array_equal(check_chunk(space.low, space), [space.low])
     assert (space.low < space.high).all()

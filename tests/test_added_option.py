@@ -102,21 +102,6 @@ def test_a_new_instruction_option_is_one_of_commands_and_changes_the_words(pytho
     assert printed.count("Hello, robot.") == 1
 
 
-def test_a_new_instruction_option_is_a_keyword_of_make(python_with_the_option, tmp_path):
-    """In a copy of the package an option `greeting` is added, which in the setting *direct* puts
-    "Hello, robot." in front. `roboirg.make` takes it as a keyword without a change of its own."""
-    program = tmp_path / "program.py"
-    program.write_text(
-        "import roboirg\n"
-        'env = roboirg.make("PickXtimes", setting="direct", greeting="hello", cameras=())\n'
-        "print(env.instruction.text)\n"
-    )
-
-    printed = python_with_the_option(str(program))
-
-    assert printed.startswith("Hello, robot.")
-
-
 def test_a_new_instruction_option_is_a_field_of_plans_with_its_explanation(python_with_the_option):
     """In a copy of the package the option `greeting` is added, with a description. A plan that sets
     it is printed with that description as a comment above."""
@@ -149,14 +134,3 @@ def test_tables_name_a_new_instruction_option_next_to_its_setting(
     tables = python_with_the_option(f"-m roboirg tables {run_with_hello}")
 
     assert "direct (greeting hello)" in tables
-
-
-def test_exported_instructions_have_the_words_of_a_new_option(python_with_the_option, tmp_path):
-    """In a copy of the package an option `greeting` is added, which in the setting *direct* puts
-    "Hello, robot." in front. The plan sets it, and the instructions of its episode are exported."""
-    plan = plan_file(tasks="PickXtimes", settings="direct", greeting="hello", episodes=1)
-    rows = tmp_path / "rows.jsonl"
-
-    python_with_the_option(f"-m roboirg export instructions --plan {plan} --out {rows}")
-
-    assert "Hello, robot." in rows.read_text()

@@ -277,21 +277,6 @@ def test_show_words_prints_the_instructions_in_each_setting_by_default(roboirg, 
     assert roboirg("show", "VideoUnmask", "0", "--words").out == snapshot
 
 
-def test_run_and_report_list_ten_failures_and_count_the_others(
-    roboirg, tmp_path, play_without_simulator
-):
-    """Three episodes in five settings."""
-    play_without_simulator("failure", cause="pressed the button too early")
-
-    result = roboirg(*RUN_RANDOM, "--episodes", "3", "--workers", "0", "--out", tmp_path)
-
-    assert result.code == 0
-    assert "random: 15 episodes without success" in result.out
-    assert "  PickXtimes test/0 explicit: pressed the button too early\n" in result.out
-    assert "and 5 more" in result.out
-    assert "and 5 more" in roboirg("report", tmp_path).out
-
-
 @pytest.fixture
 def _drawn_without_simulator(tmp_path, monkeypatch):
     """The oracle succeeds after seven steps, with one picture; figures are saved as empty files."""

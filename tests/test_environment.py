@@ -190,16 +190,6 @@ def test_a_subgoal_changes_one_step_after_its_act_and_the_last_one_at_once(oracl
     assert changed[-1] == done[-1]
 
 
-def test_a_subgoal_has_a_pixel_only_if_it_points(oracle_with_subgoals):
-    """`changes` has the subgoals of an oracle's play, in words and with pixels, one for each stage
-    and one for the end. Acts that point at a thing, such as to pick it up, have a pixel; to put
-    it down need not."""
-    env, changes = oracle_with_subgoals
-    for stage, shown in zip(env.episode.stages, changes, strict=False):
-        assert re.sub(r"at <\d+, \d+> ?", "", shown.grounded).strip() == shown.subgoal
-        assert ("<" in shown.grounded) == (stage.points_at is not None)
-
-
 def test_the_options_that_make_declares_are_those_of_the_environment():
     """`EnvOptions` has the types of all keywords of `roboirg.make`, for editors. They are the
     fields of `EnvSettings`, in which two, words and environment, stand for the options of their

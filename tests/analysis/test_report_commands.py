@@ -149,18 +149,6 @@ def test_report_writes_the_page_of_two_runs_to_out(run_of_two_policies, pack_of_
     assert "<title>shipped:listener against folder-run" in out.read_text("utf-8")
 
 
-def test_run_colon_policy_shows_the_results_of_that_policy_alone(run_of_two_policies):
-    """The run has a listener and a forgetful policy. `RUN:forgetful` gives the header and those
-    lines of the whole table that are of the forgetful policy.
-    """
-    options = ("--which", "main", "--format", "csv")
-    head, *rows = call("tables", run_of_two_policies, *options).splitlines()
-
-    forgetful = call("tables", f"{run_of_two_policies}:forgetful", *options)
-
-    assert forgetful.splitlines() == [head, *(row for row in rows if "forgetful" in row)]
-
-
 def test_a_policy_of_a_folder_and_one_of_its_pack_are_shown_as_the_whole_run_is(
     run_of_two_policies, pack_of_the_run
 ):
@@ -187,12 +175,6 @@ def test_commands_on_two_runs_warn_if_these_were_rendered_on_different_devices(t
     assert warning in call("compare", first, second)
     assert warning in call("records", "merge", first, second, "--out", merged)
     assert warning in call("report", merged)
-
-
-def test_a_run_whose_device_is_not_known_fits_any_other(run_of_two_policies, tmp_path):
-    run = write_run(tmp_path / "listener", ("listener",), device="llvmpipe")
-
-    assert "Mixed" not in call("tables", run, run_of_two_policies)
 
 
 @pytest.mark.parametrize(

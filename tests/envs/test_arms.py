@@ -37,15 +37,6 @@ def test_arms_change_words_and_nothing_that_is_seen():
     assert len(seen) == 1
 
 
-def test_a_policy_that_does_the_original_goal_although_another_was_stated_is_seen_to_do_it():
-    """The policy *habit* does the scene's original goal, whatever is said. So it fails the goal
-    that the words state, by picking up a wrong cube, and succeeds in the original one."""
-    info = play(env_with_another_goal("PickXtimes", 2), make_policy("habit", seed=0))
-
-    assert (info["status"], info["verdict"], info["original"]) == ("failure", "failure", "success")
-    assert "picked up" in info["cause"]
-
-
 def test_an_episode_with_another_goal_ends_when_the_original_goal_would_have_been_reached():
     """The policy *habit* does the scene's original goal, whatever is said. That it has failed the
     stated goal is certain long before, but the episode goes on: for as many steps as where the

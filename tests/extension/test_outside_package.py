@@ -37,9 +37,12 @@ outside = "roboirg_outside.setting:SETTING"
 [project.entry-points."roboirg.protocols"]
 outside = "roboirg_outside.protocol"
 """
-LAB = ROOT / "docs" / "extend.md"
-SETTING_PAGE = ROOT / "docs" / "add-task.md"
-"""A task of the benchmark to which the recipe's setting applies."""
+LAB_FILES = {
+    "pyproject.toml": "toml",
+    "my_lab/__init__.py": "python",
+    "my_lab/lab-quick.yaml": "yaml",
+}
+"""The package of the docs: its files, each the first block of its kind in the section."""
 CHECK_EPISODES_AND_WORDS = """\
 import sys
 sys.path[:0] = [{language!r}]
@@ -74,16 +77,15 @@ def python_with_the_packages(tmp_path_factory):
     for name, (page, heading) in RECIPES.items():
         (package / f"{name}.py").write_text(recipe(page, heading))
     (package / "words.toml").write_text(recipe("add-task.md", "Words", "toml"))
-    # The first block in TOML of the section names the entry point.
-    _, colored = re.findall(r"```toml\n(.*?)```", SETTING_PAGE.read_text(), re.DOTALL)
+    # The last block in TOML of the page.
+    *_, colored = re.findall(
+        r"```toml\n(.*?)```", (ROOT / "docs" / "add-task.md").read_text(), re.DOTALL
+    )
     (package / "colored.toml").write_text(colored)
-    lab = folder / "lab" / "my_lab"
-    lab.mkdir(parents=True)
-    blocks = re.findall(r"```(toml|python|yaml)\n(.*?)```", LAB.read_text(), re.DOTALL)
-    names = ("__init__.py", "words.toml", "lab-quick.yaml")
-    files = (lab.parent / "pyproject.toml", *(lab / name for name in names))
-    for path, (_, text) in zip(files, blocks, strict=True):
-        path.write_text(text)
+    lab = folder / "lab"
+    (lab / "my_lab").mkdir(parents=True)
+    for name, kind in LAB_FILES.items():
+        (lab / name).write_text(recipe("extend.md", "Add a package", kind))
     venv.create(folder / "env", with_pip=False)
     python = folder / "env" / "bin" / "python"
     scheme = {"base": str(folder / "env"), "platbase": str(folder / "env")}
@@ -92,7 +94,7 @@ def python_with_the_packages(tmp_path_factory):
     here = [sysconfig.get_path("purelib"), str(ROOT / "src")]
     (site / "parent.pth").write_text("\n".join(here) + "\n")
     install = ["install", "--quiet", "--no-deps", "--no-build-isolation", "--target", str(site)]
-    projects = [str(package.parent), str(lab.parent)]
+    projects = [str(package.parent), str(lab)]
     subprocess.run([sys.executable, "-m", "pip", *install, *projects], check=True)
     return python
 
@@ -167,19 +169,18 @@ def test_a_function_of_the_page_s_package_is_a_command(roboirg):
 
 
 @pytest.mark.sim
-def test_the_plan_of_the_page_s_package_plays_its_task_setting_and_kind_of_policy(roboirg):
-    """The fixture has installed the package of docs/extend.md, with the task LabPick, the
-    setting *lab* and the kind of policies *lab:*, which acts at random. Its plan *lab-quick* has an
-    episode of this task in two settings, for the oracle, which succeeds, and for *lab:any*."""
-    roboirg("run", "--plan", "lab-quick", "--max-steps", "400", "--out", "lab")
+def test_the_plan_of_the_page_s_package_is_played_by_its_name(roboirg):
+    """The fixture has installed the package of docs/extend.md. Its plan *lab-quick* has an episode
+    of PickXtimes in two settings, for the oracle, which succeeds, and for *random*."""
+    roboirg("run", "--plan", "lab-quick", "--out", "lab")
 
     records = records_of_run(roboirg.folder / "lab")
     played = [(row["policy"], row["task"], row["options"]["setting"]) for row in records]
     assert sorted(played) == [
-        ("lab:any", "LabPick", "explicit"),
-        ("lab:any", "LabPick", "lab"),
-        ("oracle", "LabPick", "explicit"),
-        ("oracle", "LabPick", "lab"),
+        ("oracle", "PickXtimes", "direct"),
+        ("oracle", "PickXtimes", "explicit"),
+        ("random", "PickXtimes", "direct"),
+        ("random", "PickXtimes", "explicit"),
     ]
     assert {row["outcome"] for row in records if row["policy"] == "oracle"} == {"success"}
     assert {row["error"] for row in records} == {None}
@@ -188,11 +189,11 @@ def test_the_plan_of_the_page_s_package_plays_its_task_setting_and_kind_of_polic
 def test_an_installed_package_does_not_change_the_benchmarks_own_episodes_and_words(
     python_with_the_packages,
 ):
-    """In an environment with two packages installed, which add the settings *colored* and *lab*, a
+    """In an environment with two packages installed, of which one adds the setting *colored*, a
     script compares fingerprints of our episodes, and digests of our words in all other settings,
     with the stored ones; it ends with an error where one differs."""
     script = CHECK_EPISODES_AND_WORDS.format(
-        language=str(ROOT / "tests" / "language"), added=("colored", "lab")
+        language=str(ROOT / "tests" / "language"), added=("colored",)
     )
 
     subprocess.run([python_with_the_packages, "-c", script], check=True)

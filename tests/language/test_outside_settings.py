@@ -4,14 +4,11 @@ A setting is a way to leave values of a goal unsaid, such as *direct*, which say
 """
 
 import dataclasses
-import io
 
 import pytest
 import seed_selection
-from rich.console import Console
 from seed_selection import EpisodeSlot, check_words
 
-from roboirg.apps.show.episode_text import instructions_table
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import (
@@ -30,7 +27,6 @@ from roboirg.language.scenarios.wording_store import register_wordings
 from roboirg.language.settings import all_settings, contextual, direct, settings_of
 from roboirg.language.settings.setting import Setting
 from roboirg.language.variants import instructions
-from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.shortcuts.command_chance import understood_goals
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
@@ -67,14 +63,6 @@ def register(monkeypatch):
     monkeypatch.undo()
     all_settings.cache_clear()
     setting_scenarios.cache_clear()
-
-
-def printed(*tables):
-    """Return what is printed of tables."""
-    console = Console(width=200, file=io.StringIO())
-    for table in tables:
-        console.print(table)
-    return console.file.getvalue()
 
 
 def test_a_registered_setting_is_listed_last(register):
@@ -115,32 +103,6 @@ def test_the_reason_why_a_setting_refuses_a_scene_is_in_the_error(register):
     complaint = "dummy setting cannot express .*the scene is too easy"
     with pytest.raises(InvalidValueError, match=complaint):
         instruct(EASY_EPISODE, "dummy")
-
-
-def test_the_reason_why_a_setting_refuses_a_scene_is_in_the_table_of_instructions(register):
-    """DUMMY, a setting named "dummy", refuses easy scenes with the words *the scene is too easy*.
-    The table is that of `roboirg show --words`."""
-    register(DUMMY)
-    table = instructions_table(EASY_EPISODE, ["dummy"], InstructionOptions())
-    assert "the scene is too easy" in printed(table)
-
-
-@pytest.mark.parametrize(("index", "is_planned"), [(0, False), (3, True)], ids=["easy", "hard"])
-def test_a_plan_leaves_out_the_episodes_that_a_registered_setting_refuses(
-    register, index, is_planned
-):
-    """DUMMY, a setting named "dummy", refuses easy scenes. Episode 0 is easy, so the plan has it in
-    all settings but this one; episode 3 is hard."""
-    register(DUMMY)
-    plan = make_plan(["listener"], tasks="PickXtimes", settings="all", episodes="0,3")
-    assert ("dummy" in plan.settings_of("PickXtimes", index)) == is_planned
-
-
-def test_a_registered_setting_does_not_change_which_episodes_are_published(register):
-    """DUMMY refuses easy scenes. Seeds became episodes if our own settings can express them; a new
-    setting has no say in this, so nothing is wrong with the seed of an easy episode (None)."""
-    register(DUMMY)
-    assert check_words(EpisodeSlot("PickXtimes", "test", 0), EASY_EPISODE.seed) is None
 
 
 def test_an_episode_that_one_of_our_settings_refuses_would_not_be_published(register, monkeypatch):

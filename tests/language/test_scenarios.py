@@ -51,10 +51,10 @@ WRITTEN = [*written_words()]
 each_task = pytest.mark.parametrize("task", WRITTEN)
 each_pool = pytest.mark.parametrize("pool", POOLS)
 DOCS = Path(__file__).parents[2] / "docs"
-USER_FILE_OF_THE_PAGE, SPATIAL_FILE_OF_THE_PAGE = re.findall(
+USER_FILE_OF_THE_PAGE, SPATIAL_FILE_OF_THE_PAGE, _ = re.findall(
     r"```toml\n(.*?)```", (DOCS / "add-scenario.md").read_text(), re.DOTALL
 )
-"""The page's examples: a file of a user's own, and two spatial scenarios."""
+"""The page's examples: a file of a user's own, two spatial scenarios, and a whole sentence."""
 TWO_CUBES = """
 tasks = ["PickXtimes"]
 [[scenario]]
@@ -188,33 +188,6 @@ say.color = ["{step} fewer [step: time|times] than <that reference: {he} did>"]
     nearest = listed.split("; ")
     assert len(set(nearest)) == len(nearest) == 5
     assert "{step:*} fewer than <that reference: that>" in nearest
-
-
-def pointers_of_the_page():
-    """Return the table of docs/scenario-marks.md: for each kind of value, operation and class the
-    words, as code. A line has one or more kinds, an operation, and words by their class:
-    ``| color | same | **it** `it`; **that** `that cube` |``.
-    """
-    lines = (DOCS / "scenario-marks.md").read_text().splitlines()
-    found = {}
-    for line in lines[lines.index("| stands for | follows by | words |") + 2 :]:
-        kinds, operation, cell = re.fullmatch(r"\| (.*?) \| (.*?) \| (.*) \|", line).groups()
-        for name, words in re.findall(r"\*\*(\w+)\*\* (.*?)(?=; \*\*|$)", cell):
-            for kind in kinds.split(", "):
-                found[kind, operation, name] = set(words.replace("\\|", "|").split(", "))
-    return found
-
-
-def test_the_documentation_lists_every_pointer_of_the_table():
-    """Pointers are words such as *it* or *the latter*. `pointer_table` has the rows of the file
-    pointers.toml, and the page must list the same words for the same kinds of values, operations
-    and classes."""
-    expected = defaultdict(set)
-    for row in pointer_table():
-        for kind in row.of:
-            expected[kind, row.operation, row.kind].add(f"`{row.words}`")
-
-    assert pointers_of_the_page() == expected
 
 
 def test_all_mistakes_of_a_scenario_file_are_reported_at_once():
@@ -417,10 +390,10 @@ def test_adding_a_scenario_changes_only_the_episodes_that_choose_it(text, settin
 
 
 def test_the_example_file_of_the_documentation_has_a_scenario_for_every_scene():
-    """docs/add-scenario.md shows a user's file with the scenario "birthday", and then two spatial
-    ones, "wobbly table" and "wasp". Together, in every fourth published scene of PickXtimes, they
-    break no rule of the checker, and no setting that they have words for is left without one that
-    fits (`unserved_settings`)."""
+    """docs/add-scenario.md shows a user's file with "fresh paint" and "photos", and then two
+    spatial scenarios, "wobbly table" and "wasp". Together, in every fourth published scene of
+    PickXtimes, they break no rule of the checker, and no setting that they have words for is left
+    without one that fits (`unserved_settings`)."""
     scenes = scenes_of("PickXtimes", 0)[::4]
     text = USER_FILE_OF_THE_PAGE + SPATIAL_FILE_OF_THE_PAGE
     words = parse_wordings(text, "mine.toml").tasks["PickXtimes"]
@@ -428,7 +401,7 @@ def test_the_example_file_of_the_documentation_has_a_scenario_for_every_scene():
     reports = check_scenarios(words, None, scenes)
 
     broken = {report.scenario.fields.frame: dict(report.broken) for report in reports}
-    assert broken == {"birthday": {}, "wobbly table": {}, "wasp": {}}
+    assert broken == {"fresh paint": {}, "photos": {}, "wobbly table": {}, "wasp": {}}
     assert list(unserved_settings(reports, scenes, Path("mine.toml"))) == []
 
 

@@ -44,14 +44,3 @@ def test_the_command_show_accepts_a_pool_of_wordings(pool):
     printed = call("show", "StopCube", "0", "--words", "--wordings", pool)
 
     assert said.text in words(printed)
-
-
-@each_pool
-def test_the_command_run_accepts_a_pool_of_wordings(pool, tmp_path):
-    """With `--dry-run` it prints what would be played: one episode."""
-    printed = call(
-        "run", "--policy", "random", "--tasks", "StopCube", "--settings", "direct",
-        "--episodes", "1", "--policy-seeds", "0", "--wordings", pool,
-        "--out", tmp_path / "run", "--dry-run",
-    )  # fmt: skip
-    assert "1 episode" in printed

@@ -137,9 +137,3 @@ def test_an_episode_with_another_option_of_the_environment_is_another_one(option
     other = replace(job, environment=EnvironmentOptions(**option))
 
     assert identity_key(other) != identity_key(job)
-
-
-def test_an_episode_with_another_option_of_its_words_is_another_one():
-    job = small_plan().jobs()[0]
-
-    assert identity_key(job.with_options(stages=(1, 5))) != identity_key(job)

@@ -44,12 +44,6 @@ def test_a_scene_without_a_second_goal_lacks_the_arm_other_goal_and_is_counted_a
     assert plan.left_out(jobs) == {"other-goal": 2}
 
 
-def test_no_episode_lacks_the_arm_told():
-    plan = plan_with_arms("told", settings="direct")
-
-    assert plan.left_out(plan.jobs()) == {}
-
-
 def test_explicit_episodes_lack_a_second_paraphrase():
     """Explicit instructions have one paraphrase only, so all six episodes lack the second."""
     plan = plan_with_arms("told,paraphrase:2", settings="explicit")

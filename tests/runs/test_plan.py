@@ -25,7 +25,6 @@ from roboirg.runs.plan.option_parsing import (
     parse_episodes,
     parse_numbers,
     parse_policies,
-    parse_stages,
 )
 from roboirg.runs.plan.plan_maker import make_plan, word_options
 from roboirg.runs.plan.stored_plans import read_plan, write_plan
@@ -113,11 +112,6 @@ def test_a_difficulty_of_the_endless_random_split_is_refused():
 def test_a_refused_list_of_episodes_comes_with_what_to_write_instead(text, split, words):
     with pytest.raises(InvalidValueError, match=words):
         parse_episodes(text, split, ())
-
-
-def test_refused_stages_come_with_the_lists_of_stages_that_there_are():
-    with pytest.raises(InvalidValueError, match="1,5; 1,2,5; 1,2,3,5; 1,2,3,4,5"):
-        parse_stages("5-1")
 
 
 def test_two_lists_of_stages_are_refused_where_one_is_wanted():
@@ -215,17 +209,6 @@ def test_an_instruction_in_turns_is_another_episode_unless_it_has_one_utterance(
 @pytest.mark.parametrize("text", ["every", "direct, Every", "all,every"])
 def test_the_word_every_stands_for_all_settings_and_for_the_harder_ones(text):
     assert make_plan(["random"], settings=text, **ONE_EPISODE).settings == ("every",)
-
-
-@pytest.mark.parametrize(("word", "is_told"), [("all", False), ("every", True)])
-def test_settings_every_adds_the_harder_settings_that_all_leaves_out(word, is_told):
-    """*direct-rival* is harder: a second thing fits the words but for one property."""
-    plan = make_plan(["random"], tasks="BinFill", settings=word, episodes="0-3")
-
-    settings_told = {job.setting for job in plan.jobs()}
-
-    assert {"explicit", "direct", "spatial"} <= settings_told
-    assert ("direct-rival" in settings_told) == is_told
 
 
 def test_a_setting_in_turns_is_added_to_its_usual_delivery():

@@ -5,7 +5,7 @@ from roboirg.cli import run_commands
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.language import STAGE_SETS
 from roboirg.language.settings import all_settings
-from roboirg.runs.plan.plan_file import named_plans, plan_text, read_plan_file
+from roboirg.runs.plan.plan_file import named_plans, read_plan_file
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.plan.plan_sections import WorkerNeeds
 from roboirg.runs.plan.stored_plans import write_plan
@@ -82,16 +82,6 @@ def test_the_standard_protocol_has_every_setting_and_direct_in_turns():
 
     assert {job.setting for job in jobs} == set(all_settings())
     assert in_turns == {(task, "direct") for task in all_tasks()}
-
-
-def test_the_standard_protocol_plays_each_scene_in_explicit_too():
-    """Otherwise a scene would have no gap, which is the difference to explicit."""
-    jobs = make_plan(["random"], **read_plan_file("standard") | {"episodes": "4"}).jobs()
-
-    scenes = {(job.task, job.episode) for job in jobs}
-    explicit = {(job.task, job.episode) for job in jobs if job.setting == "explicit"}
-
-    assert explicit == scenes
 
 
 @pytest.mark.parametrize(
@@ -197,19 +187,6 @@ def test_a_plan_is_the_same_after_it_was_written_and_read_again(tmp_path, option
 
     assert read == plan
     assert read.fingerprint == plan.fingerprint
-
-
-@pytest.mark.parametrize(
-    "episodes",
-    ["3,", "3", "0-2,7", "easy"],
-    ids=["episode 3 alone", "the first three", "a range and one more", "a difficulty"],
-)
-def test_the_text_of_a_plan_means_the_same_episodes(tmp_path, episodes):
-    plan = make_plan(["random"], tasks="PickXtimes", episodes=episodes)
-
-    read = read_plan_file(path_of_plan_file(tmp_path, plan_text(plan)))
-
-    assert make_plan(**read) == plan
 
 
 @pytest.mark.parametrize(

@@ -79,25 +79,6 @@ def test_every_model_of_the_paper_reads_all_instructions_of_the_papers_plan_to_t
     assert not list(warning_lines(shares))
 
 
-def test_shares_of_cut_prompts_are_by_policy_and_setting():
-    """The policy a reads 64 tokens of a prompt, b reads 1,000, and `random` tells no limit.
-
-    16 distractors, which are sentences without use, make instructions in the setting *contextual*
-    too long for a, but not for b. Explicit ones get none.
-    """
-    plan = make_plan(
-        ["a=system:pi0.5", "b=openpi://localhost:1?prompt_tokens=1000", "random"],
-        settings="explicit,contextual", tasks="PickXtimes", distractors=16,
-    )  # fmt: skip
-
-    a, b, without_limit = prompt_shares(plan.jobs())
-
-    assert share_text(a.settings["contextual"]) == "100 %"
-    assert share_text(a.settings["explicit"]) == "0 %"
-    assert share_text(b.settings["contextual"]) == "0 %"
-    assert without_limit.limit is None
-
-
 @pytest.mark.parametrize(
     ("settings", "line"),
     [
@@ -171,20 +152,6 @@ def test_utterances_of_the_same_step_are_sent_as_one_message(utterances, steps, 
     assert sent_messages(utterances, steps) == messages
 
 
-def test_an_instruction_too_long_as_one_prompt_fits_if_it_comes_in_turns():
-    """The model reads 64 tokens. The instruction has more, as 16 sentences without use are in it
-    (distractors), but each of its utterances has fewer.
-
-    *cut* is a prompt of which the model loses the end, *heard* one that it reads whole.
-    """
-    long = job_with(setting="contextual", distractors=16)
-    long_in_turns = job_with(setting="contextual", distractors=16, delivery="turns")
-
-    assert audit_job(long, LIMIT_OF_64_TOKENS).verdict == "cut"
-    assert audit_job(long_in_turns, LIMIT_OF_64_TOKENS).verdict == "heard"
-    assert max(audit_job(long_in_turns, LIMIT_OF_64_TOKENS).audit.needed) < 64
-
-
 def test_a_record_notes_how_many_tokens_a_cut_prompt_needed():
     """The model reads 64 tokens; 16 sentences without use (distractors) make the prompt longer.
 
@@ -197,31 +164,6 @@ def test_a_record_notes_how_many_tokens_a_cut_prompt_needed():
     assert (record.prompt_verdict, record.prompt.tokenizer) == ("cut", "some.model")
     assert least == most > 64
     assert read_record(encode(record), Path("records.jsonl"), 1) == record
-
-
-def test_a_record_notes_how_far_each_utterance_of_a_cut_prompt_was_read():
-    """The model reads 64 tokens; 16 sentences without use (distractors) make the prompt longer.
-
-    In characters: all of the first utterance, and none of the last.
-    """
-    record = audited_record(tokens=64, setting="contextual", distractors=16)
-
-    first, *_, last = record.prompt.reached
-    assert first == len(record.instruction[0].text)
-    assert last == 0
-
-
-def test_a_record_notes_the_mentions_in_what_was_not_read():
-    """The model reads 64 tokens; 16 sentences without use (distractors) make the prompt longer.
-
-    Of three mentions, words that stand for a part of the goal, the first is in the first utterance,
-    which is read. Those with the indices 1 and 2 are in the command at the end, which is lost.
-    """
-    record = audited_record(tokens=64, setting="contextual", distractors=16)
-
-    last_utterance = len(record.instruction) - 1
-    assert [mention.utterance for mention in record.mentions] == [0, last_utterance, last_utterance]
-    assert record.prompt.lost == (1, 2)
 
 
 def test_episodes_are_the_same_although_their_prompts_were_cut_differently():
@@ -262,7 +204,6 @@ def test_all_utterances_count_in_an_episode_of_which_no_steps_are_known():
 
 
 SERVER_WITH_64_TOKENS = read_policy("openpi://localhost:1?prompt_tokens=64&connect=1")
-"""Nobody listens there."""
 """Nobody listens there."""
 
 

@@ -30,7 +30,6 @@ from roboirg.records.record_codec import StoreError
 from roboirg.records.run_files import earlier_plans
 from roboirg.records.store import (
     RECORDS_FILE,
-    TORN_FILE,
     read_records,
 )
 from roboirg.runs.plan.stored_plans import read_plan, read_plans
@@ -88,18 +87,6 @@ def test_a_killed_run_goes_on_with_the_same_command_and_has_the_same_records_in_
     assert 3 <= stored < 16
     assert summary.played == 16 - stored
     assert all_comparable(tmp_path) == records_of_an_uninterrupted_run
-
-
-def test_a_line_that_a_kill_cut_off_is_set_aside_and_its_episode_played_again(tmp_path):
-    """A record is written as one line at once, so a line that is cut off is the worst that a kill
-    can leave behind. It is moved to another file, and both episodes of the plan are played."""
-    torn_line = b'{"policy":"random","ta'
-    (tmp_path / RECORDS_FILE).write_bytes(torn_line)
-
-    fake_run(tmp_path, small_plan(1))
-
-    assert (tmp_path / TORN_FILE).read_bytes().rstrip() == torn_line
-    assert len(read_records(tmp_path)) == len(small_plan(1).jobs())
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

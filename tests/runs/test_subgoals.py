@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_records import fill, make_record
 from msgspec.structs import replace
-from page_text import call, render
+from page_text import call
 
 import roboirg
 from roboirg.core.environment_options import EnvironmentOptions
@@ -79,15 +79,6 @@ def test_a_record_with_a_subgoal_of_more_than_300_characters_is_refused():
 
     with pytest.raises(StoreError, match="text"):
         read_record(encode(record), Path("r"), 1)
-
-
-def test_the_page_shows_which_subgoals_were_wrong_or_not_due():
-    """Of three subgoals in a record one names a wrong thing where "pick it up" is due, and one,
-    "sing", is no act that was due (lost)."""
-    page = render([make_record(JOB, "failure", "no", subgoals=THREE_SUBGOALS)])
-
-    assert "(wrong thing; due: pick it up)" in page
-    assert "sing (lost; due: nothing)" in page
 
 
 def test_the_table_counts_how_many_subgoals_were_right_or_wrong_in_which_way(tmp_path):

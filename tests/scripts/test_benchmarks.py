@@ -11,7 +11,6 @@ from benchmarks import large_run_costs
 from benchmarks.measures import Measure, all_measures
 from benchmarks.process_costs import probe
 from benchmarks.results import (
-    markdown_table,
     reaches,
     read_figures,
     run_measures,
@@ -95,15 +94,6 @@ def test_figures_that_are_measured_anew_replace_those_in_the_file(tmp_path):
         ("first", 1234.0), ("second", 3.0), ("third", 4.0),
     ]  # fmt: skip
     assert all(figure["date"] and figure["machine"] and figure["load"] >= 0 for figure in figures)
-
-
-def test_figures_are_shown_in_a_table_with_their_goals(tmp_path):
-    """The figure is 1,234 s, and the goal that `write_figures` sets is 0.5 s."""
-    write_figures(tmp_path / "bench.json", first=1234.0)
-
-    table = markdown_table(read_figures(tmp_path / "bench.json"))
-
-    assert "| first | 1,234 s |  |  | at most 0.5 s |" in table
 
 
 def test_a_file_that_holds_no_figures_is_refused(tmp_path):

@@ -2,7 +2,6 @@
 
 import paper_audit
 import pytest
-import write_published_figures as figures
 
 
 @pytest.mark.parametrize("item", paper_audit.ITEMS, ids=lambda item: item.name)
@@ -29,13 +28,3 @@ def test_an_item_that_fails_is_named(monkeypatch, capsys):
 
     assert paper_audit.main("it") == 1
     assert "FAILS  it: is so\n       1 instead of 2" in capsys.readouterr().out
-
-
-def test_intervals_know_a_clear_change_from_chance():
-    """Of two published systems, one loses a lot from explicit to direct words, and the interval of
-    the other's change contains 0."""
-    changes = figures.setting_changes()
-    assert changes["FrameS-Modul", "direct"].is_clear
-
-    low, high = changes["GroundSG-QwenVL", "direct"].interval
-    assert low < 0 < high

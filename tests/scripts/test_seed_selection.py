@@ -12,7 +12,7 @@ from seed_selection import (
 )
 
 from roboirg.core.episode import SPLITS
-from roboirg.language import expressible, find_refusals
+from roboirg.language import expressible
 from roboirg.language.settings import all_settings, plain_settings, settings_of
 from roboirg.tasks import every_task, get_task
 from roboirg.tasks.splits.splits import SIZES, get_episode, shipped_splits
@@ -78,11 +78,6 @@ def mute(monkeypatch):
     settings = {**all_settings(), "mute": setting}
     for module in ("settings", "scenarios.spoken"):
         monkeypatch.setattr(f"roboirg.language.{module}.all_settings", lambda: settings)
-
-
-def test_a_new_setting_that_refuses_an_episode_is_named_with_its_reason(mute):
-    """The fixture adds a setting, *mute*, that refuses every episode because "it is mute"."""
-    assert find_refusals(get_episode("VideoUnmask", "val", 0)) == {"mute": "it is mute"}
 
 
 def test_a_new_setting_does_not_change_which_seeds_are_accepted(mute):

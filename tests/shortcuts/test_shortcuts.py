@@ -395,18 +395,6 @@ def rows_by(group):
     return shortcut_rows(("BinFill",), ("test",), ("reasoning",), options, by=group)
 
 
-def test_rows_by_pattern_count_each_instruction_once():
-    """A pattern is how a value is derived."""
-    rows = rows_by("pattern")
-
-    assert sum(row.count for row in rows) == 50
-    assert {row.group for row in rows} == {
-        ("reasoning", "color exclusion"),
-        ("reasoning", "number deduction"),
-        ("reasoning", "contextual logic"),
-    }
-
-
 def test_rows_by_task_have_the_task_in_their_name():
     """50 test episodes of BinFill in the setting *reasoning* make one row."""
     (row,) = rows_by("task")

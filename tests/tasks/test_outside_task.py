@@ -25,8 +25,8 @@ OUTSIDE_TASK = "PlaceAndPress"
 @pytest.fixture
 def task(tmp_path, monkeypatch):
     """The recipe's task, as if its package were installed."""
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
-    (words,) = re.findall(r"```toml\n(tasks = .*?)```", PAGE, flags=re.DOTALL)
+    code, _ = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    words, _ = re.findall(r"```toml\n(tasks = .*?)```", PAGE, flags=re.DOTALL)
     (tmp_path / "place_and_press.py").write_text(code)
     (tmp_path / "words.toml").write_text(words)
     spec = importlib.util.spec_from_file_location(

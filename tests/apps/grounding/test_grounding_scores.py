@@ -288,17 +288,6 @@ def test_p_values_are_those_of_the_sign_flip_test_and_holms_of_four_settings(hal
     assert rows["direct"].summary.p_holm == pytest.approx(4 * p_value)
 
 
-def test_a_rate_is_corrected_for_chance(half_answered):
-    """Corrected is (rate - chance) / (1 - chance): 0 at chance, and 1 if all is right.
-
-    Direct answers are empty, so their rate is 0, which is as far below chance as can be.
-    """
-    _, rows = half_answered
-    direct = rows["direct"]
-
-    assert direct.corrected == pytest.approx(-direct.chance / (1 - direct.chance))
-
-
 def test_unusable_and_missing_answers_are_counted(half_answered):
     """Of episodes below 4 the answers are `{}` but for explicit ones; from 4 on there are none."""
     score, _ = half_answered
@@ -307,12 +296,6 @@ def test_unusable_and_missing_answers_are_counted(half_answered):
         item.setting != "explicit" and item.episode < 4 for item in items()
     )
     assert score.missing == sum(item.episode >= 4 for item in items())
-
-
-def test_only_items_with_hidden_slots_have_a_rate_of_them(half_answered):
-    """Explicit words hide no slot, so they have no rate; of direct ones no answer `{}` is right."""
-    _, rows = half_answered
-    assert (rows["explicit"].hidden, rows["direct"].hidden) == (None, 0)
 
 
 @pytest.mark.parametrize("setting", ["direct", "reasoning", "contextual"])
