@@ -180,7 +180,7 @@ def test_version_3_has_pose_actions_and_subgoals(export):
         assert not frame["is_video_demo"]
 
 
-def test_version_3_has_subgoals_and_turns_in_lerobots_language_columns(export):
+def test_version_3_has_subgoals_and_the_instruction_in_lerobots_language_columns(export):
     """The subgoal at a frame's time is the last one that has begun; the user spoke in the first
     frame.
     """
@@ -189,8 +189,8 @@ def test_version_3_has_subgoals_and_turns_in_lerobots_language_columns(export):
     _, frames = next(episodes_of(root))
 
     recording = read_rows(root / "meta/demonstrations.parquet")[0]
-    said = [row["content"] for row in frames[0]["language_events"]]
-    assert said == [turn["text"] for turn in recording["turns"]]
+    said = [(row["role"], row["content"]) for row in frames[0]["language_events"]]
+    assert said == [("user", recording["text"])]
     assert frames[1]["language_events"] == []
     for frame in frames:
         subgoals = frame["language_persistent"]

@@ -14,7 +14,8 @@ def language_columns(trajectory: Trajectory, placed: PlacedInstruction) -> dict[
 
     A row has who speaks (role), what (content), its kind (style), and a camera and calls of tools,
     which are empty here. Every frame has all subgoals of the robot, each with the time in seconds
-    from when it is pursued. The first frame of the policy's turn has the user's turns, too.
+    from when it is pursued. The first frame of the policy's turn has the instruction, in one row,
+    as LeRobot refuses to choose between rows of equal role and style.
     """
     import pyarrow as pa
 
@@ -26,11 +27,8 @@ def language_columns(trajectory: Trajectory, placed: PlacedInstruction) -> dict[
             row = {"role": "assistant", "content": subgoal, "style": "subtask"}
             subgoals.append({**row, "timestamp": frame / CONTROL_RATE})
         last = subgoal
-    turns = []
-    for turn in placed.instruction.facts["turns"]:
-        turns.append({"role": "user", "content": turn["text"]})
     events: list[object] = [[]] * facts.frames
-    events[facts.video_length] = turns
+    events[facts.video_length] = [{"role": "user", "content": placed.instruction.text}]
 
     text = pa.string()
     row_begin = [("role", text), ("content", text), ("style", text)]
