@@ -24,8 +24,12 @@ def language_columns(trajectory: Trajectory, placed: PlacedInstruction) -> dict[
     last = None
     for frame, subgoal in enumerate(trajectory.subgoals[1:].tolist()):
         if subgoal != last:
-            row = {"role": "assistant", "content": subgoal, "style": "subtask"}
-            subgoals.append({**row, "timestamp": frame / CONTROL_RATE})
+            subgoals.append({
+                "role": "assistant",
+                "content": subgoal,
+                "style": "subtask",
+                "timestamp": frame / CONTROL_RATE,
+            })  # fmt: skip
         last = subgoal
     events: list[object] = [[]] * facts.frames
     events[facts.video_length] = [{"role": "user", "content": placed.instruction.text}]

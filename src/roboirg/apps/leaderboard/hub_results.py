@@ -10,7 +10,6 @@ from roboirg.analysis.results.frame import Frame
 from roboirg.core.errors import InvalidValueError
 from roboirg.language.settings import settings_of
 from roboirg.tasks import all_tasks
-from roboirg.tasks.splits.splits import split_size
 
 
 def hub_results(frame: Frame, dataset: str) -> str:
@@ -18,8 +17,8 @@ def hub_results(frame: Frame, dataset: str) -> str:
 
     It has an entry for the mean of spatial and grounded, by which models are ranked, then one for
     each setting; a setting's rate is the mean over its tasks. The gap to explicit could not rank,
-    as a policy that never moves has none. Control arms, resolved forms and settings of which a task
-    or an episode lacks a verdict are left out.
+    as a policy that never moves has none. Control arms, resolved forms, and settings of which a
+    task or a planned episode lacks a verdict are left out.
 
     Args:
         frame: results of one policy.
@@ -37,15 +36,15 @@ def hub_results(frame: Frame, dataset: str) -> str:
     for row in measure(frame, ["setting"]):
         (setting,) = row.key
         tasks = [task for task in all_tasks().values() if setting in settings_of(task)]
-        has_all = row.counts.episodes == split_size("test") * len(tasks)
-        if row.rate is not None and row.counts.is_complete and has_all:
+        has_all = row.counts.is_complete and len(row.cells) == len(tasks)
+        if row.rate is not None and has_all:
             rates[setting] = float(row.rate)
     is_of_test = run.conditions.split == "test" and run.conditions.wordings is None
     if run.is_privileged or not is_of_test or not rates.keys() >= {"spatial", "grounded"}:
         raise InvalidValueError(
-            f"{run.marked_policy} has no results for the hub; these are of every episode of the "
-            "split test in spatial and grounded, in our own words, and without the simulator's "
-            "state."
+            f"{run.marked_policy} has no results for the hub; these are complete in every task "
+            "of spatial and grounded, of the split test, in our own words, and without the "
+            "simulator's state."
         )
     main = (rates["spatial"] + rates["grounded"]) / 2
     entries = []
