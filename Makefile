@@ -69,7 +69,7 @@ docs: dev ## the documentation site, in build/site; a warning or dead link is an
 dist: dev $(DIST_TOOLS) ## what can be published, in dist/: distributions, site, hub files, licenses, checksums
 	@scripts/dist
 
-dist-hub: dev ## add samples of questions and demonstrations to dist/hub; plays episodes, some ten minutes
+dist-hub: dev ## add samples of questions and demonstrations to dist/hub; plays episodes for three minutes
 	@scripts/dist-hub
 
 # Their versions are written into wheels, or change what is checked.
