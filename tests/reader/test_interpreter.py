@@ -165,26 +165,25 @@ def test_a_word_such_as_not_or_except_never_changes_the_goal_unnoticed(task, wor
     assert found.goals in ((), (episode.goal,)) or found.not_understood
 
 
-DOCUMENTATION = Path(__file__).parents[2] / "docs" / "references.md"
-TEXTS_WITH_COMPLAINTS = re.findall(
-    r"^\| \*(.+?)\*.*? \| `(.+?)`", DOCUMENTATION.read_text(), flags=re.MULTILINE
-)
-"""The rows of a table of the page: a text, and what the interpreter says to it."""
+COMPLAINTS = [
+    ("Take the sphere.", 'does not know the word "sphere"'),
+    ("Take the orange cube.", 'does not know the color "orange"'),
+    ("Do not put the red cube on the target.", 'does not understand "not"'),
+    ("Put it on the target twice.", 'does not read what "it" points back at'),
+    ("Take the red cube or the blue cube.", 'does not know the word "or"'),
+    ("Put the yellow cube on the target.", "there is nothing yellow in the scene"),
+    ("Put a cube on the target.", "leaves color open: it can be blue or red or green"),
+    ("I like the red cube.", "finds no command"),
+]
 
 
-@pytest.mark.parametrize(("text", "complaint"), TEXTS_WITH_COMPLAINTS)
-def test_the_complaints_quoted_by_the_documentation_are_real(text, complaint):
-    """Each row of a table in docs/references.md has a text and the complaint about it."""
+@pytest.mark.parametrize(("text", "complaint"), COMPLAINTS)
+def test_what_a_text_lacks_is_said_in_words_of_the_text(text, complaint):
     assert complaint in interpret(text, PICK_SCENE, "PickXtimes").not_understood
-
-
-def test_the_documentation_quotes_eight_complaints_or_more():
-    """Would find that the pattern above no longer finds the table."""
-    assert len(TEXTS_WITH_COMPLAINTS) >= 8
 
 
 def test_the_words_that_the_documentation_teaches_are_unknown_before():
     """The page shows how a package teaches the interpreter *hoist* and *crimson*."""
-    page = DOCUMENTATION.with_name("extend.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "extend.md").read_text()
     (command,) = re.findall(r'interpret\("(Hoist .*?)"', page)
     assert interpret(command, PICK_SCENE, "PickXtimes").unknown_words == ("hoist", "crimson")

@@ -24,7 +24,7 @@ from roboirg_learn.listener.listener_study import VARIANTS
 from roboirg_learn.listener.study_report import trained_rate
 from roboirg_learn.listener.vocabulary import parts_of, split_words
 
-PAGE = Path(__file__).parents[3] / "docs" / "learned-listener.md"
+PAGE = Path(__file__).parents[3] / "docs" / "learned-policy.md"
 
 
 @pytest.mark.parametrize("spec", ["learned:none", "trained:none?reader=none"])
