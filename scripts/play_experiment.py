@@ -16,6 +16,7 @@ from pathlib import Path
 import yaml
 from experiment.frame import prove, write_frame
 from experiment.hearing import hear_missing
+from experiment.packs import write_pack
 from experiment.playing import play_missing
 from experiment.study import Study
 from experiment.weights import train_missing
@@ -30,19 +31,23 @@ STEPS = {
     "play": play_missing,
     "frame": write_frame,
     "prove": prove,
+    "pack": write_pack,
 }
+USUAL = ("train", "hear", "play", "frame", "prove")
 PLAN = Path(__file__).parent / "experiment" / "study.yaml"
 
 
 def main() -> None:
-    """Do the steps that are named, or all; what is typed replaces what the plan says."""
+    """Do the steps that are named, or the usual ones; what is typed replaces what the plan says."""
     parser = argparse.ArgumentParser(description="Play the paper's experiment on the small body.")
-    parser.add_argument("steps", nargs="*", help=f"of {', '.join(STEPS)}; all by default")
+    parser.add_argument(
+        "steps", nargs="*", help=f"of {', '.join(STEPS)}; without any: {', '.join(USUAL)}"
+    )
     parser.add_argument("--plan", type=Path, default=PLAN)
     for name in Study.model_fields:
         parser.add_argument(f"--{name}")
     options = vars(parser.parse_args())
-    steps = options.pop("steps") or STEPS
+    steps = options.pop("steps") or USUAL
     path = options.pop("plan")
     plan = {"name": path.stem, **yaml.safe_load(path.read_text(encoding="utf-8"))}
     for name, value in options.items():

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import random
-import tempfile
 from collections import deque
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 
 import msgspec
 import pandas as pd
@@ -21,8 +20,8 @@ from roboirg.analysis.results.frame import make_frame
 from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
 from roboirg.analysis.tables.rendering.markdown import markdown
 from roboirg.core.errors import RoboIRGError
-from roboirg.core.policy_ref import unknown_policy
 from roboirg.policies.by_name.finding import policy_of
+from roboirg.policies.resolving.resolving_policy import PASSED_ON, RESOLVED
 from roboirg.records.record import Job, Record, Summary
 from roboirg.runs.job_instruction import PreparedJob
 from roboirg.runs.plan.plan_maker import make_plan
@@ -30,7 +29,6 @@ from roboirg.runs.play.episode_record import begin_record, conclude_episode
 from roboirg.runs.run.executor import choose_executor
 from roboirg.runs.run.runner import episode_runner
 from roboirg.util.atomic_write import replacing, write_atomically
-from roboirg_learn.policy.policy_files import PolicyFiles
 
 COLUMNS = (
     "policy", "policy_seed", "task", "suite", "split", "episode", "setting", "form",
@@ -93,15 +91,19 @@ def found_plays(study: Study) -> Iterator[tuple[Wanted, Entry]]:
 def record_of(trial: Trial, entry: Entry) -> Record:
     """Return the record that a run would have: the words are the trial's, what happened the play's.
 
-    The policy is known by its name only.
+    Of the policy it has the name and what all seeds share.
     """
     play = msgspec.json.decode(entry.record, type=Record)
     row = trial.row
     said = _begun(trial.job)
     words = {name: getattr(said, name) for name in WORDS}
-    ref = unknown_policy(row.policy)
-    record = replace(play, policy=row.policy, policy_seed=row.seed, ref=ref, **words)
-    if play.attribution is not None and play.attribution.failure in SIDED:
+    record = replace(play, policy=row.policy, policy_seed=row.seed, ref=row.ref, **words)
+    is_resolved = "understood" in trial.reported
+    if row.namer:
+        record.policy_metadata |= trial.reported
+        record.usage = {RESOLVED if is_resolved else PASSED_ON: 1.0}
+    is_sided = play.attribution is not None and play.attribution.failure in SIDED
+    if is_sided or is_resolved:
         start = play.policy_metadata[START_STEP]
         late = f"not done after {trial.job.environment.max_steps} steps"
         conclude_episode(record, PreparedJob(trial.job), start, timed_out=play.cause == late)
@@ -117,28 +119,30 @@ def _begun(job: Job) -> Record:
 def prove(study: Study) -> None:
     """Play random trials as a run does, with words and reader, and print what differs.
 
-    Rows that are given the true goal are left out, as no words lead there.
+    Rows that are given the true goal are left out, as no words lead there. The actions are kept for
+    packs.
 
     Raises:
         RoboIRGError: some differ.
     """
     found = [pair for pair in found_plays(study) if pair[0].trial.row.heard != TRUTH]
-    chosen = random.Random(0).sample(found, min(study.proofs, len(found)))
+    chosen = random.Random(0).sample(found, math.ceil(study.proven * len(found)))
+    expected = {}
     jobs: deque[Job] = deque()
-    for number, (wanted, _) in enumerate(chosen):
+    for wanted, play in chosen:
         row = wanted.trial.row
-        ref = policy_of(PolicyFiles(row.body, row.reader).spec, f"{row.policy}-{row.seed}")
-        jobs.append(replace(wanted.trial.job, policy=ref.name, ref=ref, policy_seed=number))
+        ref = policy_of(row.spec, f"{row.policy}-{row.seed}")
+        job = replace(wanted.trial.job, policy=ref.name, ref=ref, policy_seed=row.seed)
+        expected[job.slug] = record_of(wanted.trial, play)
+        jobs.append(job)
     differing = 0
-    with tempfile.TemporaryDirectory() as folder:
-        runner = episode_runner(make_plan("oracle"), Path(folder))
-        for again in choose_executor(study.workers).run(jobs, runner, print):
-            wanted, play = chosen[again.policy_seed]
-            expected = record_of(wanted.trial, play)
-            names = [name for name in COMPARED if getattr(expected, name) != getattr(again, name)]
-            if names:
-                differing += 1
-                print(f"{expected.slug} differs in {', '.join(names)}", flush=True)
+    runner = episode_runner(make_plan("oracle"), study.run)
+    for again in choose_executor(study.workers).run(jobs, runner, print):
+        of_play = expected[again.slug]
+        names = [name for name in COMPARED if getattr(of_play, name) != getattr(again, name)]
+        if names:
+            differing += 1
+            print(f"{again.slug} differs in {', '.join(names)}", flush=True)
     print(f"proof: {len(chosen)} trials were played in the ordinary way, {differing} differ")
     if differing:
         raise RoboIRGError("Plays do not stand for what they are said to.")

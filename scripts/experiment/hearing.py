@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiment.store import Entry, Store
-from experiment.study import TRUTH, Study, Trial, body_of, reader_of, show, text_of
+from experiment.study import TRUTH, Study, Trial, body_of, reader_of, show
 from roboirg.extension.sight import LOOK_EVERY, shown_to_policy
 from roboirg.util.atomic_write import replacing
 from roboirg.util.parallel_map import parallel_map
@@ -55,7 +55,7 @@ def _hear(folder: Path, trial: Trial) -> HeardGoal:
     with np.load(folder / trial.looks_name) as stored:
         arrays = list(stored.values())
     looks = [Detections(*arrays[start : start + 3]) for start in range(0, len(arrays), 3)]
-    return reader_of(trial.row.reader).hear(text_of(trial.job), looks)
+    return reader_of(trial.row.reader).hear(trial.reported["heard"], looks)
 
 
 def _look(folder: Path, trial: Trial) -> None:

@@ -5,26 +5,33 @@ from __future__ import annotations
 import functools
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar
+from urllib.parse import quote
 
 import msgspec
 import torch
-from pydantic import BaseModel, BeforeValidator
+from pydantic import BaseModel, BeforeValidator, Field
 
 import roboirg_learn
+from experiment.rewriting import KNOWN_WORDS, rewrite
 from experiment.store import Key, Store
-from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
+from roboirg.core.policy_ref import BEHIND, RESOLVE, PolicyRef, unknown_policy
+from roboirg.core.versions import POLICY, Makeup
 from roboirg.extension import sight
 from roboirg.extension.episodes import goal_schema
+from roboirg.language.settings import EXPLICIT
 from roboirg.records.record import Job
-from roboirg.runs.job_instruction import PreparedJob, instruct_job
+from roboirg.runs.job_instruction import PreparedJob
+from roboirg.runs.plan.plan import Plan
 from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.play.episode_record import code_fingerprints
 from roboirg.util.processor import processor_family
 from roboirg.util.short_hash import short_hash
 from roboirg_learn.policy.learned_policy import LearnedPolicy
+from roboirg_learn.policy.policy_files import PolicyFiles
 from roboirg_learn.policy.trained_body import load_body
 from roboirg_learn.policy.trained_reader import HeardGoal, load_reader
 
@@ -43,6 +50,7 @@ def _names(value: object) -> object:
 
 Item = TypeVar("Item")
 Several = Annotated[list[Item], BeforeValidator(_names)]
+ReaderName = Annotated[str, Field(pattern="^(explicit|all|truth|resolve-.+)$")]
 
 
 class Study(BaseModel, extra="forbid"):
@@ -52,7 +60,8 @@ class Study(BaseModel, extra="forbid"):
         name: of its tables.
         memories: of bodies.
         seeds: of training.
-        readers: named after the settings whose words they have learned; or `TRUTH`.
+        readers: named after the settings whose words they have learned; or `TRUTH`; or
+            ``resolve-NAMER``: that of explicit words behind the rewriter ``resolve:NAMER``.
         tasks: names of tasks; they are learned and played.
         settings: of what is said, as in the plan of a run; so are the next six.
         scenes: in which bodies are trained, and readers; the next four are of `BodyPlan`.
@@ -61,13 +70,13 @@ class Study(BaseModel, extra="forbid"):
         results: folder of what stays: weights, hearings, plays and tables.
         work: folder of what can be made again: recordings, checkpoints, first looks.
         workers: processes that record, draw and play.
-        proofs: how many trials a proof plays.
+        proven: share of the trials that a proof plays.
     """
 
     name: str
     memories: Several[Memory]
     seeds: Several[int]
-    readers: Several[Literal["explicit", "all", "truth"]]
+    readers: Several[ReaderName]
     tasks: str = "all"
     settings: str = "all"
     forms: str = "implicit"
@@ -85,7 +94,7 @@ class Study(BaseModel, extra="forbid"):
     results: Path = Path("results")
     work: Path = Path("build/experiment")
     workers: int = 2
-    proofs: int = 40
+    proven: float = 0.01
 
     def rows(self) -> list[Row]:
         """Return every body with every reader."""
@@ -97,8 +106,8 @@ class Study(BaseModel, extra="forbid"):
                     rows.append(Row(memory, reader, seed, weights))
         return rows
 
-    def trials(self) -> Iterator[Trial]:
-        """Yield every row with every episode in all its words."""
+    def plan(self) -> Plan:
+        """Return a plan of all that is said, in which the oracle stands for the rows."""
         said = {
             "tasks",
             "settings",
@@ -109,11 +118,19 @@ class Study(BaseModel, extra="forbid"):
             "wordings",
             "max_steps",
         }
-        plan = make_plan("oracle", **self.model_dump(include=said, exclude_none=True))
-        jobs = [msgspec.structs.replace(job, policy="", ref=None) for job in plan.jobs()]
+        return make_plan("oracle", **self.model_dump(include=said, exclude_none=True))
+
+    def trials(self) -> Iterator[Trial]:
+        """Yield every row with every episode in all its words."""
+        jobs = [msgspec.structs.replace(job, policy="", ref=None) for job in self.plan().jobs()]
         for row in self.rows():
             for job in jobs:
                 yield Trial(row, job)
+
+    @property
+    def run(self) -> Path:
+        """Folder with what is packed, like that of a run; proofs leave their actions there."""
+        return self.work / "runs" / self.name
 
     def open_store(self, name: str) -> Store:
         """Open the store of ``hearings``, or of ``plays``."""
@@ -141,6 +158,29 @@ class Row(NamedTuple):
         return f"{self.memory}-{self.heard}"
 
     @property
+    def namer(self) -> str:
+        """What names the goals for its rewriter, as in ``resolve:NAMER``; empty without one."""
+        _, _, namer = self.heard.partition(f"{RESOLVE}-")
+        return namer
+
+    @property
+    def ref(self) -> PolicyRef:
+        """The policy in its records, with what all seeds share of it."""
+        makeup: Makeup = ((POLICY, self.policy),)
+        if self.namer:
+            alone = f"{self.memory}-{EXPLICIT}"
+            makeup = ((POLICY, f"{RESOLVE}:{self.namer}"), (BEHIND, alone))
+        return replace(unknown_policy(self.policy), makeup=makeup)
+
+    @property
+    def spec(self) -> str:
+        """How `roboirg run` names it; it is played with its seed, from which rules draw."""
+        spec = PolicyFiles(self.body, self.reader).spec
+        if not self.namer:
+            return spec
+        return f"{RESOLVE}:{self.namer}?policy={quote(spec)}&wordings={KNOWN_WORDS}"
+
+    @property
     def body(self) -> Path:
         """File of the body."""
         return self.weights / f"{self.memory}-{self.seed}.body.safetensors"
@@ -148,7 +188,8 @@ class Row(NamedTuple):
     @property
     def reader(self) -> Path:
         """File of the reader; there is none for `TRUTH`."""
-        return self.weights / f"{self.heard}-{self.seed}.reader.safetensors"
+        words = EXPLICIT if self.namer else self.heard
+        return self.weights / f"{words}-{self.seed}.reader.safetensors"
 
 
 class Trial(NamedTuple):
@@ -168,6 +209,11 @@ class Trial(NamedTuple):
         return HeardGoal(self.job.task, goal_schema(self.job.task).answers[self.episode.goal])
 
     @property
+    def reported(self) -> dict[str, Any]:
+        """What the row's reader hears, and how a rewriter understood it, as in `rewrite`."""
+        return rewrite(self.row.namer, self.row.seed, self.job)
+
+    @property
     def looks_name(self) -> str:
         """Of the file with the first looks: all that they depend on."""
         made_by = f"{_detector_of(self.row.body)}-{circumstances()['code']}"
@@ -180,7 +226,7 @@ class Trial(NamedTuple):
             "reader": file_hash(self.row.reader),
             "detector": _detector_of(self.row.body),
             "episode": self.episode.key,
-            "text": short_hash(text_of(self.job)),
+            "text": short_hash(self.reported["heard"]),
             **circumstances(),
         }
 
@@ -230,12 +276,6 @@ def _detector_of(path: Path) -> str:
     for tensor in body.detector.state_dict().values():
         content += tensor.numpy().tobytes()
     return short_hash(content)
-
-
-@functools.cache
-def text_of(job: Job) -> str:
-    """Return everything that is said, as a policy hears it."""
-    return SpokenInstruction(instruct_job(job).turns, job.options.delivery).prompt
 
 
 def show(work: str, done: int, total: int, note: str = "") -> None:

@@ -206,11 +206,63 @@ def test_the_key_of_a_play_does_not_change_with_words_or_the_name_of_a_file(play
     assert play_key() == play_key("b", options=InstructionOptions("direct", "resolved"))
 
 
+@pytest.mark.parametrize("namer", ["surface", "first-mention", "last-mention", "elimination"])
+def test_a_reader_behind_a_rewriter_hears_what_it_hears_in_a_run(namer, study):
+    """A run puts a namer in front of a policy by the name of both, here that of the study's row.
+    The policy hears the same words, and the same goal is reported, also where the rule draws one.
+
+    A rule names no goal in spatial words, which are passed on as they were said.
+    """
+    from types import SimpleNamespace
+
+    from roboirg.policies.by_name.finding import rewriting_in
+    from roboirg.policies.by_name.policy_kinds import put_behind, split_spec
+    from roboirg.runs.job_instruction import PreparedJob, episode_policy_seed
+
+    study.readers = [f"resolve-{namer}"]
+    study.settings = "direct,spatial"
+    study.seeds = [0, 1, 2]
+    for trial in study.trials():
+        prepared = PreparedJob(trial.job)
+        said = prepared.words.instruction
+        heard = []
+        policy = SimpleNamespace(reset=lambda words, _shown, heard=heard: heard.append(words))
+        rewriting = rewriting_in(split_spec("a", trial.row.spec))
+        seed = episode_policy_seed(trial.row.seed, prepared.episode.seed)
+        in_run = put_behind(rewriting, policy, seed)
+        in_run.attach(SimpleNamespace(episode=prepared.episode, instruction=said, unheard=0))
+        in_run.reset(" ".join(said.turns), {})
+
+        assert heard == [trial.reported["heard"]]
+        assert in_run.metadata.get("understood") == trial.reported.get("understood")
+        is_passed_on = heard == [" ".join(said.turns)]
+        assert is_passed_on == (trial.job.setting == "spatial")
+
+
+def test_a_row_behind_a_rewriter_names_the_policy_alone(study):
+    """A run that plays the row has the spec of the row with the reader of explicit words in it, and
+    the table of rewriters finds that row by what the records of the other one name."""
+    from roboirg.core.versions import makeup_text
+    from roboirg.policies.by_name.finding import rewriting_in
+    from roboirg.policies.by_name.policy_kinds import split_spec
+
+    study.readers = ["resolve-surface", "explicit"]
+    behind, alone = study.rows()
+
+    rewriting = rewriting_in(split_spec("a", behind.spec))
+
+    assert rewriting == ("surface", {}, alone.spec, "train")
+    assert dict(behind.ref.makeup)["behind"] == makeup_text(alone.ref.makeup)
+
+
 @pytest.mark.sim
 @pytest.mark.slow
-@pytest.mark.parametrize("memory", ["recurrent", "subgoal"])
+@pytest.mark.parametrize(
+    ("memory", "reader"),
+    [("recurrent", "all"), ("subgoal", "all"), ("recurrent", "resolve-surface")],
+)
 def test_a_goal_that_is_heard_and_then_played_gives_what_a_run_with_words_records(
-    memory, study, capsys
+    memory, reader, study, capsys
 ):
     """The experiment does in two steps what a run does in one: it finds which goal a policy hears
     in the words of an episode, and it plays the policy for that goal. Many words share a play.
@@ -218,25 +270,37 @@ def test_a_goal_that_is_heard_and_then_played_gives_what_a_run_with_words_record
     `study` is an experiment with one episode and one policy, here with random weights. The proof
     plays the episode in the ordinary way, with its words, and must find the same record. This would
     find motion that depends on words in another way than through the goal. The table of results
-    has the outcome and the steps of the play.
+    has the outcome and the steps of the play. The pack has its record, with the actions that the
+    proof has left, and all of it holds.
     """
     import pandas as pd
     from experiment.frame import found_plays, prove, write_frame
     from experiment.hearing import hear_missing
+    from experiment.packs import write_pack
     from experiment.playing import play_missing
 
+    from roboirg.apps.leaderboard.run_verification import verify_run
+    from roboirg.records.packs import opened_run
+
     study.memories = [memory]
+    study.readers = [reader]
+    study.settings = "direct"
     save_random_policy(study, memory)
 
     hear_missing(study)
     play_missing(study)
     prove(study)
     write_frame(study)
+    write_pack(study)
 
     assert "proof: 1 trials were played in the ordinary way, 0 differ" in capsys.readouterr().out
     ((_trial, play),) = found_plays(study)
     (line,) = pd.read_csv(study.results / "small.csv.xz").to_dict("records")
     assert f"{line['outcome']} {line['steps']} " in play.verdict
+    with opened_run(study.results / "small.roboirg.zip") as folder:
+        verified = verify_run(folder)
+    assert verified.holds
+    assert verified.verdicts == {"exact": 1}
 
 
 def save_random_policy(study, memory):

@@ -90,11 +90,11 @@ def _write(out: Path, manifest: PackManifest, paths: Mapping[str, Path]) -> None
 
     Every entry gets the same date, so that the same files give the same bytes.
     """
-    with replacing(out) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+    with replacing(out) as part, zipfile.ZipFile(part, "w") as archive:
         archive.writestr(zipfile.ZipInfo(MANIFEST, _EPOCH), manifest.model_dump_json(indent=1))
         for name, path in paths.items():
             entry = zipfile.ZipInfo(name, _EPOCH)
-            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.compress_type = zipfile.ZIP_LZMA
             if name.endswith(_COMPRESSED):  # packing it again would save nothing
                 entry.compress_type = zipfile.ZIP_STORED
             with path.open("rb") as file, archive.open(entry, "w", force_zip64=True) as target:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.core.actions import Actions
-from roboirg.core.episode import Goal
+from roboirg.core.episode import Episode, Goal
 from roboirg.core.inference_facts import InferenceFacts, inference_facts
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import Demonstration, Observation
@@ -98,19 +98,14 @@ class ResolvingPolicy(PlannerAndPolicy, AttachedPolicy):
 
     def _resolve(self) -> None:
         """Let the namer name the goal, and replace the command, if it names one."""
-        from roboirg.language import instruct_with
-
         env = self.env
         given = SaidAndShown.of(env, " ".join(self._heard), self._shown)
         self._goal = self.namer.name_goal(given)
         self._has_resolved = self._goal is not None
         if self._goal is not None:
-            # Only its words are used, so it may be a goal that the scene does not have.
-            episode = replace(env.episode, goal=self._goal)
             said_wordings = cast("str | None", env.instruction.metadata["wordings"])
             wordings = self._wordings or said_wordings
-            explicit = InstructionOptions(wordings=wordings)
-            self._last_words = instruct_with(episode, explicit).text
+            self._last_words = explicit_command(env.episode, self._goal, wordings)
 
     def act(self, observation: Observation) -> Actions:
         """Return the policy's actions; its observation has the words that it has heard last."""
@@ -160,6 +155,20 @@ class ResolvingPolicy(PlannerAndPolicy, AttachedPolicy):
     def inference(self) -> InferenceFacts:
         """What the policy computes with."""
         return inference_facts(self.policy)
+
+
+def explicit_command(episode: Episode, goal: Goal, wordings: str | None) -> str:
+    """Return what the explicit setting says of a goal, which the scene need not have.
+
+    Args:
+        episode: with the scene.
+        goal: of its task.
+        wordings: whose words are said, as in `InstructionOptions`.
+    """
+    from roboirg.language import instruct_with
+
+    explicit = InstructionOptions(wordings=wordings)
+    return instruct_with(replace(episode, goal=goal), explicit).text
 
 
 def rewritten_version(namer: GoalNamer, policy: object) -> str:
