@@ -5,7 +5,7 @@ CFFCONVERT := build/citation/bin/cffconvert
 DIST_TOOLS := build/dist-tools/bin/twine
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev learn style types test fast-tests test-slow test-all test-learn every-test net integrations lint docs dist try-dist demo play card clean
+.PHONY: help setup dev learn style types test fast-tests test-slow test-all test-learn every-test net integrations lint docs dist dist-hub try-dist demo play card clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 21
@@ -68,6 +68,9 @@ docs: dev ## the documentation site, in build/site; a warning or dead link is an
 
 dist: dev $(DIST_TOOLS) ## what can be published, in dist/: distributions, site, hub files, licenses, checksums
 	@scripts/dist
+
+dist-hub: dev ## add samples of questions and demonstrations to dist/hub; plays episodes for three minutes
+	@scripts/dist-hub
 
 # Their versions are written into wheels, or change what is checked.
 $(DIST_TOOLS): | dev

@@ -112,7 +112,13 @@ def test_the_program_has_eight_applications():
                     "language stats",
                 },
             ),
-            ("leaderboard", {"leaderboard", "leaderboard pack", "leaderboard verify"}),
+            (
+                "leaderboard",
+                {
+                    "export hub-results", "leaderboard", "leaderboard pack",
+                    "leaderboard verify",
+                },
+            ),
             ("policy_check", {"check-policy"}),
             ("real", {"real", "real plan", "real score"}),
             ("show", {"show"}),

@@ -39,6 +39,7 @@ WORDS = {
     " --workers 0 --out {folder}/moves",
     "export grounding": "--tasks StopCube --plan {one_episode} --settings explicit"
     " --out {folder}/questions",
+    "export hub-results": "--help",
     "replay": "--help",
     "score grounding": "--help",
     "learn listener": "--help",

@@ -10,8 +10,8 @@ import typer.main
 from roboirg.main import app
 
 MOST_ENTRIES = 19
-MOST_COMMANDS = 30
-MOST_PARAMETERS = 151
+MOST_COMMANDS = 31
+MOST_PARAMETERS = 154
 """What a reader can find their way in: entries of ``roboirg --help``, commands in all, options and
 arguments in all."""
 

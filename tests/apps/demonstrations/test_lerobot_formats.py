@@ -180,6 +180,22 @@ def test_version_3_has_pose_actions_and_subgoals(export):
         assert not frame["is_video_demo"]
 
 
+def test_version_3_has_subgoals_and_the_instruction_in_lerobots_language_columns(export):
+    """The subgoal at a frame's time is the last one that has begun; the user spoke in the first
+    frame.
+    """
+    root = export(language=True)
+
+    episode, frames = next(episodes_of(root))
+
+    (said,) = frames[0]["language_events"]
+    assert [said["content"]] == episode["tasks"]
+    for frame in frames:
+        subgoals = frame["language_persistent"]
+        begun = [row for row in subgoals if row["timestamp"] <= frame["timestamp"]]
+        assert begun[-1]["content"] == frame["subgoal"]
+
+
 @pytest.mark.parametrize("column", ["next.done", "next.success", "next.reward"])
 def test_version_3_rewards_the_last_of_seven_steps(column, export):
     """A synthetic episode has seven steps, of which the last one succeeds."""

@@ -93,8 +93,8 @@ def compare(first: Frame, second: Frame, breakdowns: Sequence[Breakdown] = ()) -
     """
     first = first.without_control_arms()
     second = second.without_control_arms()
-    first_run = _only_policy_run(first)
-    second_run = _only_policy_run(second)
+    first_run = only_policy_run(first)
+    second_run = only_policy_run(second)
     _check_fair(first, second)
     found = _measure(dict(_groups(first, breakdowns)), dict(_groups(second, breakdowns)))
     averages = [result for result in found if result.key.is_average]
@@ -124,7 +124,7 @@ def compare_settings(frame: Frame) -> Comparison:
             not played.
     """
     frame = frame.without_control_arms()
-    policy_run = _only_policy_run(frame)
+    policy_run = only_policy_run(frame)
     groups = dict(_groups(frame, ()))
     settings = {}
     explicit = {}
@@ -202,7 +202,7 @@ def _shared(cells: ByTask, others: ByTask) -> ByTask:
     return {task: cell for task, cell in cells.items() if task in others}
 
 
-def _only_policy_run(frame: Frame) -> PolicyRun:
+def only_policy_run(frame: Frame) -> PolicyRun:
     """Return the policy run that all results are of: a policy, its conditions and versions.
 
     Raises:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 OWN_OPTIONS = (
     "cameras", "size", "video", "variations", "policy", "outcomes", "actions", "disturbed",
+    "language",
 )  # fmt: skip
 """What is rare in an export: keys of a plan's section ``demonstrations``."""
 _TEST_EPISODES = (
@@ -72,7 +73,7 @@ def export_demonstrations(
     """Export demonstrations for training, recorded once per episode, in the words of every setting.
 
     A plan may have, under `demonstrations`: cameras, size, video, variations, policy, outcomes,
-    actions, disturbed. Words are those for training unless it has `wordings: test`.
+    actions, disturbed, language. Words are those for training unless it has `wordings: test`.
 
     Example: roboirg export demonstrations --tasks PickXtimes --out data
     """

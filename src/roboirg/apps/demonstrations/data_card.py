@@ -37,7 +37,7 @@ def card_text(plan: ExportPlan, facts: Sequence[TrajectoryFacts], root: Path) ->
     card_license = OWN_LICENSE if plan.pictures == "none" else PICTURE_LICENSE
     # The head, between two lines of dashes, is YAML.
     lines = ["---", f"license: {card_license}", "task_categories: [robotics]"]
-    lines.append("tags: [LeRobot, RoboIRGBench]")
+    lines.append('tags: [LeRobot, robotics, RoboIRGBench, "arxiv:2609.34384"]')
     if plan.file_format.has_frame_tables:
         # Without them, Hugging Face takes the tables of facts for frames.
         lines.append("configs: [{config_name: default, data_files: data/*/*.parquet}]")
@@ -77,18 +77,18 @@ def _words_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator
 
 def _content_lines(plan: ExportPlan) -> Iterator[str]:
     """Yield the card's lines on what a frame holds: state, action, video, pictures, licenses."""
-    yield "State: seven joint angles (rad) and the first finger (m)."
+    yield "- State: seven joint angles (rad) and the first finger (m)."
     origin = "exactly what was executed"
     if plan.disturbed:
         origin = "what the **disturbed** expert should have done; `executed_action` is what it did"
-    yield f"Action: {_MEANINGS[plan.actions]}; {origin}."
+    yield f"- Action: {_MEANINGS[plan.actions]}; {origin}."
     if plan.video:
-        yield "Frames of the video come before the policy's, with `is_video_demo`."
+        yield "- Frames of the video come before the policy's, with `is_video_demo`."
     else:
-        yield "Frames of the videos are left out."
+        yield "- Frames of the videos are left out."
     if plan.pictures == "none":
-        yield "There are no pictures."
+        yield "- There are no pictures."
         return
-    yield f"Cameras: {', '.join(plan.cameras)}; {plan.size} × {plan.size} pixels."
-    yield f"Pictures are stored {_STORED[plan.pictures]}."
-    yield TERMS
+    yield f"- Cameras: {', '.join(plan.cameras)}; {plan.size} × {plan.size} pixels."
+    yield f"- Pictures are stored {_STORED[plan.pictures]}."
+    yield f"- {TERMS}"

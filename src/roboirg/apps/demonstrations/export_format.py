@@ -37,6 +37,7 @@ class ExportFormat:
         has_depth: whether it holds depth and calibration, and therefore always the pictures of both
             cameras, in full size and without loss.
         has_frame_tables: whether its frames are tables below ``data/``, which Hugging Face reads.
+        has_language: whether a frame can hold LeRobot's language columns.
         has_labels: whether a frame can hold an action to learn next to the one that was executed.
         has_waypoints: whether a frame may be a waypoint.
         is_for_openpi: whether its tables with PNGs are openpi's: with its names, and the pictures
@@ -53,6 +54,7 @@ class ExportFormat:
     begins_with_video: bool = False
     has_depth: bool = False
     has_frame_tables: bool = True
+    has_language: bool = False
     has_labels: bool = True
     has_waypoints: bool = False
     is_for_openpi: bool = False

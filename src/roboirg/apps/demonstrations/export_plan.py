@@ -55,6 +55,7 @@ class ExportPlan:
         outcomes: whether failures are exported too.
         actions: the action space, and what a frame is: a control step, or a waypoint.
         disturbed: whether the oracle is disturbed on its way.
+        language: whether frames have LeRobot's language columns.
     """
 
     tasks: tuple[str, ...]
@@ -73,6 +74,7 @@ class ExportPlan:
     outcomes: Outcomes = "successes"
     actions: Literal["joint_angle", "waypoint"] = "joint_angle"
     disturbed: bool = False
+    language: bool = False
 
     def validated(self) -> ExportPlan:
         """Return this plan if its values are known and go together.
@@ -89,6 +91,9 @@ class ExportPlan:
                 f"variations is {self.variations}, but only disturbed demonstrations vary; ask for "
                 "`disturbed: true`."
             )
+        if self.language and not self.file_format.has_language:
+            able = names_where(lambda known: known.has_language)
+            raise InvalidValueError(f"language is true: such columns have the format {able}.")
         self._check_disturbed()
         self._check_waypoints()
         self._check_pictures()

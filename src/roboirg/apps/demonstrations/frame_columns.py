@@ -40,6 +40,8 @@ _SINGLE = (
 )
 """The columns with one value in each frame: its type, and what it is called."""
 
+LANGUAGE_COLUMNS = ("language_persistent", "language_events")
+"""What LeRobot calls the columns of what is said during an episode, and of what in one frame."""
 EXECUTED = "executed_action"
 """Column of what was executed where that is not the action to learn."""
 
@@ -100,6 +102,9 @@ class FrameColumns:
         found["pose_action"] = _feature("float32", _POSE)
         for column, dtype, name in _SINGLE:
             found[column] = _feature(dtype, [name])
+        if self.plan.language:
+            for column in LANGUAGE_COLUMNS:
+                found[column] = {"dtype": "language", "shape": [1], "names": None}
         return found
 
     def table_features(self) -> dict[str, dict[str, Any]]:

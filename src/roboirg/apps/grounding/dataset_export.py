@@ -25,7 +25,8 @@ _CARD = """\
 ---
 license: {picture_license}
 language: [en]
-task_categories: [visual-question-answering, multiple-choice]
+task_categories: [visual-question-answering, multiple-choice, robotics]
+tags: [robotics, RoboIRGBench, "arxiv:2609.34384"]
 configs:
 - config_name: default
   data_files:

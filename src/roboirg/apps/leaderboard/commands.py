@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboirg.cli.export_commands import export_app
 from roboirg.cli.options import check_output_file
 from roboirg.cli.progress_bar import progress_bar
 from roboirg.cli.run_commands import USAGE_ERROR, Folder
@@ -76,6 +77,24 @@ def pack(
     manifest = pack_run(run_folder(run), out, videos=videos, logs=logs)
     size = out.stat().st_size / 1e6
     typer.echo(f"{counted(manifest.records, 'record')}, {size:.1f} MB: {out}")
+
+
+def hub_results(
+    run: RunOrPack,
+    policy: Annotated[str, typer.Argument(help="Name of the policy in it.")],
+    dataset: Annotated[
+        str, typer.Option(help="The benchmark's dataset at Hugging Face: OWNER/NAME.")
+    ],
+) -> None:
+    """Print success rates for .eval_results/roboirg.yaml in a model's repository at Hugging Face.
+
+    Example: roboirg export hub-results mine.roboirg.zip mine --dataset OWNER/roboirg-instructions
+    """
+    from roboirg.analysis.results.sources import opened_sources
+    from roboirg.apps.leaderboard.hub_results import hub_results as results_text
+
+    with opened_sources([f"{run}:{policy}"]) as (source,):
+        typer.echo(results_text(source.frame, dataset), nl=False)
 
 
 def _share(text: str) -> float:
@@ -153,3 +172,4 @@ def add_commands(app: typer.Typer) -> None:
     for command in (verify, pack):
         group.command()(command)
     app.add_typer(group, name="leaderboard")
+    export_app.command("hub-results")(hub_results)

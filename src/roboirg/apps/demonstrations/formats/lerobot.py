@@ -26,6 +26,7 @@ from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.apps.demonstrations.feature_stats import FeatureStats, vector_stats
 from roboirg.apps.demonstrations.formats.lerobot_tables import INFO, read_tables
 from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedInstruction
+from roboirg.apps.demonstrations.language_columns import language_columns
 from roboirg.apps.demonstrations.parquet_tables import (
     number_column,
     picture_column,
@@ -98,7 +99,12 @@ def write_part(part: DatasetPart) -> None:
     if columns.has_videos:
         write_videos(part, partial(_VIDEO.format, **place))
     shared = frame_columns(columns, trajectory)
-    own = [own_columns(placed, trajectory.facts.frames) for placed in episode.instructions]
+    own = []
+    for placed in episode.instructions:
+        own_of_episode = own_columns(placed, trajectory.facts.frames)
+        if columns.plan.language:
+            own_of_episode |= language_columns(trajectory, placed)
+        own.append(own_of_episode)
     path = part.root / _DATA.format(**place)
     write_frames(path, columns.table_features(), shared, own)
 
@@ -347,6 +353,7 @@ def training_text(plan: ExportPlan, root: Path) -> str:
 
 FORMAT = ExportFormat(
     name="lerobot-v3",
+    has_language=True,
     has_waypoints=True,
     make_parts=make_parts,
     write_part=write_part,
