@@ -51,10 +51,10 @@ WRITTEN = [*written_words()]
 each_task = pytest.mark.parametrize("task", WRITTEN)
 each_pool = pytest.mark.parametrize("pool", POOLS)
 DOCS = Path(__file__).parents[2] / "docs"
-USER_FILE_OF_THE_PAGE, SPATIAL_FILE_OF_THE_PAGE, _ = re.findall(
+*EXAMPLES_OF_THE_PAGE, _ = re.findall(
     r"```toml\n(.*?)```", (DOCS / "add-scenario.md").read_text(), re.DOTALL
 )
-"""The page's examples: a file of a user's own, two spatial scenarios, and a whole sentence."""
+"""The smallest file, what to add to it, two spatial scenarios; without the whole sentence."""
 TWO_CUBES = """
 tasks = ["PickXtimes"]
 [[scenario]]
@@ -395,8 +395,7 @@ def test_the_example_file_of_the_documentation_has_a_scenario_for_every_scene():
     PickXtimes, they break no rule of the checker, and no setting that they have words for is left
     without one that fits (`unserved_settings`)."""
     scenes = scenes_of("PickXtimes", 0)[::4]
-    text = USER_FILE_OF_THE_PAGE + SPATIAL_FILE_OF_THE_PAGE
-    words = parse_wordings(text, "mine.toml").tasks["PickXtimes"]
+    words = parse_wordings("".join(EXAMPLES_OF_THE_PAGE), "mine.toml").tasks["PickXtimes"]
 
     reports = check_scenarios(words, None, scenes)
 

@@ -39,10 +39,11 @@ from roboirg.shortcuts.command_chance import blind_goals, goals_of_command, unde
 from roboirg.tasks.splits.splits import get_episode
 
 PAGE = (Path(__file__).parents[2] / "docs/add-scenario.md").read_text()
-COMMAND_FILE_OF_THE_PAGE, SENTENCE_FILE_OF_THE_PAGE = re.findall(
-    r"```toml\n(name = .*?)```", PAGE, re.DOTALL
+SMALLEST_FILE_OF_THE_PAGE, ADDED_TO_IT, _, SENTENCE_FILE_OF_THE_PAGE = re.findall(
+    r"```toml\n(.*?)```", PAGE, re.DOTALL
 )
-"""The page's examples: a command and scenarios; a whole sentence."""
+"""The page's examples: a scenario; one more and a command; spatial ones; a whole sentence."""
+COMMAND_FILE_OF_THE_PAGE = SMALLEST_FILE_OF_THE_PAGE + ADDED_TO_IT
 each_pool = pytest.mark.parametrize("pool", POOLS)
 EPISODE = get_episode("PickXtimes", "test", 3)
 """Its goal is to put the blue of three cubes on the target four times."""
