@@ -127,6 +127,8 @@ def prove(study: Study) -> None:
     """
     found = [pair for pair in found_plays(study) if pair[0].trial.row.heard != TRUTH]
     chosen = random.Random(0).sample(found, math.ceil(study.proven * len(found)))
+    # A process is started for each policy, so trials of one follow each other.
+    chosen.sort(key=lambda pair: pair[0].trial.row)
     expected = {}
     jobs: deque[Job] = deque()
     for wanted, play in chosen:
