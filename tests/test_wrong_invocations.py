@@ -31,6 +31,7 @@ OPTIONS_OF_ANY_TEXT = {
 
 
 RIGHT_WORDS_FOR = {
+    "export hub-results": ["run", "random", "--dataset", "owner/name"],
     "fetch-models": ["--wheel", "nowhere"],
     "language check-scenarios": ["nowhere"],
     "language sample": ["--out", "out"],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import yaml
 
 from roboirg.analysis.measures.comparison import only_policy_run
@@ -26,10 +28,12 @@ def hub_results(frame: Frame, dataset: str) -> str:
             the tasks of these entries.
 
     Raises:
-        InvalidValueError: the results are of several policies or conditions, of a policy that reads
+        InvalidValueError: the repository has no such name; or the results are of several policies or conditions, of a policy that reads
             the simulator's state, not of the split test in our own words, or without one of the two
             settings.
     """
+    if not re.fullmatch(r"[\w.-]+/[\w.-]+", dataset):
+        raise InvalidValueError(f"dataset is {dataset!r}; it must be OWNER/NAME.")
     frame = frame.without_control_arms().where(form="implicit")
     run = only_policy_run(frame)
     rates = {}
