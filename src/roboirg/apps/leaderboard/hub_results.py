@@ -28,9 +28,9 @@ def hub_results(frame: Frame, dataset: str) -> str:
             the tasks of these entries.
 
     Raises:
-        InvalidValueError: the repository has no such name; or the results are of several policies or conditions, of a policy that reads
-            the simulator's state, not of the split test in our own words, or without one of the two
-            settings.
+        InvalidValueError: a repository has no such name; or the results are of several policies or
+            conditions, of a policy that reads the simulator's state, not of the split test in our
+            own words, or without one of the two settings.
     """
     if not re.fullmatch(r"[\w.-]+/[\w.-]+", dataset):
         raise InvalidValueError(f"dataset is {dataset!r}; it must be OWNER/NAME.")
