@@ -9,7 +9,6 @@ import tomllib
 from collections import defaultdict
 from typing import NamedTuple
 
-import draw_layout
 import layout
 import pytest
 from house_rooms import PACKAGE, PACKAGES, ROOT, SOURCES, TESTS, house_files
@@ -258,9 +257,9 @@ def test_no_room_but_the_package_itself_imports_the_api():
     assert [room for room, others in layout.arrows().items() if "api" in others] == ["roboirg"]
 
 
-def test_the_picture_of_the_layout_is_up_to_date():
-    drawn = draw_layout.FILE.read_text(encoding="utf-8")
-    assert drawn == draw_layout.picture(), "draw it anew: python scripts/draw_layout.py"
+def test_the_table_of_rooms_is_up_to_date():
+    page = layout.PAGE.read_text(encoding="utf-8")
+    assert page == layout.page_text(), "write it anew: python scripts/layout.py"
 
 
 def repeated(places):
