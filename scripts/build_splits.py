@@ -15,7 +15,7 @@ import typer
 from roboirg.cli.options import Tasks, Workers
 from roboirg.cli.progress_bar import progress_bars
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.runs.plan.option_parsing import parse_names, parse_splits
+from roboirg.runs.plan.option_parsing import parse_names
 from roboirg.tasks import find_tasks
 from roboirg.tasks.splits import splits
 from roboirg.util.atomic_write import write_atomically
@@ -24,17 +24,14 @@ from roboirg.util.processor import worker_count
 
 def build_splits(
     tasks: Tasks = "all",
-    split: Annotated[str, typer.Option(help="train, val, test or all.")] = "all",
     workers: Workers = None,
     out: Annotated[str | None, typer.Option(help="Write to this file instead of stdout.")] = None,
 ) -> None:
-    """Select the seeds of the splits again; tasks and splits not named stay unchanged."""
+    """Select the seeds of all splits of some tasks again; those of other tasks stay unchanged."""
     names = find_tasks(parse_names("task", tasks))
-    wanted = parse_splits(split)
-    seed_selection.check_kept_splits(names, wanted, splits.shipped_splits())
     if out is not None and not Path(out).parent.is_dir():
         raise InvalidValueError(f"There is no folder for {out!r}; create it first.")
-    slots = seed_selection.episode_slots(names, wanted)
+    slots = seed_selection.episode_slots(names)
     count = worker_count(workers)
     found: list[seed_selection.SelectedSeed] = []
     with progress_bars() as report:
