@@ -110,14 +110,6 @@ def circles(graph: Graph) -> list[list[str]]:
     return []
 
 
-def file_circles() -> list[list[str]]:
-    """Return a circle of files that import each other, if there is any."""
-    graph: dict[str, list[str]] = defaultdict(list)
-    for item in imports():
-        graph[item.source].append(item.target)
-    return circles(graph)
-
-
 def imports_back_up() -> list[str]:
     """Return imports inside a room that close a circle between its folders and files."""
     folders = [name for name, path in modules().items() if path.name == "__init__.py"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -150,23 +149,20 @@ def find_seed(slot: EpisodeSlot, check: SeedCheck = check_seed) -> SelectedSeed:
     )
 
 
-def find_seeds(
-    slots: Sequence[EpisodeSlot], workers: int, check: SeedCheck = check_seed
-) -> Iterator[SelectedSeed]:
+def find_seeds(slots: Sequence[EpisodeSlot], workers: int) -> Iterator[SelectedSeed]:
     """Find a seed for every slot; yields the results as they finish.
 
     Args:
         slots: the episodes.
         workers: number of processes; 0 works in this process.
-        check: accepts or rejects a seed.
 
     Raises:
         InvalidValueError: a negative number of workers.
         SceneRejectedError: an episode has no seed.
         RoboIRGError: a process died.
     """
-    found = parallel_map(functools.partial(find_seed, check=check), slots, workers)
-    yield from (outcome for _, outcome in found)
+    for _, selected in parallel_map(find_seed, slots, workers):
+        yield selected
 
 
 def merge_splits(

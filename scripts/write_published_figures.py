@@ -225,12 +225,6 @@ def _spatial() -> Iterator[str]:
         cells = (explicit, change.first, change.second, drops[model], _signed(change))
         lines.append((model, *cells))
     yield table(heads, lines)
-    printed = sorted(models, key=drops.__getitem__)
-    same = sorted(models, key=lambda model: -changes[model].change)
-    yield _text(
-        f"From the smallest drop to the largest, as printed: {', '.join(printed)};",
-        f"on the same tasks: {', '.join(same)}.",
-    )
 
 
 def _starts() -> Iterator[str]:

@@ -183,10 +183,6 @@ def test_rooms_import_each_other_in_no_circle():
     check_empty(layout.circles(layout.arrows()))
 
 
-def test_files_import_each_other_in_no_circle():
-    check_empty(layout.file_circles())
-
-
 def test_the_package_has_few_rooms_and_few_imports_between_them():
     assert len(layout.arrows()) <= MOST_ROOMS, sorted(layout.arrows())
     assert sum(map(len, layout.arrows().values())) <= MOST_ARROWS, {
