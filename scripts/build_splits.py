@@ -1,6 +1,6 @@
 """Select the seeds of the splits again.
 
-python scripts/build_splits.py --out src/roboirg/tasks/splits/splits.json
+python scripts/build_splits.py --tasks PickXtimes
 """
 
 from __future__ import annotations
@@ -15,26 +15,25 @@ import typer
 from roboirg.cli.options import Tasks, Workers
 from roboirg.cli.progress_bar import progress_bars
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.runs.plan.option_parsing import parse_names, parse_splits
+from roboirg.runs.plan.option_parsing import parse_names
 from roboirg.tasks import find_tasks
 from roboirg.tasks.splits import splits
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.processor import worker_count
 
+SHIPPED = Path(splits.__file__).with_name(splits.SPLITS_FILE)
+
 
 def build_splits(
     tasks: Tasks = "all",
-    split: Annotated[str, typer.Option(help="train, val, test or all.")] = "all",
     workers: Workers = None,
-    out: Annotated[str | None, typer.Option(help="Write to this file instead of stdout.")] = None,
+    out: Annotated[Path, typer.Option(help="The file to write.")] = SHIPPED,
 ) -> None:
-    """Select the seeds of the splits again; tasks and splits not named stay unchanged."""
+    """Select the seeds of all splits of some tasks again; those of other tasks stay unchanged."""
     names = find_tasks(parse_names("task", tasks))
-    wanted = parse_splits(split)
-    seed_selection.check_kept_splits(names, wanted, splits.shipped_splits())
-    if out is not None and not Path(out).parent.is_dir():
-        raise InvalidValueError(f"There is no folder for {out!r}; create it first.")
-    slots = seed_selection.episode_slots(names, wanted)
+    if not out.parent.is_dir():
+        raise InvalidValueError(f"There is no folder for '{out}'; create it first.")
+    slots = seed_selection.episode_slots(names)
     count = worker_count(workers)
     found: list[seed_selection.SelectedSeed] = []
     with progress_bars() as report:
@@ -45,11 +44,7 @@ def build_splits(
         for seed, reason, cause in rejections:
             typer.echo(f"{slot.key}: seed {seed} is rejected, {reason}: {cause}", err=True)
     built = seed_selection.merge_splits(names, found, splits.shipped_splits())
-    text = seed_selection.splits_text(built)
-    if out is None:
-        typer.echo(text, nl=False)
-    else:
-        write_atomically(Path(out), text)
+    write_atomically(out, seed_selection.splits_text(built))
 
 
 if __name__ == "__main__":

@@ -77,38 +77,31 @@ def _words_of(scenario: Scenario) -> set[str]:
     for person in scenario.people or ((),):
         for sentences in scenario.texts.values():
             for sentence in sentences:
-                for said in _spellings(sentence, person):
+                for is_many in (False, True):
+                    said = _spelling(sentence, person, is_many=is_many)
                     # A sentence begins with a capital, unless a lead goes before it.
                     words |= split_words(said)
                     words |= split_words(_BEGINNING.sub(lambda found: found[0].upper(), said))
     return words
 
 
-def _spellings(text: Text, person: tuple[str, ...]) -> tuple[str, str]:
-    """Return what a sentence says of one thing, and of several."""
-    one = ""
-    many = ""
+def _spelling(text: Text, person: tuple[str, ...], *, is_many: bool) -> str:
+    """Return what a sentence says of one thing, or of several."""
+    said = ""
     for part in text:
         if isinstance(part, Slot):
             name = part.name.partition(".")[0]
             if name in PERSON:
-                value = person[PERSON.index(name)]
-                one += value
-                many += value
+                said += person[PERSON.index(name)]
             elif part.form and part.form not in FORMS:
-                one += part.form
-                many += plural(part.form)
+                said += plural(part.form) if is_many else part.form
         elif isinstance(part, Agreement):
-            one += part.one
-            many += part.many
+            said += part.many if is_many else part.one
         elif isinstance(part, Pointer):
-            inner_one, inner_many = _spellings(part.parts, person)
-            one += inner_one
-            many += inner_many
+            said += _spelling(part.parts, person, is_many=is_many)
         else:
-            one += part.text
-            many += part.text
-    return one, many
+            said += part.text
+    return said
 
 
 def main() -> None:

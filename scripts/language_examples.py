@@ -11,12 +11,12 @@ from collections.abc import Iterator, Mapping
 from written_parts import table, with_part
 
 from roboirg.core.episode import Episode
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language.generator import find_refusal, instruct
+from roboirg.language.generator import instruct
 from roboirg.language.instruction import Described, Instruction, Mention
 from roboirg.language.meaning import field_values
 from roboirg.language.scenarios.scenario_file import pointer_table
 from roboirg.language.settings import all_settings, plain_settings
+from roboirg.language.variants import instructions
 from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 WALK = ("PickXtimes", 6)
@@ -125,8 +125,7 @@ def _pointers(said: Instruction) -> Iterator[str]:
 def _rivals() -> str:
     rows = []
     for remark, task in RIVALS.items():
-        episode = _first_with(task, "direct-rival", "rival_reference", remark)
-        said = instruct(episode, "direct-rival")
+        episode, said = _first_with(task, "direct-rival", "rival_reference", remark)
         values = [value for _, _, _, value in _meanings(said, episode)]
         rows.append((f"`{remark}`", marked(said), ", ".join(values)))
     return table(("remark", "what is said", "meant"), rows)
@@ -135,18 +134,16 @@ def _rivals() -> str:
 def _seen() -> str:
     rows = []
     for kind, task in SEEN:
-        said = instruct(_first_with(task, "grounded", "pattern", kind), "grounded")
+        _, said = _first_with(task, "grounded", "pattern", kind)
         rows.append((kind, task, marked(said)))
     return table(("kind", "task", "what is said"), rows)
 
 
-def _first_with(task: str, setting: str, note: str, wanted: str) -> Episode:
+def _first_with(task: str, setting: str, note: str, wanted: str) -> tuple[Episode, Instruction]:
     """Return the first test episode of a task whose words have something in their metadata."""
-    options = InstructionOptions(setting)
-    for episode in split_episodes([task], ["test"]):
-        is_said = find_refusal(episode, options) is None
-        if is_said and instruct(episode, setting).metadata[note] == wanted:
-            return episode
+    for episode, said in instructions(split_episodes([task], ["test"]), [setting], ["implicit"]):
+        if said.metadata[note] == wanted:
+            return episode, said
     raise LookupError(f"No test episode of {task} has {wanted} in {setting}.")
 
 

@@ -2,7 +2,8 @@
 
 A room is a folder or module at the top of `src/roboirg`; an arrow says that one room imports
 another, at any level of nesting. Inside a room, an import runs back up where folders or files
-import each other in a circle. `scripts/draw_layout.py` draws the rooms.
+import each other in a circle. ``python scripts/layout.py`` writes the table of rooms in
+docs/architecture.md.
 """
 
 from __future__ import annotations
@@ -16,9 +17,16 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import NamedTuple
 
+from written_parts import table, with_part
+
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "roboirg"
+PAGE = ROOT / "docs" / "architecture.md"
 APPS = "roboirg.apps"
+GROUND = ("core", "util")
+"""What all rooms may import."""
+FACE = ("roboirg", "__main__")
+"""What only hands on: the package's own file, and ``python -m roboirg``."""
 
 Graph = Mapping[str, Iterable[str]]
 
@@ -102,14 +110,6 @@ def circles(graph: Graph) -> list[list[str]]:
     return []
 
 
-def file_circles() -> list[list[str]]:
-    """Return a circle of files that import each other, if there is any."""
-    graph: dict[str, list[str]] = defaultdict(list)
-    for item in imports():
-        graph[item.source].append(item.target)
-    return circles(graph)
-
-
 def imports_back_up() -> list[str]:
     """Return imports inside a room that close a circle between its folders and files."""
     folders = [name for name, path in modules().items() if path.name == "__init__.py"]
@@ -156,10 +156,41 @@ def imports_between_applications() -> list[Import]:
     return found
 
 
-def floors(graph: Graph) -> dict[str, int]:
-    """Return the floor of each node: above all that it reaches; 0 for what imports nothing."""
-    found: dict[str, int] = {}
-    for node in TopologicalSorter(graph).static_order():
-        below = [found[other] for other in graph.get(node, ())]
-        found[node] = 1 + max(below, default=-1)
-    return found
+def rooms_by_layer() -> str:
+    """Return a table of the rooms, each in a layer above all that it imports.
+
+    Imports that a longer way implies are left out, as are those of `GROUND`.
+    """
+    graph = {}
+    for room, others in arrows().items():
+        if room not in (*GROUND, *FACE):
+            graph[room] = set(others) - set(GROUND)
+    sorter = TopologicalSorter(graph)
+    sorter.prepare()
+    reached: dict[str, set[str]] = {}
+    rows: list[tuple[object, ...]] = [(0, _quoted(GROUND), "")]
+    for layer in itertools.count(1):
+        ready = sorted(sorter.get_ready(), reverse=True)
+        if not ready:
+            break
+        for room in ready:
+            implied = set()
+            for other in graph[room]:
+                implied |= reached[other]
+            reached[room] = graph[room] | implied
+            rows.append((layer, _quoted([room]), _quoted(graph[room] - implied)))
+        sorter.done(*ready)
+    return table(("layer", "room", "imports"), reversed(rows))
+
+
+def _quoted(rooms: Iterable[str]) -> str:
+    return ", ".join(f"`{room}`" for room in sorted(rooms))
+
+
+def page_text() -> str:
+    """Return the page with the table of rooms."""
+    return with_part(PAGE.read_text(encoding="utf-8"), "rooms", rooms_by_layer())
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page_text(), encoding="utf-8")

@@ -7,12 +7,10 @@ how well the raters agree. ``roboirg language sample`` writes key and sheets.
 
 from __future__ import annotations
 
-import csv
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import typer
 from written_parts import table
 
@@ -24,36 +22,29 @@ NUMBERS = ("texts", "rated")
 HEADS = ("words", *NUMBERS, "95 % interval", "worst frame")
 
 
-def read_key(path: Path) -> dict[str, dict[str, str]]:
-    """Return what the numbers stand for."""
-    with path.open(newline="", encoding="utf-8") as file:
-        return {row["number"]: row for row in csv.DictReader(file)}
+def read_key(path: Path) -> pd.DataFrame:
+    """Return what the numbers of texts, the index, stand for."""
+    return pd.read_csv(path, index_col="number", keep_default_na=False)
 
 
-def read_ratings(path: Path, known: Mapping[str, object]) -> dict[str, float]:
-    """Return the ratings of a sheet by number; complains about one that is missing or odd."""
-    found: dict[str, float] = {}
-    with path.open(newline="", encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            number = row["number"]
-            rating = row["rating"].strip()
-            if number not in known:
-                raise SystemExit(f"{path} rates text {number!r}, which the key does not have.")
-            try:
-                found[number] = float(rating)
-            except ValueError:
-                raise SystemExit(
-                    f"{path} rates text {number} {rating!r}; it must be a number from 1 to 5."
-                ) from None
-            if not LOWEST <= found[number] <= HIGHEST:
-                raise SystemExit(f"{path} rates text {number} {rating}; it must be 1 to 5.")
-    missing = sorted(set(known) - set(found), key=int)
-    if missing:
-        raise SystemExit(f"{path} lacks the ratings of {', '.join(missing)}.")
-    return found
+def read_ratings(path: Path, known: pd.Index[int]) -> pd.Series[float]:
+    """Return the ratings of a sheet by number, in the order of the known numbers.
+
+    Raises:
+        SystemExit: it has other texts, or a rating is missing or odd.
+    """
+    sheet = pd.read_csv(path, index_col="number")
+    if sorted(sheet.index) != sorted(known):
+        raise SystemExit(f"{path} does not have the texts of the key, each once.")
+    ratings = pd.to_numeric(sheet["rating"], errors="coerce").reindex(known)
+    odd = ratings[~ratings.between(LOWEST, HIGHEST)].index
+    if len(odd):
+        numbers = ", ".join(map(str, odd))
+        raise SystemExit(f"{path} needs a number from 1 to 5 as the rating of texts {numbers}.")
+    return ratings
 
 
-def interval(means: Sequence[float]) -> str:
+def interval(means: list[float]) -> str:
     """Return the 95 % interval of a mean over frames: ``4.1 to 4.7``."""
     found = interval_of_values([means], LOWEST, HIGHEST)
     if found is None:
@@ -61,50 +52,38 @@ def interval(means: Sequence[float]) -> str:
     return f"{found.low:.1f} to {found.high:.1f}"
 
 
-def rows(
-    key: Mapping[str, Mapping[str, str]], sheets: Sequence[Mapping[str, float]]
-) -> list[tuple[object, ...]]:
-    """Return the cells of each setting."""
+def rows(key: pd.DataFrame, ratings: pd.DataFrame) -> list[tuple[object, ...]]:
+    """Return the cells of each setting; a text without a frame counts as one of its own.
+
+    Args:
+        key: as `read_key` returns it.
+        ratings: with a column for each rater.
+    """
+    named = key["task"] + ": " + key["frame"]
+    frames = named.where(key["frame"] != "", "text " + key.index.astype(str))
+    of_frames = ratings.mean(axis=1).groupby([key["setting"], frames], sort=False).mean()
     found: list[tuple[object, ...]] = []
-    for setting, frames in sorted(by_frame(key, sheets).items()):
-        means = {frame: float(np.mean(ratings)) for frame, ratings in frames.items()}
-        rated = float(np.mean(list(means.values())))
-        worst = min(means, key=means.__getitem__)
-        shown = f"{means[worst]:.1f} ({worst})"
-        found.append((setting, len(means), f"{rated:.1f}", interval(list(means.values())), shown))
+    for setting, means in of_frames.groupby(level=0):
+        _, worst = means.idxmin()
+        shown = f"{means.min():.1f} ({worst})"
+        found.append((setting, len(means), f"{means.mean():.1f}", interval([*means]), shown))
     return found
 
 
-def by_frame(
-    key: Mapping[str, Mapping[str, str]], sheets: Sequence[Mapping[str, float]]
-) -> dict[str, dict[str, list[float]]]:
-    """Return all ratings by setting and frame; a text without a frame stands alone."""
-    found: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
-    for number, text in key.items():
-        frame = f"text {number}"
-        if text["frame"]:
-            frame = f"{text['task']}: {text['frame']}"
-        found[text["setting"]][frame] += [sheet[number] for sheet in sheets]
-    return found
-
-
-def agreement(sheets: Sequence[Mapping[str, float]]) -> str:
-    """Return the mean correlation of two raters."""
-    if len(sheets) == 1:
+def agreement(ratings: pd.DataFrame) -> str:
+    """Return the mean correlation of two raters, who have a column each."""
+    raters = len(ratings.columns)
+    if raters == 1:
         return "One rater."
-    numbers = list(sheets[0])
-    ratings = []
-    for sheet in sheets:
-        ratings.append([sheet[number] for number in numbers])
-    correlations = np.corrcoef(ratings)
-    pairs = np.triu_indices(len(sheets), k=1)
-    return f"Mean correlation of two raters: {np.mean(correlations[pairs]):.2f}."
+    pairs = np.triu_indices(raters, k=1)
+    return f"Mean correlation of two raters: {ratings.corr().to_numpy()[pairs].mean():.2f}."
 
 
 def main(key: Path, sheets: list[Path]) -> None:
     """Print the table of a key and of the sheets that raters filled in."""
     known = read_key(key)
-    ratings = [read_ratings(path, known) for path in sheets]
+    columns = [read_ratings(path, known.index) for path in sheets]
+    ratings = pd.concat(columns, axis="columns")
     print(table(HEADS, rows(known, ratings), NUMBERS), "", agreement(ratings), sep="\n")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -10,11 +9,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from roboirg.core.episode import SPLITS, Difficulty, Episode, Split, episode_key
-from roboirg.core.errors import (
-    InvalidValueError,
-    MotionPlanningError,
-    SceneRejectedError,
-)
+from roboirg.core.errors import MotionPlanningError, SceneRejectedError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.envs.factory import make
 from roboirg.language.generator import request_of
@@ -83,12 +78,10 @@ SeedCheck = Callable[[EpisodeSlot, int], Rejection | None]
 """Returns why a seed is rejected for a slot; None if it is accepted."""
 
 
-def episode_slots(
-    tasks: Sequence[str], splits: Sequence[Split] = SPLITS
-) -> tuple[EpisodeSlot, ...]:
+def episode_slots(tasks: Sequence[str]) -> tuple[EpisodeSlot, ...]:
     """Return a slot for every sampled episode of the tasks' splits, in order."""
     slots = []
-    for task, split in itertools.product(tasks, splits):
+    for task, split in itertools.product(tasks, SPLITS):
         for index in range(SIZES[split]):
             if published_episode(task, split, index) is None:
                 slots.append(EpisodeSlot(task, split, index))
@@ -156,70 +149,39 @@ def find_seed(slot: EpisodeSlot, check: SeedCheck = check_seed) -> SelectedSeed:
     )
 
 
-def find_seeds(
-    slots: Sequence[EpisodeSlot], workers: int, check: SeedCheck = check_seed
-) -> Iterator[SelectedSeed]:
+def find_seeds(slots: Sequence[EpisodeSlot], workers: int) -> Iterator[SelectedSeed]:
     """Find a seed for every slot; yields the results as they finish.
 
     Args:
         slots: the episodes.
         workers: number of processes; 0 works in this process.
-        check: accepts or rejects a seed.
 
     Raises:
         InvalidValueError: a negative number of workers.
         SceneRejectedError: an episode has no seed.
         RoboIRGError: a process died.
     """
-    found = parallel_map(functools.partial(find_seed, check=check), slots, workers)
-    yield from (outcome for _, outcome in found)
-
-
-def check_kept_splits(
-    tasks: Sequence[str], splits: Sequence[Split], known: Mapping[str, TaskSplits]
-) -> None:
-    """Check that the splits that are not rebuilt can be kept.
-
-    Raises:
-        InvalidValueError: they were never built, or their scenes have changed since.
-    """
-    kept = [split for split in SPLITS if split not in splits]
-    for slot in episode_slots(tasks, kept):
-        entry = known.get(slot.task)
-        is_valid = False
-        if entry is not None:
-            passed_over = entry.passed_over.get(slot_key(slot.split, slot.index), 0)
-            first = slot_seed(get_task(slot.task), slot.split, slot.index)
-            is_valid = check_words(slot, first + passed_over) is None
-        if not is_valid:
-            raise InvalidValueError(
-                f"Episode {slot.key} cannot be kept, because it is not valid; build all splits of "
-                f"{slot.task}."
-            )
+    for _, selected in parallel_map(find_seed, slots, workers):
+        yield selected
 
 
 def merge_splits(
     tasks: Sequence[str], found: Sequence[SelectedSeed], known: Mapping[str, TaskSplits]
 ) -> dict[str, TaskSplits]:
-    """Return the splits to ship, with new fingerprints of the named tasks.
+    """Return the splits to ship, with new ones of the named tasks.
 
     Args:
         tasks: names of the tasks whose splits are built.
-        found: the seeds selected for their sampled episodes; others keep the known ones.
+        found: the seeds selected for all of their sampled episodes.
         known: the splits shipped before.
     """
     rejected = {selected.slot: len(selected.rejections) for selected in found}
     splits = dict(known)
     for task in tasks:
-        old: Mapping[str, int] = {}
-        if task in known:
-            old = known[task].passed_over
-        passed_over: dict[str, int] = {}
+        passed_over = {}
         for slot in episode_slots([task]):
-            key = slot_key(slot.split, slot.index)
-            count = rejected.get(slot, old.get(key, 0))
-            if count:
-                passed_over[key] = count
+            if rejected[slot]:
+                passed_over[slot_key(slot.split, slot.index)] = rejected[slot]
         sha256 = fingerprint(_fixed_episodes(task, passed_over))
         splits[task] = TaskSplits(sha256, passed_over)
     return {task: splits[task] for task in every_task() if task in splits}

@@ -10,74 +10,36 @@ ended. Seconds are the clock's: what workers did side by side counts for each.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal
 from xml.etree import ElementTree as ET
 
+import pandas as pd
 import typer
 
 By = Literal["folder", "file", "function", "item"]
 PROCESSOR = "./properties/property[@name='processor']"
 
 
-class TimedTest(NamedTuple):
-    """One test of a report.
-
-    Attributes:
-        file: the file in which it stands, without suffix, such as ``tests/judging/test_judge``.
-        name: its name with its parameters.
-        processor_s: the processor time that it took.
-        seconds: how long it took.
-    """
-
-    file: str
-    name: str
-    processor_s: float
-    seconds: float
-
-    def group(self, by: By) -> str:
-        """Return the group to which it belongs."""
-        if by == "folder":
-            return self.file.rpartition("/")[0]
-        if by == "file":
-            return self.file
-        if by == "function":
-            return f"{self.file}::{self.name.partition('[')[0]}"
-        return f"{self.file}::{self.name}"
-
-
-def read_report(path: Path) -> list[TimedTest]:
-    """Return the tests of a JUnit XML that pytest has written."""
+def read_reports(paths: list[Path]) -> pd.DataFrame:
+    """Return the tests of JUnit XMLs that pytest has written: their groups and what they took."""
     tests = []
-    for case in ET.parse(path).iterfind(".//testcase"):  # noqa: S314 - our own
-        file = case.get("classname", "").replace(".", "/")
-        processor = case.find(PROCESSOR)
-        processor_s = 0.0
-        if processor is not None:
-            processor_s = float(processor.get("value", ""))
-        seconds = float(case.get("time", "0"))
-        tests.append(TimedTest(file, case.get("name", ""), processor_s, seconds))
-    return tests
-
-
-def table(tests: list[TimedTest], by: By, top: int) -> str:
-    """Return a line for each of the most costly groups, and one for all tests."""
-    groups: dict[str, list[TimedTest]] = defaultdict(list)
-    for test in tests:
-        groups[test.group(by)].append(test)
-    rows = sorted((_row(name, group) for name, group in groups.items()), reverse=True)
-    lines = ["  items  processor  seconds  group"]
-    for spent, seconds, items, name in [*rows[:top], _row("all", tests)]:
-        lines.append(f"{items:7} {spent:10.1f} {seconds:8.1f}  {name}")
-    return "\n".join(lines)
-
-
-def _row(name: str, tests: list[TimedTest]) -> tuple[float, float, int, str]:
-    """Return the processor time and the seconds of some tests, their number, and their name."""
-    processor_s = sum(test.processor_s for test in tests)
-    seconds = sum(test.seconds for test in tests)
-    return processor_s, seconds, len(tests), name
+    for path in paths:
+        for case in ET.parse(path).iterfind(".//testcase"):  # noqa: S314 - our own
+            file = case.get("classname", "").replace(".", "/")
+            item = f"{file}::{case.get('name')}"
+            processor = case.find(PROCESSOR)
+            test = {
+                "folder": file.rpartition("/")[0],
+                "file": file,
+                "function": item.partition("[")[0],
+                "item": item,
+                "items": 1,
+                "processor": 0.0 if processor is None else float(processor.get("value", "")),
+                "seconds": float(case.get("time", "0")),
+            }
+            tests.append(test)
+    return pd.DataFrame(tests)
 
 
 def main(
@@ -85,11 +47,12 @@ def main(
     by: By = "file",
     top: Annotated[int, typer.Option(help="The number of groups.")] = 30,
 ) -> None:
-    """Print the table of the tests in some reports."""
-    tests = []
-    for path in reports:
-        tests += read_report(path)
-    print(table(tests, by, top))
+    """Print a line for each of the most costly groups of tests, and one for all tests."""
+    tests = read_reports(reports)
+    costs = tests.groupby(by)[["items", "processor", "seconds"]].sum()
+    shown = costs.nlargest(top, "processor")
+    shown.loc["all"] = costs.sum()
+    print(shown.reset_index(names="group").to_string(index=False, float_format="%.1f"))
 
 
 if __name__ == "__main__":

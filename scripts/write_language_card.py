@@ -7,7 +7,7 @@ It also writes the examples on the pages of the settings.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from language_examples import harder_page, language_page, marked, marks_page
@@ -20,10 +20,11 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import find_refusal, instruct
 from roboirg.language.instruction import Instruction
 from roboirg.language.scenarios.scenario import PATTERNS
-from roboirg.language.settings import all_settings, plain_settings, settings_of
+from roboirg.language.settings import all_settings, plain_settings
+from roboirg.language.variants import instructions
 from roboirg.language.word_sampler import LANGUAGE_VERSION
-from roboirg.tasks import Task, all_tasks, get_task
-from roboirg.tasks.splits.splits import get_episode, split_size
+from roboirg.tasks import Task, all_tasks
+from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 SPLIT = "test"
 DOCS = Path(__file__).parent.parent / "docs"
@@ -87,42 +88,26 @@ def _variants(task: Task) -> list[str]:
     return [name for name in plain_settings(task) if all_settings()[name].implicit]
 
 
-def _harder_variants(name: str) -> list[str]:
+def _harder_variants(task: str) -> list[str]:
     """Return the harder settings of a task that can express a test episode."""
-    names = []
-    for setting in settings_of(get_task(name)):
-        is_harder = all_settings()[setting].plain is not None
-        if is_harder and _has_example(name, setting):
-            names.append(setting)
-    return names
+    harder = [name for name, setting in all_settings().items() if setting.plain is not None]
+    told = {said.setting for _, said in instructions(_episodes([task]), harder, ["implicit"])}
+    return [name for name in harder if name in told]
 
 
-def _has_example(task: str, setting: str) -> bool:
-    options = InstructionOptions(setting)
-    return any(find_refusal(episode, options) is None for episode in _episodes(task))
+def _episodes(tasks: Iterable[str]) -> Iterator[Episode]:
+    return split_episodes(tasks, [SPLIT])
 
 
 def _patterns_by_task() -> str:
     """Return how many test episodes of each task have each reasoning pattern."""
-    counts = metadata_counts(_reasoning(), "pattern")
+    told = instructions(_episodes(all_tasks()), ["reasoning"], ["implicit"])
+    counts = metadata_counts((said for _, said in told), "pattern")
     rows = []
     for task in all_tasks():
         cells = [counts[task].get(pattern) or "–" for pattern in PATTERNS]
         rows.append((task, *cells))
     return f"{_PATTERNS_HEAD}\n\n{table(('task', *PATTERNS), rows)}"
-
-
-def _reasoning() -> Iterator[Instruction]:
-    for name, task in all_tasks().items():
-        if "reasoning" in settings_of(task):
-            for episode in _episodes(name):
-                yield instruct(episode, "reasoning")
-
-
-def _episodes(task: str) -> Iterator[Episode]:
-    """Yield the test episodes of a task."""
-    for index in range(split_size(SPLIT)):
-        yield get_episode(task, SPLIT, index)
 
 
 def example_episode(task: str, setting: str) -> Episode:

@@ -10,7 +10,6 @@ import math
 import textwrap
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from decimal import Decimal
-from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
 
@@ -126,32 +125,14 @@ def _percent(interval: Interval) -> Interval:
     return Interval(100 * interval.low, 100 * interval.high)
 
 
-def _of_cell(rate: Decimal | int, trials: int) -> Interval:
-    """Return the interval of a published rate, which is in percent."""
-    rows = np.ones((trials, 2), dtype=np.int64)
-    rows[round(Fraction(rate) * trials / 100) :, 0] = 0
-    interval = mean_interval([TaskRates.of(rows).combined(1)])
+def half_width(percent: int, trials: int) -> str:
+    """Return half the width of the interval of a cell's rate, in points."""
+    outcomes = np.ones((trials, 2), dtype=np.int64)
+    outcomes[percent * trials // 100 :, 0] = 0
+    interval = mean_interval([TaskRates.of(outcomes).combined(1)])
     if interval is None:
         raise ValueError("a cell has too few trials for an interval")
-    return interval
-
-
-def printed_drops() -> dict[str, Decimal]:
-    """Return each model's spatial drop as printed: its averages are over other tasks."""
-    rows = rows_of("main")
-    drops = {}
-    for model in models_of("main"):
-        drops[model] = rows[model, EXPLICIT].average - rows[model, SPATIAL].average
-    return drops
-
-
-def spatial_changes() -> dict[str, Comparison]:
-    """Return each model's spatial setting next to explicit, on the same tasks."""
-    changes = {}
-    for (model, setting), change in setting_changes().items():
-        if setting == SPATIAL:
-            changes[model] = change
-    return changes
+    return f"{50 * (interval.high - interval.low):.0f}"
 
 
 def lowest_settings(tasks: Collection[str] | None = None) -> dict[str, str]:
@@ -167,41 +148,6 @@ def lowest_settings(tasks: Collection[str] | None = None) -> dict[str, str]:
     return lowest
 
 
-def shortest_context() -> list[tuple[str, str, Comparison]]:
-    """Return for each model and task the direct setting next to the shortest context."""
-    direct = rows_of("main")
-    staged = rows_of("context")
-    shortest = _stages_text(staged_options()[0].stages)
-    cells = []
-    for model in models_of("context"):
-        for task in published_tasks("context"):
-            change = compare(direct[model, DIRECT], staged[model, shortest], (task,))
-            cells.append((model, task, change))
-    return cells
-
-
-class Step(NamedTuple):
-    """A model's average before and after one more stage; `before` and `after` are stages."""
-
-    model: str
-    before: str
-    after: str
-    change: Comparison
-
-
-def context_steps() -> list[Step]:
-    """Return each model's average before and after every further stage."""
-    rows = rows_of("context")
-    tasks = published_tasks("context")
-    stages = [_stages_text(options.stages) for options in staged_options()]
-    steps = []
-    for model in models_of("context"):
-        for before, after in itertools.pairwise(stages):
-            change = compare(rows[model, before], rows[model, after], tasks)
-            steps.append(Step(model, before, after, change))
-    return steps
-
-
 def setting_changes() -> dict[tuple[str, str], Comparison]:
     """Return each implicit setting next to explicit, on the tasks that have it."""
     rows = rows_of("main")
@@ -211,17 +157,6 @@ def setting_changes() -> dict[tuple[str, str], Comparison]:
             row = rows[model, setting]
             changes[model, setting] = compare(rows[model, EXPLICIT], row, defined_tasks(row))
     return changes
-
-
-def half_widths() -> list[float]:
-    """Return half the widths of the intervals of the main table's rates of 10 to 90 %, points."""
-    widths = []
-    for row in published_rows("main"):
-        for rate in row.rates.values():
-            if rate is not None and 10 <= rate <= 90:  # noqa: PLR2004 - percent
-                low, high = _of_cell(rate, CELL)
-                widths.append(50 * (high - low))
-    return widths
 
 
 def page() -> str:
@@ -266,9 +201,12 @@ def _signed(comparison: Comparison) -> str:
 
 def _spatial() -> Iterator[str]:
     rows = rows_of("main")
-    drops = printed_drops()
-    changes = spatial_changes()
+    all_changes = setting_changes()
     models = models_of("main")
+    changes = {model: all_changes[model, SPATIAL] for model in models}
+    drops = {}
+    for model in models:
+        drops[model] = rows[model, EXPLICIT].average - rows[model, SPATIAL].average
     every = len(published_tasks("main"))
     some = len(defined_tasks(rows[models[0], SPATIAL]))
     yield f"## Spatial: {some} tasks against {every}"
@@ -287,19 +225,17 @@ def _spatial() -> Iterator[str]:
         cells = (explicit, change.first, change.second, drops[model], _signed(change))
         lines.append((model, *cells))
     yield table(heads, lines)
-    printed = sorted(models, key=drops.__getitem__)
-    same = sorted(models, key=lambda model: -changes[model].change)
-    yield _text(
-        f"From the smallest drop to the largest, as printed: {', '.join(printed)};",
-        f"on the same tasks: {', '.join(same)}.",
-    )
 
 
 def _starts() -> Iterator[str]:
+    direct = rows_of("main")
+    staged = rows_of("context")
+    shortest = _stages_text(staged_options()[0].stages)
     lines = []
     differing = 0
     clear = 0
-    for model, task, change in shortest_context():
+    for model, task in itertools.product(models_of("context"), published_tasks("context")):
+        change = compare(direct[model, DIRECT], staged[model, shortest], (task,))
         lines.append((model, task, change.first, change.second, _signed(change)))
         differing += change.change != 0
         clear += change.is_clear
@@ -317,25 +253,26 @@ def _starts() -> Iterator[str]:
 def _trend() -> Iterator[str]:
     rows = rows_of("context")
     tasks = published_tasks("context")
-    steps = context_steps()
-    rises = sum(step.change.change > 0 for step in steps)
-    clear = sum(step.change.is_clear for step in steps)
+    stages = [_stages_text(options.stages) for options in staged_options()]
+    steps = []
+    lines = []
+    for model in models_of("context"):
+        cells = [model]
+        for before, after in itertools.pairwise(stages):
+            change = compare(rows[model, before], rows[model, after], tasks)
+            steps.append(change)
+            cells.append(f"{change.first} → {change.second}: {_signed(change)}")
+        whole = compare(rows[model, stages[0]], rows[model, stages[-1]], tasks)
+        lines.append((*cells, _signed(whole)))
+    rises = sum(step.change > 0 for step in steps)
+    clear = sum(step.is_clear for step in steps)
     yield "## Context: does success fall with every stage?"
     yield _text(
         f"Of {len(steps)} steps to one more stage, {rises} are up, and",
         f"{clear or 'none'} has an interval without zero.",
         "From the shortest context to the longest every model falls.",
     )
-    lines = []
-    for model in models_of("context"):
-        own = [step for step in steps if step.model == model]
-        cells = [model]
-        for step in own:
-            change = step.change
-            cells.append(f"{change.first} → {change.second}: {_signed(change)}")
-        whole = compare(rows[model, own[0].before], rows[model, own[-1].after], tasks)
-        lines.append((*cells, _signed(whole)))
-    heads = [f"{step.before} → {step.after}" for step in own]
+    heads = [f"{before} → {after}" for before, after in itertools.pairwise(stages)]
     yield table(("model", *heads, "first to last"), lines)
 
 
@@ -400,15 +337,14 @@ def _by_setting(texts: Mapping[tuple[str, str], str]) -> str:
 
 
 def _widths() -> Iterator[str]:
-    usual = half_widths()
     real, _ = TRIALS["real"]
-    low, high = _of_cell(50, real)
+    usual = f"{half_width(10, CELL)} to {half_width(50, CELL)}"
     yield "## How wide is a cell?"
     yield table(
         ("table", "trials of a cell", "half the 95 % interval, points"),
         [
-            ("main, planner, context", CELL, f"{min(usual):.0f} to {max(usual):.0f} (10 to 90 %)"),
-            ("real world", real, f"{50 * (high - low):.0f} (50 %)"),
+            ("main, planner, context", CELL, f"{usual} (10 to 90 %)"),
+            ("real world", real, f"{half_width(50, real)} (50 %)"),
         ],
     )
     apart = 100 * critical_value() * math.sqrt(2 * 0.25 / CELL)

@@ -9,7 +9,6 @@ import tomllib
 from collections import defaultdict
 from typing import NamedTuple
 
-import draw_layout
 import layout
 import pytest
 from house_rooms import PACKAGE, PACKAGES, ROOT, SOURCES, TESTS, house_files
@@ -184,10 +183,6 @@ def test_rooms_import_each_other_in_no_circle():
     check_empty(layout.circles(layout.arrows()))
 
 
-def test_files_import_each_other_in_no_circle():
-    check_empty(layout.file_circles())
-
-
 def test_the_package_has_few_rooms_and_few_imports_between_them():
     assert len(layout.arrows()) <= MOST_ROOMS, sorted(layout.arrows())
     assert sum(map(len, layout.arrows().values())) <= MOST_ARROWS, {
@@ -258,9 +253,9 @@ def test_no_room_but_the_package_itself_imports_the_api():
     assert [room for room, others in layout.arrows().items() if "api" in others] == ["roboirg"]
 
 
-def test_the_picture_of_the_layout_is_up_to_date():
-    drawn = draw_layout.FILE.read_text(encoding="utf-8")
-    assert drawn == draw_layout.picture(), "draw it anew: python scripts/draw_layout.py"
+def test_the_table_of_rooms_is_up_to_date():
+    page = layout.PAGE.read_text(encoding="utf-8")
+    assert page == layout.page_text(), "write it anew: python scripts/layout.py"
 
 
 def repeated(places):

@@ -43,8 +43,7 @@ def test_every_task_has_its_splits_in_the_shipped_file():
 def test_the_episodes_of_each_task_are_still_those_of_the_shipped_fingerprint(task):
     assert fingerprint(episodes_of(task)) == shipped_splits()[task].sha256, (
         f"The episodes of {task} are not those for which the splits were built; if that is wanted, "
-        f"run: python scripts/build_splits.py --tasks {task} "
-        "--out src/roboirg/tasks/splits/splits.json"
+        f"run: python scripts/build_splits.py --tasks {task}"
     )
 
 

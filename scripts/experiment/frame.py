@@ -15,10 +15,7 @@ from msgspec.structs import replace
 from experiment.playing import START_STEP, Wanted, wanted_plays
 from experiment.store import Entry
 from experiment.study import TRUTH, Study, Trial
-from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.frame import make_frame
-from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
-from roboirg.analysis.tables.rendering.markdown import markdown
 from roboirg.core.errors import RoboIRGError
 from roboirg.policies.by_name.finding import policy_of
 from roboirg.policies.resolving.resolving_policy import PASSED_ON, RESOLVED
@@ -28,7 +25,7 @@ from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.play.episode_record import begin_record, conclude_episode
 from roboirg.runs.run.executor import choose_executor
 from roboirg.runs.run.runner import episode_runner
-from roboirg.util.atomic_write import replacing, write_atomically
+from roboirg.util.atomic_write import replacing
 
 COLUMNS = (
     "policy", "policy_seed", "task", "suite", "split", "episode", "setting", "form",
@@ -48,7 +45,7 @@ COMPARED = (
 
 
 def write_frame(study: Study) -> None:
-    """Write a row for each trial that was played, and the paper's tables of them.
+    """Write a row for each trial that was played.
 
     `roboirg.measure` takes the frame as it takes that of `roboirg.results`; the seed of a training
     is in the place of a policy's seed.
@@ -66,12 +63,6 @@ def write_frame(study: Study) -> None:
     path = study.results / f"{study.name}.csv.xz"
     with replacing(path) as part:
         table.to_csv(part, index=False, compression="xz")
-    data = RunData(frame)
-    texts = []
-    for which in WHICH:
-        if is_informative(which, data):
-            texts.append(markdown(make_table(which, data, published=True)))
-    write_atomically(path.with_name(f"{study.name}.md"), "\n".join(texts))
     print(f"{path}: {len(results):,} trials")
 
 

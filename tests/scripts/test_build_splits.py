@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import build_splits
 import pytest
@@ -34,52 +35,41 @@ def search_that_ends_with_the_first_episode(monkeypatch):
     monkeypatch.setattr(seed_selection, "find_seeds", find_seeds)
 
 
-def test_splits_that_are_built_anew_are_printed_as_they_are_shipped(
-    search_that_ends_with_the_first_episode, capsys
+def test_splits_that_are_built_anew_are_as_they_are_shipped(
+    search_that_ends_with_the_first_episode, tmp_path
 ):
-    """The program that made the shipped file of seeds selects them again for the val split of two
-    tasks, and keeps those of the others. As nothing has changed since, the result is that file, in
-    whatever order the searches for single episodes end (here: backwards)."""
-    build_splits.build_splits(tasks="VideoPlaceOrder,PickXtimes", split="val", workers=0)
+    """The program that made the shipped file of seeds selects them again for two tasks, and
+    keeps those of the others. As nothing has changed since, the result is that file, in whatever
+    order the searches for single episodes end (here: backwards)."""
+    file = tmp_path / "splits.json"
 
-    assert capsys.readouterr().out == seed_selection.splits_text(shipped_splits())
+    build_splits.build_splits(tasks="VideoPlaceOrder,PickXtimes", workers=0, out=file)
+
+    assert file.read_text() == seed_selection.splits_text(shipped_splits())
 
 
 def test_building_splits_reports_each_rejected_seed_and_its_progress(
-    search_that_ends_with_the_first_episode, capsys
+    search_that_ends_with_the_first_episode, tmp_path, capsys
 ):
-    """Of the 50 val episodes of VideoPlaceOrder RoboMME has published 48, whose seeds are known.
-    Seeds are searched for the other two, and the scenes of some seeds have no room for all things.
-    """
-    build_splits.build_splits(tasks="VideoPlaceOrder", split="val", workers=0)
+    """Of the 200 episodes of VideoPlaceOrder RoboMME has published 195, whose seeds are known.
+    Seeds are searched for the other five, and the scenes of some have no room for all things."""
+    build_splits.build_splits(tasks="VideoPlaceOrder", workers=0, out=tmp_path / "splits.json")
 
     reported = capsys.readouterr().err
     assert re.search(r"VideoPlaceOrder/val/\d+: seed \d+ is rejected, no room", reported)
-    assert "episodes 2/2" in reported
-
-
-def test_splits_are_written_to_the_file_that_is_named(
-    search_that_ends_with_the_first_episode, tmp_path
-):
-    """The seeds of one split are selected again; the file is the one that is shipped, unchanged."""
-    file = tmp_path / "splits.json"
-
-    build_splits.build_splits(tasks="VideoPlaceOrder", split="val", workers=0, out=str(file))
-
-    assert file.read_text() == seed_selection.splits_text(shipped_splits())
+    assert "episodes 5/5" in reported
 
 
 @pytest.mark.parametrize(
     ("chosen", "sentence"),
     [
         ({"tasks": "PickXtime"}, "There is no task 'PickXtime'"),
-        ({"split": "dev"}, "There is no split 'dev'"),
         ({"workers": -1}, "workers is -1"),
-        ({"out": "nowhere/splits.json"}, "There is no folder for 'nowhere/"),
+        ({"out": Path("nowhere/splits.json")}, "There is no folder for 'nowhere/"),
     ],
 )
 def test_what_is_wrong_is_refused(chosen, sentence):
-    """An unknown task, an unknown split, a negative number of processes and a folder that is not
-    there are refused in a sentence that names the value."""
+    """An unknown task, a negative number of processes and a folder that is not there are refused in
+    a sentence that names the value."""
     with pytest.raises(RoboIRGError, match=re.escape(sentence)):
         build_splits.build_splits(**chosen)

@@ -3,6 +3,7 @@
 import csv
 import json
 
+import pandas as pd
 import pytest
 import rate_words
 from page_text import call
@@ -187,21 +188,21 @@ def read_sheets(rating):
     sheets = []
     for path in rating.glob("sheet-*.csv"):
         _, *rows = csv.reader(path.open())
-        sheets.append([(row[0], row[1]) for row in rows])
+        sheets.append([(int(row[0]), row[1]) for row in rows])
     return sheets
 
 
 def test_raters_get_one_text_of_each_scenario(rating):
     """The two tasks share scenarios ("frames")."""
-    rows = rate_words.read_key(rating / "key.csv").values()
-    assert len({(row["setting"], row["frame"]) for row in rows}) == len(rows)
+    key = rate_words.read_key(rating / "key.csv")
+    assert not key.duplicated(["setting", "frame"]).any()
 
 
 def test_three_raters_get_the_texts_of_the_key_in_other_orders(rating):
     """`rating` is a folder with the key, which tells the scenario of each numbered text, and three
     sheets with the same texts, each in an order of its own, so that no text is always the last.
     """
-    texts = {number: row["text"] for number, row in rate_words.read_key(rating / "key.csv").items()}
+    texts = rate_words.read_key(rating / "key.csv")["text"].to_dict()
     first, second, third = read_sheets(rating)
 
     assert dict(first) == dict(second) == dict(third) == texts
@@ -215,9 +216,9 @@ def test_raters_table_has_intervals_around_equal_ratings(rating):
     better; so it is wider than a point although no two ratings differ.
     """
     key = rate_words.read_key(rating / "key.csv")
-    ratings = dict.fromkeys(key, 4.0)
+    ratings = pd.DataFrame({"one rater": 4.0, "another": 4.0}, key.index)
 
-    direct, reasoning = rate_words.rows(key, [ratings, ratings])
+    direct, reasoning = rate_words.rows(key, ratings)
 
     for setting, _, mean, interval, _ in (direct, reasoning):
         low, high = interval.split(" to ")
@@ -227,5 +228,7 @@ def test_raters_table_has_intervals_around_equal_ratings(rating):
 
 def test_an_empty_rating_is_refused_with_its_number(rating):
     """The sheet is as it was written: no rating is filled in."""
-    with pytest.raises(SystemExit, match=r"rates text \d+ ''; it must be a number"):
-        rate_words.read_ratings(rating / "sheet-1.csv", rate_words.read_key(rating / "key.csv"))
+    key = rate_words.read_key(rating / "key.csv")
+
+    with pytest.raises(SystemExit, match=r"needs a number from 1 to 5 as the rating of texts 1, 2"):
+        rate_words.read_ratings(rating / "sheet-1.csv", key.index)
