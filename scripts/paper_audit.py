@@ -116,17 +116,19 @@ PAPER_AUTHORS = [
 ]
 
 
-@item("cite", "paper and RoboMME are cited with their authors, and README says where")
+@item("cite", "paper and RoboMME with their authors, and the project page, are cited everywhere")
 def _() -> str:
     cff = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     paper = cff["preferred-citation"]
     robomme = cff["references"][0]
     authors = [f"{author['family-names']}, {author['given-names']}" for author in paper["authors"]]
     same(authors, PAPER_AUTHORS)
+    says("README.md", "Aernaer Akelijiang, Jiannan Li")
     same([len(robomme["authors"]), robomme["authors"][0]["family-names"]], [9, "Dai"])
     same(paper["identifiers"][0]["value"], "arXiv:2609.34384")
     same(robomme["identifiers"][0]["value"], "arXiv:2603.04639")
-    return says("README.md", "by Akelijiang et al.", "arXiv:2609.34384", "(both in `CITATION.cff`)")
+    project = "aernar.github.io/RoboIRGBench/"
+    return says("README.md", "arXiv:2609.34384", "arxiv.org/abs/2603.04639", project)
 
 
 @item("independent", "the first sentence says that this is an independent implementation")
