@@ -90,6 +90,9 @@ def _() -> str:
 def _() -> str:
     paper = {"pi0.5", "TTT-Expert", "FrameS-Modul", "GroundSG-QwenVL", "GroundSG-Gemini", "MemER"}
     same(set(all_systems()), paper | {"GroundSG-oracle"})
+    for page in ("README.md", "docs/policies.md", "docs/planners.md", "CHANGELOG.md"):
+        if "seven systems" in read(page):
+            raise AssertionError(f"{page} speaks of seven systems")
     return says("docs/planners.md", "GroundSG with the oracle is RoboMME's.")
 
 

@@ -91,8 +91,9 @@ def _variants(task: Task) -> list[str]:
 def _harder_variants(task: str) -> list[str]:
     """Return the harder settings of a task that can express a test episode."""
     harder = [name for name, setting in all_settings().items() if setting.plain is not None]
-    told = {said.setting for _, said in instructions(_episodes([task]), harder, ["implicit"])}
-    return [name for name in harder if name in told]
+    said = instructions(_episodes([task]), harder, ["implicit"])
+    expressed = {instruction.setting for _, instruction in said}
+    return [name for name in harder if name in expressed]
 
 
 def _episodes(tasks: Iterable[str]) -> Iterator[Episode]:
@@ -101,8 +102,8 @@ def _episodes(tasks: Iterable[str]) -> Iterator[Episode]:
 
 def _patterns_by_task() -> str:
     """Return how many test episodes of each task have each reasoning pattern."""
-    told = instructions(_episodes(all_tasks()), ["reasoning"], ["implicit"])
-    counts = metadata_counts((said for _, said in told), "pattern")
+    said = instructions(_episodes(all_tasks()), ["reasoning"], ["implicit"])
+    counts = metadata_counts((instruction for _, instruction in said), "pattern")
     rows = []
     for task in all_tasks():
         cells = [counts[task].get(pattern) or "–" for pattern in PATTERNS]

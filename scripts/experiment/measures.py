@@ -71,8 +71,8 @@ def measure_frame(frame: pd.DataFrame) -> list[Measure]:
     if (played.groupby("setting").nunique() > 1).any():
         raise RoboIRGError(f"Trials are missing; hear and play them:\n{played.to_string()}")
     usual[["memory", "reader"]] = usual["policy"].str.split("-", n=1, expand=True)
-    has_failed = usual["outcome"] == "failure"
-    ends = usual["failure_kind"].astype(object).fillna("undecided").where(has_failed, SUCCESS)
+    has_succeeded = usual["outcome"] == "success"
+    ends = usual["failure_kind"].astype(object).fillna("undecided").mask(has_succeeded, SUCCESS)
     measures = []
     for end in (SUCCESS, *FAILURE_KINDS):
         counted = usual.assign(number=end, value=(ends == end).astype(float))

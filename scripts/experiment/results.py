@@ -11,7 +11,7 @@ import pandas as pd
 
 from experiment.measures import ABOUT, SUCCESS, measure_frame
 from experiment.pages import FACTS, NUMBERS, write_pages
-from experiment.rewriting import rewrite
+from experiment.rewriting import text_of
 from experiment.study import Study, body_of, reader_of
 from roboirg.analysis.measures.chance import floor_level
 from roboirg.analysis.measures.measure import ALL_TASKS
@@ -94,7 +94,7 @@ def _facts(study: Study, jobs: Sequence[Job]) -> dict[str, str]:
             found[f"looks at `{split}`"] = str(times)
     words: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for job in jobs:
-        words[job.setting].update(split_words(rewrite("", 0, job)["heard"]))
+        words[job.setting].update(split_words(text_of(job)))
     for row in study.rows():
         parameters = []
         for name, net in body_of(row.body).nets.items():

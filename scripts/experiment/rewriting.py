@@ -19,11 +19,17 @@ KNOWN_WORDS = "train"
 
 
 @functools.cache
+def text_of(job: Job) -> str:
+    """Return everything that is said, as a policy hears it."""
+    return SpokenInstruction(instruct_job(job).turns, job.options.delivery).prompt
+
+
+@functools.cache
 def rewrite(namer: str, seed: int, job: Job) -> dict[str, Any]:
     """Return what ``resolve:NAMER`` passes on to a policy in a job, as the record of a run has it.
 
     Args:
-        namer: a rule, or ``learned:FILE``; empty if nothing is rewritten.
+        namer: a rule, or ``learned:FILE``.
         seed: of the run, from which the draws of a rule follow.
         job: without policy.
 
@@ -31,9 +37,7 @@ def rewrite(namer: str, seed: int, job: Job) -> dict[str, Any]:
         ``heard``: the words. ``understood``: the goal that they state; missing if none was named,
         and then the words are those that were said.
     """
-    text = SpokenInstruction(instruct_job(job).turns, job.options.delivery).prompt
-    if not namer:
-        return {"heard": text}
+    text = text_of(job)
     episode = PreparedJob(job).episode
     rewriting = Rewriting(namer, {}, "", None)
     made = namer_of(rewriting, episode_policy_seed(seed, episode.seed, job.arm))

@@ -15,7 +15,7 @@ import torch
 from pydantic import BaseModel, BeforeValidator, Field
 
 import roboirg_learn
-from experiment.rewriting import KNOWN_WORDS, rewrite
+from experiment.rewriting import KNOWN_WORDS, rewrite, text_of
 from experiment.store import Key, Store
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.policy_ref import BEHIND, RESOLVE, PolicyRef, unknown_policy
@@ -211,6 +211,8 @@ class Trial(NamedTuple):
     @property
     def reported(self) -> dict[str, Any]:
         """What the row's reader hears, and how a rewriter understood it, as in `rewrite`."""
+        if not self.row.namer:
+            return {"heard": text_of(self.job)}
         return rewrite(self.row.namer, self.row.seed, self.job)
 
     @property

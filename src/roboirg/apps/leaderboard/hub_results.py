@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 
 import yaml
 
@@ -36,13 +37,7 @@ def hub_results(frame: Frame, dataset: str) -> str:
         raise InvalidValueError(f"dataset is {dataset!r}; it must be OWNER/NAME.")
     frame = frame.without_control_arms().where(form="implicit")
     run = only_policy_run(frame)
-    rates = {}
-    for row in measure(frame, ["setting"]):
-        (setting,) = row.key
-        tasks = [task for task in all_tasks().values() if setting in settings_of(task)]
-        has_all = row.counts.is_complete and len(row.cells) == len(tasks)
-        if row.rate is not None and has_all:
-            rates[setting] = float(row.rate)
+    rates = _complete_rates(frame)
     is_of_test = run.conditions.split == "test" and run.conditions.wordings is None
     if run.is_privileged or not is_of_test or not rates.keys() >= {"spatial", "grounded"}:
         raise InvalidValueError(
@@ -60,3 +55,17 @@ def hub_results(frame: Frame, dataset: str) -> str:
         }
         entries.append(entry)
     return yaml.safe_dump(entries, sort_keys=False)
+
+
+def _complete_rates(frame: Frame) -> dict[str, float]:
+    """Return the rate of each setting of which all tasks are complete."""
+    tasks_of = Counter[str]()
+    for task in all_tasks().values():
+        tasks_of.update(settings_of(task))
+    rates = {}
+    for row in measure(frame, ["setting"]):
+        (setting,) = row.key
+        has_all_tasks = len(row.cells) == tasks_of[setting]
+        if row.rate is not None and row.counts.is_complete and has_all_tasks:
+            rates[setting] = float(row.rate)
+    return rates
