@@ -85,7 +85,7 @@ demo: setup ## the main job: three policies, every task and setting; ends with a
 	@.venv/bin/roboirg report runs/demo >/dev/null && echo runs/demo/report.html
 
 play: learn ## a policy that learned, from its two files in results/; ends with a table and a page
-	.venv/bin/roboirg run --policy 'small=trained:results/recurrent.body.safetensors?reader=results/recurrent.reader.safetensors' --tasks PickXtimes,VideoRepick --episodes 2 --video all --out runs/small
+	.venv/bin/roboirg run --policy 'small=trained:results/weights/recurrent-0.body.safetensors?reader=results/weights/all-0.reader.safetensors' --tasks PickXtimes,VideoRepick --episodes 2 --video all --out runs/small
 	@.venv/bin/roboirg report runs/small >/dev/null && echo runs/small/report.html
 
 card: dev ## write docs/language-card.md anew, after a change of words or episodes

@@ -29,9 +29,9 @@ from roboirg_learn.policy.recording_files import load_recording, save_recording
 from roboirg_learn.policy.sight import encode_yaws, object_classes_of
 from roboirg_learn.policy.timing import DUE_TIME, passes_so_far, steps_to_act, timed_move
 
-RESULTS = Path(__file__).parents[3] / "results"
+WEIGHTS = Path(__file__).parents[3] / "results" / "weights"
 SHIPPED = PolicyFiles(
-    RESULTS / "recurrent.body.safetensors", RESULTS / "recurrent.reader.safetensors"
+    WEIGHTS / "recurrent-0.body.safetensors", WEIGHTS / "all-0.reader.safetensors"
 )
 
 
