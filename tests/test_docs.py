@@ -41,7 +41,12 @@ MOST_WORDS = {"README.md": 1100, "CHANGELOG.md": 1800}
 MOST_WORDS_OF_A_PAGE = 1200
 SETTINGS = ("explicit", "direct", "reasoning", "contextual", "spatial")
 """The columns of the tables of results."""
-GENERATED = ("language-card.md", "published-figures.md", "scenario-marks.md")
+GENERATED = (
+    "attribution-rates.md",
+    "language-card.md",
+    "published-figures.md",
+    "scenario-marks.md",
+)
 """Pages that programs write, which are not read from beginning to end."""
 
 

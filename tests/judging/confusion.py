@@ -1,6 +1,7 @@
-"""How well failures are attributed whose cause is known: tables for docs/attribution.md.
+"""How well failures are attributed whose cause is known: tables for docs/attribution-rates.md.
 
-``python tests/judging/confusion.py`` writes them there, from the stored facts of each half.
+``python tests/judging/confusion.py`` writes them there, from the stored facts of each half, and the
+names of failures into docs/attribution.md.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ from roboirg.stats.intervals import interval_of_values
 from roboirg.tasks import get_task
 
 HERE = Path(__file__).parent
-DOCUMENT = HERE.parents[1] / "docs" / "attribution.md"
+DOCS = HERE.parents[1] / "docs"
+NAMES_PAGE = DOCS / "attribution.md"
+RATES_PAGE = DOCS / "attribution-rates.md"
 HALVES = {
     "development": HERE / "made_failures.jsonl.xz",
     "held back": HERE / "held_back.jsonl.xz",
@@ -225,11 +228,11 @@ def put_in(document, mark, text):
 
 
 def main():
-    document = put_in(DOCUMENT.read_text(), "failures", failures_table())
+    NAMES_PAGE.write_text(put_in(NAMES_PAGE.read_text(), "failures", failures_table()))
+    rates = RATES_PAGE.read_text()
     for half, path in HALVES.items():
-        if path.exists():
-            document = put_in(document, half, table(pairs(read_courses(path))))
-    DOCUMENT.write_text(document)
+        rates = put_in(rates, half, table(pairs(read_courses(path))))
+    RATES_PAGE.write_text(rates)
 
 
 if __name__ == "__main__":

@@ -45,7 +45,7 @@ def test_failures_with_a_known_cause_are_attributed_to_the_right_kind():
     so that its right kind is known: *grounding* (did something else than was meant) or *execution*
     (did not complete it). Of those that are attributed to one of the two, at least 95 % must get
     the right one; so must 90 % of each cause's on average; at most 5 % may stay undecided. Today's
-    shares (docs/attribution.md) are a few points better."""
+    shares (docs/attribution-rates.md) are a few points better."""
     found = confusion.scores(pairs_of("development"))
 
     assert found.of_decided >= 0.95
@@ -70,12 +70,12 @@ def test_failures_with_a_known_cause_get_its_name_in_most_cases(name):
     assert right_names >= 0.6 * made
 
 
-@pytest.mark.parametrize("half", [half for half, path in confusion.HALVES.items() if path.exists()])
+@pytest.mark.parametrize("half", confusion.HALVES)
 def test_the_documentation_has_the_current_tables_of_attribution(half):
-    """docs/attribution.md has a table for each half of the stored failures of known cause, such as
-    *development*: how often which kind was made, and found. To put the table of today's rules in
-    its place must leave the page as it is."""
-    page = confusion.DOCUMENT.read_text()
+    """docs/attribution-rates.md has a table for each half of the stored failures of known cause,
+    such as *development*: how often which kind was made, and found. To put the table of today's
+    rules in its place must leave the page as it is."""
+    page = confusion.RATES_PAGE.read_text()
 
     table = confusion.table(pairs_of(half))
 
@@ -85,7 +85,7 @@ def test_the_documentation_has_the_current_tables_of_attribution(half):
 def test_the_documentation_has_the_current_table_of_failures():
     """The page lists the names of all failures. To put in the list that is made from the code must
     leave the page as it is."""
-    page = confusion.DOCUMENT.read_text()
+    page = confusion.NAMES_PAGE.read_text()
 
     assert confusion.put_in(page, "failures", confusion.failures_table()) == page
 
