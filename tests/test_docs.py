@@ -224,16 +224,9 @@ def tasks_with_rates(row):
 
 
 def test_percentages_in_readme_are_those_of_the_published_table(best_published):
-    """README quotes means over tasks of the best published model. Spatial instructions exist for
-    seven tasks alone, so their mean is next to that of explicit ones for the same seven."""
-    explicit = best_published["explicit"]
-    spatial = best_published["spatial"]
-
-    same_tasks = explicit.average_over(tasks_with_rates(spatial))
-
-    assert f"succeeds in {explicit.average:.0f} %" in README
+    """README quotes means over tasks of the best published model."""
+    assert f"succeeds in {best_published['explicit'].average:.0f} %" in README
     assert f"{best_published['reasoning'].average:.0f} % is left with reasoning" in README
-    assert f"7 tasks: {spatial.average:.0f} %, next to {same_tasks:.0f} % explicit" in README
 
 
 def test_readme_rightly_says_that_a_third_is_lost_with_direct_and_over_half_with_others(
