@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 from written_parts import table, with_part
@@ -83,32 +83,35 @@ def read_numbers(path: Path) -> pd.DataFrame:
     """
     numbers = pd.read_csv(path, dtype={"by_seed": str})
     by_seed = numbers["by_seed"].str.split()
-    numbers["trainings"] = by_seed.str.len().map("{:.0f}".format, na_action="ignore")
-    numbers["trainings"] = numbers["trainings"].fillna(NOT_APPLICABLE)
+    trainings = by_seed.str.len().map("{:.0f}".format, na_action="ignore")
+    numbers["trainings"] = trainings.fillna(NOT_APPLICABLE)
     numbers["text"] = [_text(line) for line in numbers.to_dict("records")]
     for name, first in ORDER.items():
         numbers[name] = pd.Categorical(numbers[name], dict.fromkeys([*first, *numbers[name]]))
     return numbers.sort_values(list(ORDER), kind="stable")
 
 
-def _text(line: Mapping[str, float]) -> str:
-    """Return a rate as ``78 (74–82)``, in percent; a difference as ``−3 (−8 to +2)``, in points."""
+def _text(line: Mapping[str, Any]) -> str:
+    """Return a rate as ``78<br>74–82``, in percent; a difference as ``−3<br>−8 to +2``, in points.
+
+    The interval has a line of its own, so that tables are narrow.
+    """
     show: Callable[[float], str] = whole_percent
     between = "–"
-    if OVER in str(line["number"]):
+    if OVER in line["number"]:
         show = points
         between = " to "
     text = show(line["value"])
     if pd.isna(line["low"]):
         return text
-    return f"{text} ({show(line['low'])}{between}{show(line['high'])})"
+    return f"{text}<br>{show(line['low'])}{between}{show(line['high'])}"
 
 
 def with_numbers(page: str, numbers: pd.DataFrame, facts: Mapping[str, str]) -> str:
     """Return a page with its tables written and its slots filled.
 
-    A slot is ``<!-- counting, recurrent, all, direct, success -->78 (74–82)<!-- -->``: scope,
-    memory, reader, setting and number of a `Measure`.
+    A slot is ``<!-- counting, recurrent, all, direct, success -->78<!-- -->``: scope, memory,
+    reader, setting and number of a `Measure`; it shows no interval.
 
     Raises:
         KeyError: there is no number for a slot.
@@ -117,7 +120,7 @@ def with_numbers(page: str, numbers: pd.DataFrame, facts: Mapping[str, str]) -> 
         page = with_part(page, name, _table(name, numbers, facts))
     texts = {}
     for scope, memory, reader, setting, number, *_, text in numbers.itertuples(index=False):
-        texts[f"{scope}, {memory}, {reader}, {setting}, {number}"] = text
+        texts[f"{scope}, {memory}, {reader}, {setting}, {number}"] = text.split("<br>")[0]
     slot = r"(<!-- (\w[^<>]+,[^<>]+) -->)[^<]*(?=<!-- -->)"
     return re.sub(slot, lambda found: found[1] + texts[found[2]], page)
 
