@@ -84,7 +84,7 @@ demo: setup ## the main job: three policies, every task and setting; ends with a
 	.venv/bin/roboirg run --plan demo --out runs/demo
 	@.venv/bin/roboirg report runs/demo >/dev/null && echo runs/demo/report.html
 
-play: learn ## a policy that learned, from its two files in results/; ends with a table and a page
+play: learn ## a policy that learned, from its two files in results/weights; ends with a table and a page
 	.venv/bin/roboirg run --policy 'small=trained:results/weights/recurrent-0.body.safetensors?reader=results/weights/all-0.reader.safetensors' --tasks PickXtimes,VideoRepick --episodes 2 --video all --out runs/small
 	@.venv/bin/roboirg report runs/small >/dev/null && echo runs/small/report.html
 
