@@ -90,15 +90,18 @@ def test_a_cluster_that_loses_a_machine_half_way_gives_the_same_records_as_one_p
 def test_a_run_on_a_cluster_is_decided_at_the_same_scene_as_in_one_process(
     cluster_with_one_cpu, tmp_path
 ):
-    """Three workers play scenes ahead of the decision, and these count nowhere."""
+    """Three workers play scenes ahead of the decision, and these count nowhere.
+
+    How many depends on the machine: all, if the worker of the first scene is slow.
+    """
     cluster_with_one_cpu.add_node(num_cpus=2)
     ray.init(address=cluster_with_one_cpu.address, log_to_driver=False)
     plan = two_policies()
-    run_plan(plan, tmp_path / "alone", Lucky(), InProcess())
+    alone = run_plan(plan, tmp_path / "alone", Lucky(), InProcess())
 
-    summary = run_plan(plan, tmp_path / "cluster", Lucky(seconds=0.05), RayCluster())
+    run_plan(plan, tmp_path / "cluster", Lucky(seconds=0.05), RayCluster())
 
-    assert summary.spared > 0
+    assert alone.spared > 0
     assert found_in(tmp_path / "cluster", plan) == found_in(tmp_path / "alone", plan)
 
 
