@@ -12,8 +12,9 @@ import msgspec
 from msgspec.structs import replace
 
 from experiment.hearing import heard_goal
+from experiment.rehearsing import WatchedPolicy, known_scene
 from experiment.store import Entry, Key
-from experiment.study import Study, Trial, body_of, circumstances, show
+from experiment.study import Study, Trial, body_of, circumstances, detector_of, show
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import encode
@@ -28,6 +29,7 @@ from roboirg_learn.learn_support import check_learn_support
 from roboirg_learn.policy.learned_policy import LearnedPolicy
 from roboirg_learn.policy.policy_model import PolicyModel
 from roboirg_learn.policy.subgoal_following import LearnedHands
+from roboirg_learn.policy.trained_body import TrainedBody
 from roboirg_learn.policy.trained_reader import HeardGoal
 
 UNHEARD = InstructionOptions()
@@ -92,7 +94,8 @@ def play_missing(study: Study) -> None:
 def play_wanted(every: Sequence[Wanted], job: Job) -> Record:
     """Play a job as a run does, with a body that is given its goal; return the record.
 
-    Runs in worker processes.
+    Runs in worker processes. If the body does what was done before in the scene, the record is that
+    of then.
 
     Args:
         every: what is played.
@@ -100,9 +103,13 @@ def play_wanted(every: Sequence[Wanted], job: Job) -> Record:
     """
     check_learn_support()
     wanted = every[job.policy_seed]
-    body = body_of(wanted.trial.row.body)
-    model = PolicyModel(body, cast("Any", GoalGiven(wanted.heard)))
-    policy = LearnedPolicy(model) if body.planner is None else LearnedHands(model)
+    scene = known_scene(replace(job, policy_seed=0))
+    path = wanted.trial.row.body
+    body = scene.with_eyes(body_of(path), detector_of(path))
+    known = scene.rehearse(_acting(body, wanted.heard))
+    if known is not None:
+        return replace(known, policy_seed=job.policy_seed)
+    policy = WatchedPolicy(_acting(body, wanted.heard))
     prepared = PreparedJob(job)
     record = begin_record(prepared)
     try:
@@ -117,7 +124,15 @@ def play_wanted(every: Sequence[Wanted], job: Job) -> Record:
     record.policy_metadata = {START_STEP: loop.start_step}
     record.duration_s = round(sum(record.timings.values()), 3)
     record.timings = {}
+    if record.outcome != "error":
+        scene.keep(policy, record)
     return record
+
+
+def _acting(body: TrainedBody, heard: HeardGoal) -> LearnedPolicy:
+    """Return a body as a policy that was given its goal."""
+    model = PolicyModel(body, cast("Any", GoalGiven(heard)))
+    return LearnedPolicy(model) if body.planner is None else LearnedHands(model)
 
 
 @dataclass(frozen=True)

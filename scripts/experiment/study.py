@@ -218,7 +218,7 @@ class Trial(NamedTuple):
     @property
     def looks_name(self) -> str:
         """Of the file with the first looks: all that they depend on."""
-        made_by = f"{_detector_of(self.row.body)}-{circumstances()['code']}"
+        made_by = f"{detector_of(self.row.body)}-{circumstances()['code']}"
         return f"{made_by}/{self.episode.key.replace('/', '-')}.npz"
 
     @property
@@ -226,7 +226,7 @@ class Trial(NamedTuple):
         """All that decides what the row's reader hears."""
         return {
             "reader": file_hash(self.row.reader),
-            "detector": _detector_of(self.row.body),
+            "detector": detector_of(self.row.body),
             "episode": self.episode.key,
             "text": short_hash(self.reported["heard"]),
             **circumstances(),
@@ -271,7 +271,7 @@ def file_hash(path: Path) -> str:
 
 
 @functools.cache
-def _detector_of(path: Path) -> str:
+def detector_of(path: Path) -> str:
     """Return a hash of what the body of a file sees with; bodies of one training share it."""
     body = body_of(path)
     content = repr(body.object_classes).encode()
