@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -241,8 +242,6 @@ def test_a_reader_behind_a_rewriter_hears_what_it_hears_in_a_run(namer, study):
 
     A rule names no goal in spatial words, which are passed on as they were said.
     """
-    from types import SimpleNamespace
-
     from roboirg.policies.by_name.finding import rewriting_in
     from roboirg.policies.by_name.policy_kinds import put_behind, split_spec
     from roboirg.runs.job_instruction import PreparedJob, episode_policy_seed
@@ -329,6 +328,58 @@ def test_a_goal_that_is_heard_and_then_played_gives_what_a_run_with_words_record
         verified = verify_run(folder)
     assert verified.holds
     assert verified.verdicts == {"exact": 1}
+
+
+@pytest.mark.sim
+@pytest.mark.slow
+def test_what_was_done_in_a_scene_before_is_not_simulated_again(study, monkeypatch):
+    """A policy with random weights plays an episode. The same policy then gets the same record
+    without the simulator, and a simulation gives that record, too, but for its times."""
+    from experiment import playing
+
+    study.readers = ["truth"]
+    save_random_policy(study, "recurrent")
+    (wanted,) = playing.wanted_plays(study)
+    job = replace(wanted.trial.job, policy="body", policy_seed=0, options=playing.UNHEARD)
+
+    first = playing.play_wanted([wanted], job)
+    playing.known_scene.cache_clear()
+    simulated = playing.play_wanted([wanted], job)
+    monkeypatch.delattr(playing, "play_with")
+    again = playing.play_wanted([wanted], job)
+
+    assert again == simulated
+    timeless = {"started_at": "", "duration_s": 0.0}
+    assert replace(first, **timeless) == replace(simulated, **timeless)
+
+
+def test_a_policy_gets_the_record_of_an_earlier_one_that_did_the_same_and_no_other():
+    """Each policy answers some numbers, one after the other, and may name a subgoal with them. Two
+    have played in the scene; what others begin like them, but do not end so, has no record yet."""
+    pytest.importorskip("torch")
+    from experiment.rehearsing import KnownScene, WatchedPolicy
+
+    scene = KnownScene()
+    for record, answers in {"first": [1, 2], "second": [1, 3, 4]}.items():
+        policy = WatchedPolicy(answering(answers))
+        policy.reset("", {})
+        for observation in range(len(answers)):
+            policy.act(observation)
+        scene.keep(policy, record)
+
+    assert scene.rehearse(answering([1, 2])) == "first"
+    assert scene.rehearse(answering([1, 3, 4])) == "second"
+    for answers in ([2], [1, 4], [1, 3, 5]):
+        assert scene.rehearse(answering(answers)) is None
+    assert scene.rehearse(answering([1, 2], subgoal="press the button")) is None
+
+
+def answering(answers, subgoal=None):
+    """Return a policy that answers some numbers, one after the other."""
+    left = iter(answers)
+    return SimpleNamespace(
+        reset=lambda *_heard: None, act=lambda _seen: np.array([next(left)]), subgoal=subgoal
+    )
 
 
 def save_random_policy(study, memory):
