@@ -25,20 +25,18 @@ import typer
 from convert_robomme_episodes import Row, body_name, read_rows
 from rich.console import Console
 from rich.table import Table
+from seed_selection import oracle_failure
 
-from roboirg.core.episode import Episode, SceneObject, Split
-from roboirg.core.errors import MotionPlanningError
+from roboirg.core.episode import Episode, episode_key
 from roboirg.core.motions import Shuttle, Swap
 from roboirg.core.observations import Demonstration
 from roboirg.envs.environment import RoboIRGEnv
-from roboirg.envs.factory import make
-from roboirg.policies import play
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
 from roboirg.runs.plan.option_parsing import parse_names, parse_splits
 from roboirg.simulation.motion_player import shuttle_position
 from roboirg.tasks import find_tasks
 from roboirg.tasks.splits.published_episodes import published_episode
-from roboirg.tasks.splits.splits import get_episode, split_episodes
+from roboirg.tasks.splits.splits import split_episodes
 from roboirg.util.parallel_map import parallel_map
 
 ROWS = Path(__file__).parents[1] / "tests" / "episodes" / "robomme"
@@ -52,9 +50,6 @@ COARSE_LIMIT = 5e-3
 """Of the distance of a body, m."""
 TABLE_REACH = 3.0
 """m; what is farther away is out of the world."""
-
-Slot = tuple[str, Split, int]
-"""Task, split and index of an episode."""
 
 
 class VideoLength(NamedTuple):
@@ -129,26 +124,22 @@ class ComparingOracle(OraclePolicy):
         super().reset(instruction, demonstration)
 
 
-def compare(slot: Slot) -> Comparison:
+def compare(episode: Episode) -> Comparison:
     """Play an episode with the oracle and compare it with RoboMME's."""
-    episode = get_episode(*slot)
-    row = _rows()[slot]
+    row = _rows()[episode.key]
     moves = any(stage.primitive.kind == "pick_cube" for stage in episode.demonstration)
     result = Comparison(moves, episode.recorded)
     result.swaps = tuple(_swaps(episode, row, _our_names(episode, row)))
-    try:
-        info = play(make(episode, cameras=()), ComparingOracle(row, result))
-    except MotionPlanningError as error:
-        result.failure = str(error)
-    else:
-        if info["status"] != "success":
-            result.failure = str(info["cause"] or info["status"])
+    result.failure = oracle_failure(episode, ComparingOracle(row, result))
     return result
 
 
 @functools.cache
-def _rows() -> Mapping[Slot, Row]:
-    return {(row["task"], row["dataset"], row["episode"]): row for row in read_rows(ROWS)}
+def _rows() -> Mapping[str, Row]:
+    """Return RoboMME's data by the names of the episodes."""
+    return {
+        episode_key(row["task"], row["dataset"], row["episode"]): row for row in read_rows(ROWS)
+    }
 
 
 def _our_names(episode: Episode, row: Row) -> dict[str, str]:
@@ -156,12 +147,10 @@ def _our_names(episode: Episode, row: Row) -> dict[str, str]:
     names = {}
     for name, body in row["start"].items():
         if name not in (ROBOT, SITE):
-            names[name] = _nearest(episode.scene.objects, _place(body)).name
+            place = _place(body)
+            nearest = min(episode.scene.objects, key=lambda item: math.dist(item.position, place))
+            names[name] = nearest.name
     return names
-
-
-def _nearest(objects: Sequence[SceneObject], place: Sequence[float]) -> SceneObject:
-    return min(objects, key=lambda item: math.dist(item.position, place))
 
 
 def _place(body: Mapping[str, Sequence[float]] | Sequence[float]) -> Sequence[float]:
@@ -232,49 +221,46 @@ def exceptions(comparison: Comparison) -> Iterator[str]:
             yield f"{' swaps with '.join(ours)}, there {' with '.join(theirs)}"
 
 
-COLUMNS = (
-    "task",
-    "episodes",
-    "solved",
-    f"joints within {JOINT_LIMIT:g} rad",
-    "bodies within 0.1 mm",
-    "within 5 mm",
-    "frames, steps equal",
-    "swap partners",
-)
-
-
-def print_table(found: Mapping[Slot, Comparison], console: Console) -> None:
+def print_table(found: Mapping[Episode, Comparison], console: Console) -> None:
     """Print counts by task, for all, and for the episodes in whose videos the arm moves."""
     groups: dict[str, list[Comparison]] = defaultdict(list)
-    for (task, _, _), comparison in found.items():
-        groups[task].append(comparison)
+    for episode, comparison in found.items():
+        groups[episode.task].append(comparison)
     groups["all"] = list(found.values())
     moving = [comparison for comparison in found.values() if comparison.moves]
     if moving:
         groups["video with moving arm"] = moving
-    table = Table(box=None)
-    for name in COLUMNS:
-        table.add_column(name, justify="left" if name == "task" else "right")
+    table = Table("task", box=None)
+    for name in _counts([]):
+        table.add_column(name, justify="right")
     for name, group in groups.items():
-        table.add_row(name, *_cells(group))
+        table.add_row(name, *map(str, _counts(group).values()))
     console.print(table)
 
 
-def _cells(group: Sequence[Comparison]) -> Iterator[str]:
-    """Yield what `COLUMNS` say of some episodes."""
-    yield str(len(group))
-    yield str(sum(comparison.failure is None for comparison in group))
-    yield str(sum(comparison.joints <= JOINT_LIMIT for comparison in group))
-    yield str(sum(comparison.farthest <= FINE_LIMIT for comparison in group))
-    yield str(sum(comparison.farthest <= COARSE_LIMIT for comparison in group))
-    yield str(sum(comparison.our_length == comparison.their_length for comparison in group))
+def _counts(group: Sequence[Comparison]) -> dict[str, object]:
+    """Return the cells of some episodes, by the heads of their columns."""
     swaps = 0
     equal = 0
     for comparison in group:
         swaps += len(comparison.swaps)
         equal += sum(ours == theirs for ours, theirs in comparison.swaps)
-    yield f"{equal} of {swaps}" if swaps else ""
+    partners = ""
+    if swaps:
+        partners = f"{equal} of {swaps}"
+    return {
+        "episodes": len(group),
+        "solved": sum(comparison.failure is None for comparison in group),
+        f"joints within {JOINT_LIMIT:g} rad": sum(
+            comparison.joints <= JOINT_LIMIT for comparison in group
+        ),
+        "bodies within 0.1 mm": sum(comparison.farthest <= FINE_LIMIT for comparison in group),
+        "within 5 mm": sum(comparison.farthest <= COARSE_LIMIT for comparison in group),
+        "frames, steps equal": sum(
+            comparison.our_length == comparison.their_length for comparison in group
+        ),
+        "swap partners": partners,
+    }
 
 
 def main(
@@ -284,17 +270,17 @@ def main(
 ) -> None:
     """Compare the episodes; ends with 1 if the oracle fails in one of them."""
     names = find_tasks(parse_names("task", tasks))
-    slots: list[Slot] = []
+    episodes = []
     for episode in split_episodes(names, parse_splits(split)):
         if published_episode(episode.task, episode.split, episode.index):
-            slots.append((episode.task, episode.split, episode.index))
-    compared = dict(parallel_map(compare, slots, workers))
-    found = {slot: compared[slot] for slot in slots}
+            episodes.append(episode)
+    compared = dict(parallel_map(compare, episodes, workers))
+    found = {episode: compared[episode] for episode in episodes}
     console = Console(width=150)
     print_table(found, console)
-    for (task, of_split, index), comparison in found.items():
+    for episode, comparison in found.items():
         for text in exceptions(comparison):
-            console.print(f"{task}/{of_split}/{index}: {text}.", highlight=False)
+            console.print(f"{episode.key}: {text}.", highlight=False)
     if any(comparison.failure is not None for comparison in found.values()):
         sys.exit(1)
 

@@ -69,7 +69,7 @@ def write_recordings(folder: Path, out: Path) -> None:
         split = row["dataset"]
         index = row["episode"]
         source = folder / f"{split}-{task}.npz"
-        if "error" in row or (task, split, index) in INCOMPLETE or not source.exists():
+        if (task, split, index) in INCOMPLETE or not source.exists():
             continue
         with np.load(source) as recorded:
             actions = recorded[f"actions_{index}"]
@@ -88,8 +88,6 @@ def write_recordings(folder: Path, out: Path) -> None:
 def converted_lines(folder: Path) -> Iterator[str]:
     """Yield a line of JSON for each episode that builds."""
     for row in read_rows(folder):
-        if "error" in row:
-            continue
         scene, goal = CONVERTERS[row["task"]](row)
         entry = {
             "task": row["task"],
@@ -104,10 +102,13 @@ def converted_lines(folder: Path) -> Iterator[str]:
 
 
 def read_rows(folder: Path) -> Iterator[Row]:
-    """Yield every row of the three files, in the order of splits and lines."""
+    """Yield each episode of the three files that builds, in the order of splits and lines."""
     for split in SPLITS:
         with gzip.open(folder / f"{split}.jsonl.gz", "rt", encoding="utf-8") as file:
-            yield from map(json.loads, file)
+            for line in file:
+                row = json.loads(line)
+                if "error" not in row:
+                    yield row
 
 
 def body_name(reference: str | Sequence[str]) -> str:
@@ -130,24 +131,29 @@ def upright_yaw(body: Body) -> float:
     return 2.0 * math.atan2(body[6], body[3])
 
 
+def point_of(body: Body, height: float) -> Point:
+    """Return where a body is, at a height of our own."""
+    return Point(body[0], body[1], height)
+
+
 def make_button(row: Row, source: str = "button", name: str = "button") -> SceneObject:
     """Return a button at the height of its origin."""
-    x, y, *_ = row["start"][source]["pose"]
-    return SceneObject(name, "button", Point(x, y, object_sizes.BUTTON_HEIGHT))
+    body = row["start"][source]["pose"]
+    return SceneObject(name, "button", point_of(body, object_sizes.BUTTON_HEIGHT))
 
 
 def make_cube(row: Row, source: str, name: str, color: Color) -> SceneObject:
     """Return a cube that lies on the table."""
     body = row["start"][source]
-    position = Point(body[0], body[1], object_sizes.CUBE_HALF)
+    position = point_of(body, object_sizes.CUBE_HALF)
     return SceneObject(name, "cube", position, upright_yaw(body), color)
 
 
 def make_target(row: Row, source: str, name: str, radius: float, **look: Any) -> SceneObject:  # noqa: ANN401 - fields of SceneObject
     """Return a target disc."""
-    x, y, *_ = row["start"][source]
     height = look.pop("height", object_sizes.TARGET_HEIGHT)
-    return SceneObject(name, "target", Point(x, y, height), radius=radius, **look)
+    position = point_of(row["start"][source], height)
+    return SceneObject(name, "target", position, radius=radius, **look)
 
 
 def colored_cubes(row: Row) -> list[SceneObject]:
@@ -225,7 +231,7 @@ def convert_bin_fill(row: Row) -> tuple[Scene, Goal]:
     """Button, bin and cubes, numbered within their color in the order of creation."""
     facts = row["facts"]
     body = row["start"]["board_with_hole"]
-    position = Point(body[0], body[1], object_sizes.BIN_HEIGHT / 2)
+    position = point_of(body, object_sizes.BIN_HEIGHT / 2)
     bin_ = SceneObject("bin", "bin", position, upright_yaw(body))
     cubes: list[SceneObject] = []
     for source in body_names(facts["all_cubes"]):
@@ -292,7 +298,7 @@ def make_containers(row: Row) -> tuple[SceneObject, ...]:
     for number, source in enumerate(body_names(row["facts"]["spawned_bins"])):
         body = row["start"][source]
         yaw = 2.0 * math.atan2(body[5], body[4])
-        position = Point(body[0], body[1], object_sizes.CONTAINER_HEIGHT)
+        position = point_of(body, object_sizes.CONTAINER_HEIGHT)
         found.append(SceneObject(f"container_{number}", "container", position, yaw))
     return tuple(found)
 
@@ -334,8 +340,8 @@ def convert_video_repick(row: Row) -> tuple[Scene, Goal]:
 def place_scene(row: Row, site_radius: float) -> tuple[Scene, str]:
     """The table of a Place task, its video and exchange, and the color that is wanted."""
     facts = row["facts"]
-    x, y, *_ = row["start"]["goal_site"]
-    site = SceneObject("site", "site", Point(x, y, object_sizes.TARGET_HEIGHT), radius=site_radius)
+    position = point_of(row["start"]["goal_site"], object_sizes.TARGET_HEIGHT)
+    site = SceneObject("site", "site", position, radius=site_radius)
     discs = []
     for number, source in enumerate(body_names(facts["targets"])):
         discs.append(make_target(row, source, f"target_{number}", video_place.TARGET_RADIUS))
@@ -343,16 +349,16 @@ def place_scene(row: Row, site_radius: float) -> tuple[Scene, str]:
     past = tuple(past_of(row, f"cube_{color}"))
     swaps: tuple[Motion, ...] = ()
     if "swap_target_a" in facts:
-        swaps = (swap_of(row, [disc.name for disc in discs], past),)
+        swaps = (swap_of(row, discs, past),)
     objects = (site, make_button(row), *colored_cubes(row), *discs)
     return Scene(objects, swaps, past), color
 
 
-def swap_of(row: Row, discs: Sequence[str], past: tuple[Fact, ...]) -> Motion:
+def swap_of(row: Row, discs: Sequence[SceneObject], past: tuple[Fact, ...]) -> Motion:
     """Return the exchange of two discs after what the video shows."""
     first = body_name(row["facts"]["swap_target_a"])
     second = body_name(row["facts"]["swap_target_b"])
-    others = tuple(disc for disc in discs if disc not in (first, second))
+    others = tuple(disc.name for disc in discs if disc.name not in (first, second))
     return video_place.plan_swap(first, second, others, past)
 
 

@@ -12,7 +12,7 @@ from written_parts import table, with_part
 
 from roboirg.core.episode import Episode
 from roboirg.language.generator import instruct
-from roboirg.language.instruction import Described, Instruction, Mention
+from roboirg.language.instruction import Described, Instruction
 from roboirg.language.meaning import field_values
 from roboirg.language.scenarios.scenario_file import pointer_table
 from roboirg.language.settings import all_settings, plain_settings
@@ -105,21 +105,21 @@ def _meanings(said: Instruction, episode: Episode) -> Iterator[tuple[str, str, s
             operation = f"{operation} {term.rank}"
         values = field_values(said.meaning, field, episode)
         value = ", ".join(sorted(map(str, values)))
-        yield ", ".join(operands), ", ".join(_pointers(said)), operation, value
+        yield ", ".join(operands), _pointers(said), operation, value
 
 
 def _operand(operand: str | int | Described) -> str:
     return operand.phrase if isinstance(operand, Described) else str(operand)
 
 
-def _pointers(said: Instruction) -> Iterator[str]:
-    """Yield the words of the command that point back, each once."""
+def _pointers(said: Instruction) -> str:
+    """Return the words of the command that point back, each once."""
     last = len(said.utterances) - 1
-    words: dict[str, None] = {}
+    words = []
     for mention in said.mentions:
         if mention.utterance == last and mention.role == "anaphor":
-            words[f"*{said.span(mention)}*"] = None
-    yield from words
+            words.append(f"*{said.span(mention)}*")
+    return ", ".join(dict.fromkeys(words))
 
 
 def _rivals() -> str:
@@ -159,12 +159,10 @@ def marked_turns(instruction: Instruction) -> list[str]:
         text = utterance.text
         for mention in reversed(instruction.mentions):
             if mention.utterance == number:
-                sign = _sign(mention)
+                sign = "*"
+                if mention.role == "anaphor":
+                    sign = "**"
                 span = text[mention.start : mention.end]
                 text = f"{text[: mention.start]}{sign}{span}{sign}{text[mention.end :]}"
         turns.append(text)
     return turns
-
-
-def _sign(mention: Mention) -> str:
-    return "**" if mention.role == "anaphor" else "*"

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import ast
 import itertools
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -58,46 +57,46 @@ def tree(path: Path) -> ast.Module:
 
 def imported_names(path: Path) -> Iterator[str]:
     """Yield the dotted name of all that a file imports, inside functions, too."""
-    package = module_name(path.parent)
     for node in ast.walk(tree(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            base = node.module or ""
-            if node.level:
-                parts = package.split(".")
-                parent = parts[: len(parts) - node.level + 1]
-                base = ".".join([*parent, base]).rstrip(".")
             for alias in node.names:
-                name = f"{base}.{alias.name}"
-                yield name if name in modules() else base
+                name = f"{node.module}.{alias.name}"
+                yield name if name in modules() else str(node.module)
 
 
 @cache
 def imports() -> tuple[Import, ...]:
-    """Return every import of one file of the package by another one, each once."""
-    found: dict[Import, None] = {}
+    """Return every import of one file of the package by another one."""
+    found = []
     for source, path in modules().items():
         for target in imported_names(path):
             if target in modules() and target != source:
-                found[Import(source, target)] = None
+                found.append(Import(source, target))
     return tuple(found)
 
 
-def room_of(module: str) -> str:
-    """Return the folder or module at the top of the package that holds a module."""
-    return module.split(".")[1] if "." in module else module
+def room_of(module: str, folder: str = PACKAGE.name) -> str:
+    """Return the file or folder directly in a folder, or in the package, that holds a module."""
+    return module.removeprefix(f"{folder}.").partition(".")[0]
 
 
 @cache
-def arrows() -> Mapping[str, Mapping[str, Import]]:
-    """Return the rooms that each room imports, with an example of such an import."""
-    found: dict[str, dict[str, Import]] = {room_of(module): {} for module in modules()}
+def arrows(folder: str = PACKAGE.name) -> Mapping[str, Mapping[str, Import]]:
+    """Return what each room imports of the others, with an example of such an import.
+
+    Args:
+        folder: the package, or one inside it, whose files and folders are its rooms.
+    """
+    inside = [module for module in modules() if _within(module, folder)]
+    found: dict[str, dict[str, Import]] = {room_of(module, folder): {} for module in inside}
     for item in imports():
-        source = room_of(item.source)
-        target = room_of(item.target)
-        if source != target:
-            found[source].setdefault(target, item)
+        if item.source in inside and item.target in inside:
+            source = room_of(item.source, folder)
+            target = room_of(item.target, folder)
+            if source != target:
+                found[source].setdefault(target, item)
     return found
 
 
@@ -112,18 +111,11 @@ def circles(graph: Graph) -> list[list[str]]:
 
 def imports_back_up() -> list[str]:
     """Return imports inside a room that close a circle between its folders and files."""
-    folders = [name for name, path in modules().items() if path.name == "__init__.py"]
-    found: list[str] = []
-    for folder in folders:
-        if folder == PACKAGE.name:
+    found = []
+    for folder, path in modules().items():
+        if path.name != "__init__.py" or path.parent == PACKAGE:
             continue
-        graph: dict[str, dict[str, Import]] = defaultdict(dict)
-        for item in imports():
-            if _within(item.source, folder) and _within(item.target, folder):
-                source = _child(item.source, folder)
-                target = _child(item.target, folder)
-                if source != target:
-                    graph[source][target] = item
+        graph = arrows(folder)
         for circle in circles(graph):
             for target, source in itertools.pairwise(circle):
                 item = graph[source][target]
@@ -135,11 +127,6 @@ def _within(module: str, folder: str) -> bool:
     return module == folder or module.startswith(f"{folder}.")
 
 
-def _child(module: str, folder: str) -> str:
-    """Return the file or folder directly in a folder that holds a module."""
-    return module[len(folder) + 1 :].split(".", maxsplit=1)[0] or "__init__"
-
-
 def importers_of_applications() -> set[str]:
     """Return the modules outside the applications that import one of them."""
     of_applications = [item.source for item in imports() if _within(item.target, APPS)]
@@ -148,11 +135,9 @@ def importers_of_applications() -> set[str]:
 
 def imports_between_applications() -> list[Import]:
     """Return the imports of one application by another."""
-    found = []
-    for item in imports():
-        is_inside = _within(item.source, APPS) and _within(item.target, APPS)
-        if is_inside and _child(item.source, APPS) != _child(item.target, APPS):
-            found.append(item)
+    found: list[Import] = []
+    for others in arrows(APPS).values():
+        found += others.values()
     return found
 
 

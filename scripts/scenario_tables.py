@@ -20,7 +20,6 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import TRAINING_SPLITS
 from roboirg.language.instruction import Instruction
 from roboirg.language.places import PlaceClass
-from roboirg.language.scenarios.scenario import Scenario
 from roboirg.language.scenarios.scenario_file import pointer_table, written_words
 from roboirg.language.settings import all_settings
 from roboirg.language.token_counts import USUAL_LIMIT, count_tokens
@@ -173,23 +172,17 @@ def _spoken(words: str) -> str:
     return r"\b" + re.sub(r"\{[^}]*\}|\*", r"[a-z]+(?: [a-z]+)?", named) + r"\b"
 
 
-def _scenarios() -> Iterator[tuple[str, Scenario]]:
-    """Yield the scenarios of the test pool, with their tasks."""
-    for task, words in written_words().items():
-        for scenario in words.scenarios:
-            if scenario.fields.pool == "test":
-                yield task, scenario
-
-
 @functools.cache
 def _frames() -> pd.DataFrame:
-    """Return how many frames of a task and setting come up, and which do not."""
+    """Return how many frames of the test pool come up, by task and setting, and which do not."""
     said = {(row.task, row.setting, row.frame) for row in _told(TEST).itertuples()}
     rows = []
-    for task, scenario in _scenarios():
-        fields = scenario.fields
-        is_said = (task, fields.setting, fields.frame) in said
-        rows.append((task, fields.setting, fields.frame, is_said))
+    for task, words in written_words().items():
+        for scenario in words.scenarios:
+            fields = scenario.fields
+            row = (task, fields.setting, fields.frame)
+            if fields.pool == "test":
+                rows.append((*row, row in said))
     found = pd.DataFrame(rows, columns=["task", "setting", "frame", "is_said"])
     cells = found.groupby(["task", "setting"], sort=False)
     came_up = cells.is_said.agg(lambda column: f"{column.sum()} of {len(column)}")

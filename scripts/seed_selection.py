@@ -14,7 +14,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.envs.factory import make
 from roboirg.language.generator import request_of
 from roboirg.language.settings import ACCEPTANCE_SETTINGS, all_settings, settings_of
-from roboirg.policies import make_policy, play
+from roboirg.policies import Policy, make_policy, play
 from roboirg.tasks import every_task, get_task
 from roboirg.tasks.splits.fingerprint import fingerprint
 from roboirg.tasks.splits.published_episodes import published_episode
@@ -112,17 +112,16 @@ def check_seed(slot: EpisodeSlot, seed: int) -> Rejection | None:
     rejection = check_words(slot, seed)
     if rejection is not None:
         return rejection
-    failure = oracle_failure(_episode(slot, seed))
+    failure = oracle_failure(_episode(slot, seed), make_policy("oracle", 0))
     if failure is not None:
         return Rejection(seed, "oracle failed", failure)
     return None
 
 
-def oracle_failure(episode: Episode) -> str | None:
+def oracle_failure(episode: Episode, oracle: Policy) -> str | None:
     """Return why the oracle fails in an episode, played without pictures; None if it succeeds."""
-    env = make(episode, cameras=())
     try:
-        info = play(env, make_policy("oracle", 0))
+        info = play(make(episode, cameras=()), oracle)
     except MotionPlanningError as error:
         return str(error)
     if info["status"] == "success":

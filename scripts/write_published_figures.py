@@ -8,7 +8,8 @@ from __future__ import annotations
 import itertools
 import math
 import textwrap
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Mapping
 from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
@@ -24,12 +25,11 @@ from roboirg.analysis.published import (
     published_tasks,
     unpaired_rates,
 )
-from roboirg.analysis.results.option_labels import staged_options
 from roboirg.language.settings import EXPLICIT
 from roboirg.stats.intervals import (
     Interval,
-    TaskRates,
     critical_value,
+    interval_of_values,
     mean_interval,
     ratio_interval,
 )
@@ -41,31 +41,29 @@ REASONING = "reasoning"
 SPATIAL = "spatial"
 CELL = math.prod(TRIALS["main"])
 """Trials of a cell of the main, planner and context tables."""
+MODEL = "MemER"
+"""Is in every table, and has the tasks, settings and stages of all models."""
 
 
-def rows_of(kind: RateTable) -> Mapping[tuple[str, str], PublishedRow]:
-    """Return the rows of a table by model and setting, or stages in the table of contexts."""
-    rows = {}
+def rows_of(kind: RateTable) -> Mapping[str, Mapping[str, PublishedRow]]:
+    """Return each model's rows of a table by setting, or by stages in the table of contexts."""
+    rows: dict[str, dict[str, PublishedRow]] = defaultdict(dict)
     for row in published_rows(kind):
         condition = row.options.setting
         if kind == "context":
-            condition = _stages_text(row.options.stages)
-        rows[row.model, condition] = row
+            condition = ",".join(map(str, row.options.stages))
+        rows[row.model][condition] = row
     return rows
-
-
-def _stages_text(stages: Sequence[int]) -> str:
-    return ",".join(map(str, stages))
-
-
-def models_of(kind: RateTable) -> tuple[str, ...]:
-    """Return the models of a table, in its order."""
-    return tuple(dict.fromkeys(row.model for row in published_rows(kind)))
 
 
 def defined_tasks(row: PublishedRow) -> tuple[str, ...]:
     """Return the tasks for which a row has a rate."""
     return tuple(task for task, rate in row.rates.items() if rate is not None)
+
+
+def shared_tasks() -> tuple[str, ...]:
+    """Return the tasks of the main table that have every setting."""
+    return defined_tasks(rows_of("main")[MODEL][SPATIAL])
 
 
 def average(row: PublishedRow, tasks: Collection[str]) -> Decimal:
@@ -77,13 +75,13 @@ def average(row: PublishedRow, tasks: Collection[str]) -> Decimal:
 
 
 class Comparison(NamedTuple):
-    """Two published rows over the same tasks, in points.
+    """Two published rows over the same tasks.
 
     Attributes:
-        first: mean of the first.
-        second: mean of the second.
-        interval: of the second less the first.
-        kept: the second as a share of the first, percent.
+        first: mean of the first, percent.
+        second: mean of the second, percent.
+        interval: of the second less the first; both are 0 to 1 here.
+        kept: the second as a share of the first.
         kept_interval: of that share.
     """
 
@@ -117,46 +115,17 @@ def compare(first: PublishedRow, second: PublishedRow, tasks: Collection[str]) -
         raise ValueError("a cell has too few trials for an interval")
     first_mean = average(first, tasks)
     second_mean = average(second, tasks)
-    kept = 100 * float(second_mean / first_mean)
-    return Comparison(first_mean, second_mean, _percent(change), kept, _percent(kept_interval))
-
-
-def _percent(interval: Interval) -> Interval:
-    return Interval(100 * interval.low, 100 * interval.high)
+    kept = float(second_mean / first_mean)
+    return Comparison(first_mean, second_mean, change, kept, kept_interval)
 
 
 def half_width(percent: int, trials: int) -> str:
     """Return half the width of the interval of a cell's rate, in points."""
-    outcomes = np.ones((trials, 2), dtype=np.int64)
-    outcomes[percent * trials // 100 :, 0] = 0
-    interval = mean_interval([TaskRates.of(outcomes).combined(1)])
+    outcomes = np.arange(trials) < percent * trials // 100
+    interval = interval_of_values([outcomes])
     if interval is None:
         raise ValueError("a cell has too few trials for an interval")
     return f"{50 * (interval.high - interval.low):.0f}"
-
-
-def lowest_settings(tasks: Collection[str] | None = None) -> dict[str, str]:
-    """Return the implicit setting with the lowest average of each model, on some tasks."""
-    rows = rows_of("main")
-    lowest = {}
-    for model in models_of("main"):
-        means = {}
-        for setting in IMPLICIT:
-            row = rows[model, setting]
-            means[setting] = average(row, tasks or defined_tasks(row))
-        lowest[model] = min(IMPLICIT, key=means.__getitem__)
-    return lowest
-
-
-def setting_changes() -> dict[tuple[str, str], Comparison]:
-    """Return each implicit setting next to explicit, on the tasks that have it."""
-    rows = rows_of("main")
-    changes = {}
-    for model in models_of("main"):
-        for setting in IMPLICIT:
-            row = rows[model, setting]
-            changes[model, setting] = compare(rows[model, EXPLICIT], row, defined_tasks(row))
-    return changes
 
 
 def page() -> str:
@@ -196,19 +165,20 @@ def _signed(comparison: Comparison) -> str:
     if comparison.is_clear:
         text = f"**{text}**"
     low, high = comparison.interval
-    return f"{text} ({low:+.1f} to {high:+.1f})".replace("-", "−")
+    return f"{text} ({100 * low:+.1f} to {100 * high:+.1f})".replace("-", "−")
 
 
 def _spatial() -> Iterator[str]:
-    rows = rows_of("main")
-    all_changes = setting_changes()
-    models = models_of("main")
-    changes = {model: all_changes[model, SPATIAL] for model in models}
-    drops = {}
-    for model in models:
-        drops[model] = rows[model, EXPLICIT].average - rows[model, SPATIAL].average
+    lines = []
+    for model, rows in rows_of("main").items():
+        explicit = rows[EXPLICIT]
+        spatial = rows[SPATIAL]
+        change = compare(explicit, spatial, shared_tasks())
+        drop = explicit.average - spatial.average
+        cells = (explicit.average, change.first, change.second, drop, _signed(change))
+        lines.append((model, *cells))
     every = len(published_tasks("main"))
-    some = len(defined_tasks(rows[models[0], SPATIAL]))
+    some = len(shared_tasks())
     yield f"## Spatial: {some} tasks against {every}"
     yield _text(
         f"The spatial setting exists for {some} tasks. The printed change of its average is from",
@@ -219,23 +189,17 @@ def _spatial() -> Iterator[str]:
         "model", "explicit, all tasks", "explicit, same tasks", "spatial", "drop as printed",
         "change on the same tasks",
     )  # fmt: skip
-    lines = []
-    for model, change in changes.items():
-        explicit = rows[model, EXPLICIT].average
-        cells = (explicit, change.first, change.second, drops[model], _signed(change))
-        lines.append((model, *cells))
     yield table(heads, lines)
 
 
 def _starts() -> Iterator[str]:
     direct = rows_of("main")
     staged = rows_of("context")
-    shortest = _stages_text(staged_options()[0].stages)
     lines = []
     differing = 0
     clear = 0
-    for model, task in itertools.product(models_of("context"), published_tasks("context")):
-        change = compare(direct[model, DIRECT], staged[model, shortest], (task,))
+    for model, task in itertools.product(staged, published_tasks("context")):
+        change = compare(direct[model][DIRECT], staged[model]["1,5"], (task,))
         lines.append((model, task, change.first, change.second, _signed(change)))
         differing += change.change != 0
         clear += change.is_clear
@@ -251,18 +215,18 @@ def _starts() -> Iterator[str]:
 
 
 def _trend() -> Iterator[str]:
-    rows = rows_of("context")
     tasks = published_tasks("context")
-    stages = [_stages_text(options.stages) for options in staged_options()]
+    all_rows = rows_of("context")
+    stages = list(all_rows[MODEL])
     steps = []
     lines = []
-    for model in models_of("context"):
+    for model, rows in all_rows.items():
         cells = [model]
         for before, after in itertools.pairwise(stages):
-            change = compare(rows[model, before], rows[model, after], tasks)
+            change = compare(rows[before], rows[after], tasks)
             steps.append(change)
             cells.append(f"{change.first} → {change.second}: {_signed(change)}")
-        whole = compare(rows[model, stages[0]], rows[model, stages[-1]], tasks)
+        whole = compare(rows[stages[0]], rows[stages[-1]], tasks)
         lines.append((*cells, _signed(whole)))
     rises = sum(step.change > 0 for step in steps)
     clear = sum(step.is_clear for step in steps)
@@ -277,63 +241,60 @@ def _trend() -> Iterator[str]:
 
 
 def _hardest() -> Iterator[str]:
-    rows = rows_of("main")
-    shared = defined_tasks(rows[models_of("main")[0], SPATIAL])
-    lowest = lowest_settings()
-    lowest_shared = lowest_settings(shared)
+    shared = shared_tasks()
+    lines = []
+    hardest = 0
+    hardest_shared = 0
+    for model, rows in rows_of("main").items():
+        lowest = min(IMPLICIT, key=lambda setting: rows[setting].average)
+        lowest_shared = min(IMPLICIT, key=lambda setting: average(rows[setting], shared))
+        change = compare(rows[REASONING], rows[SPATIAL], shared)
+        cells = (change.first, change.second, _signed(change))
+        lines.append((model, lowest, lowest_shared, *cells))
+        hardest += lowest == REASONING
+        hardest_shared += lowest_shared == REASONING
     yield "## Is reasoning always the hardest?"
     yield _text(
-        f"Reasoning has the lowest average of {_hardest_for(lowest)} of {len(lowest)} models; on",
+        f"Reasoning has the lowest average of {hardest} of {len(lines)} models; on",
         f"the {len(shared)} tasks that have every setting, of",
-        f"{_hardest_for(lowest_shared)}. The last columns compare it",
+        f"{hardest_shared}. The last columns compare it",
         "with spatial on these tasks: above zero, spatial is easier.",
     )
-    lines = []
-    for model in models_of("main"):
-        change = compare(rows[model, REASONING], rows[model, SPATIAL], shared)
-        cells = (change.first, change.second, _signed(change))
-        lines.append((model, lowest[model], lowest_shared[model], *cells))
     heads = ("model", "lowest, as printed", "lowest, same tasks", REASONING, SPATIAL, "change")
     yield table(heads, lines)
 
 
-def _hardest_for(lowest: Mapping[str, str]) -> int:
-    """Return the number of models for which reasoning is lowest."""
-    return list(lowest.values()).count(REASONING)
-
-
 def _kept() -> Iterator[str]:
-    changed = {}
-    kept = {}
+    changed = []
+    kept = []
     small = []
-    for (model, setting), change in setting_changes().items():
-        changed[model, setting] = _signed(change)
-        low, high = change.kept_interval
-        kept[model, setting] = f"{change.kept:.0f} ({low:.0f} to {high:.0f})"
-        if setting == DIRECT and not change.is_clear:
-            small.append(model)
+    for model, rows in rows_of("main").items():
+        changed_cells = [model]
+        kept_cells = [model]
+        for setting in IMPLICIT:
+            change = compare(rows[EXPLICIT], rows[setting], defined_tasks(rows[setting]))
+            low, high = change.kept_interval
+            changed_cells.append(_signed(change))
+            kept_cells.append(f"{100 * change.kept:.0f} ({100 * low:.0f} to {100 * high:.0f})")
+            if setting == DIRECT and not change.is_clear:
+                small.append(model)
+        changed.append(changed_cells)
+        kept.append(kept_cells)
+    heads = ("model", *IMPLICIT)
     yield "## What each model loses, and keeps"
     yield "Points from explicit, on the tasks that have the setting:"
-    yield _by_setting(changed)
+    yield table(heads, changed)
     yield _text(
         f"In the direct setting the changes of {', '.join(small)} have an interval with zero: not",
         "every model loses much there, with memory or without.",
     )
     yield "Percent of the explicit rate that is kept:"
-    yield _by_setting(kept)
+    yield table(heads, kept)
     yield _text(
         "Of the two systems that plan in words, GroundSG-QwenVL keeps most, and MemER less than",
         "pi0.5, which has no memory, in the first three settings. A low explicit rate is",
         "also easier to keep: near what chance gives, there is little to lose.",
     )
-
-
-def _by_setting(texts: Mapping[tuple[str, str], str]) -> str:
-    lines = []
-    for model in models_of("main"):
-        cells = [texts[model, setting] for setting in IMPLICIT]
-        lines.append((model, *cells))
-    return table(("model", *IMPLICIT), lines)
 
 
 def _widths() -> Iterator[str]:

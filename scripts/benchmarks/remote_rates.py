@@ -9,7 +9,6 @@ import statistics
 import subprocess
 import sys
 import time
-from typing import ClassVar
 
 from benchmarks.step_times import CHUNK
 from benchmarks.worker_rates import WavingPolicy
@@ -29,7 +28,7 @@ POLICY = f"{__name__}:BothCameras"
 class BothCameras(WavingPolicy):
     """Looks at both pictures."""
 
-    cameras: ClassVar[tuple[str, ...]] = CAMERAS
+    cameras = CAMERAS
 
 
 def in_process() -> float:

@@ -6,6 +6,7 @@ import datetime as dt
 import json
 import os
 import statistics
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -36,17 +37,15 @@ def run_measures(
         that of others.
     """
     load = os.getloadavg()[1]
-    ours: list[list[float]] = [[] for _ in measures]
-    baselines: list[list[float]] = [[] for _ in measures]
+    ours: dict[Measure, list[float]] = defaultdict(list)
+    baselines: dict[object, list[float]] = defaultdict(list)
     for number in range(1, rounds + 1):
-        timed: dict[Callable[[], float], float] = {}
-        for measure, own, base in zip(measures, ours, baselines, strict=True):
+        for measure in measures:
             report(f"round {number} of {rounds}: {measure.name}")
-            if measure.baseline is not None:
-                if measure.baseline not in timed:
-                    timed[measure.baseline] = measure.baseline()
-                base.append(timed[measure.baseline])
-            own.append(measure.ours())
+            baseline = measure.baseline
+            if baseline is not None and len(baselines[baseline]) < number:
+                baselines[baseline].append(baseline())
+            ours[measure].append(measure.ours())
     where = {
         "date": dt.datetime.now(dt.UTC).date().isoformat(),
         "machine": f"{os.cpu_count()} cores, {processor_features().splitlines()[0]}",
@@ -54,8 +53,8 @@ def run_measures(
         "roboirg": __version__,
     }
     rows = []
-    for measure, own, base in zip(measures, ours, baselines, strict=True):
-        rows.append(_figures(measure, own, base) | where)
+    for measure in measures:
+        rows.append(_figures(measure, ours[measure], baselines[measure.baseline]) | where)
     return rows
 
 

@@ -33,8 +33,8 @@ class WavingPolicy:
     """Swings the arm back and forth, so that every picture must be drawn; replies at once."""
 
     cameras: ClassVar[tuple[str, ...]] = (FRONT,)
-    demonstration_frames: ClassVar[str] = "none"
-    chunk: ClassVar[int] = CHUNK
+    demonstration_frames = "none"
+    chunk = CHUNK
     version = "1"
 
     def __init__(self) -> None:
@@ -73,8 +73,8 @@ class BothPictures(FrontPicture):
 class SlowPolicy:
     """Swings the arm, takes batches, and thinks 50 ms about each, as a model on a GPU does."""
 
-    cameras: ClassVar[tuple[str, ...]] = (FRONT,)
-    demonstration_frames: ClassVar[str] = "none"
+    cameras = (FRONT,)
+    demonstration_frames = "none"
     version = "1"
 
     def begin(self, instruction: str, demonstration: Demonstration) -> WavingPolicy:

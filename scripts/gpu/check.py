@@ -6,7 +6,6 @@ Each check is a process with a time limit. `check` of the kit calls this with it
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import statistics
@@ -15,6 +14,8 @@ import sys
 import time
 from pathlib import Path
 from typing import Any
+
+import typer
 
 TREES = ("before", "after", "unculled")
 TEXTS = ("output", "errors")
@@ -62,18 +63,19 @@ class Checks:
         return found
 
 
-def main() -> None:
-    """Run all checks, and print a line for each figure."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("kit", type=Path, help="folder that `install` made")
-    parser.add_argument("out", type=Path, help="JSON file for the results")
-    parser.add_argument("--workers", default="8,16", help="numbers of worker processes")
-    options = parser.parse_args()
-    checks = Checks(options.kit, options.out)
+def main(kit: Path, out: Path, workers: str = "8,16") -> None:
+    """Run all checks, and print a line for each figure.
+
+    Args:
+        kit: folder that `install` made.
+        out: JSON file for the results.
+        workers: numbers of worker processes.
+    """
+    checks = Checks(kit, out)
     checks.keep("doctor", checks.run("doctor", "after", "-m", "roboirg", "doctor"))
-    check_pictures(checks, options.kit)
+    check_pictures(checks, kit)
     check_steps(checks)
-    for count in options.workers.split(","):
+    for count in workers.split(","):
         for cameras, chunk, trees in ((2, 1, TREES), (1, 1, TREES[1:]), (1, 16, TREES[1:2])):
             for tree in trees:
                 name = f"{count} workers, {cameras} of 2 cameras, chunks of {chunk}, {tree}"
@@ -89,8 +91,9 @@ def check_pictures(checks: Checks, kit: Path) -> None:
     for tree in TREES:
         checks.measure(f"draw, {tree}", tree, "draw", str(kit / f"{tree}.npz"))
     for first, second in (("expected", "after"), ("before", "after"), ("after", "unculled")):
-        files = (str(kit / f"{one}.npz") for one in (first, second))
-        checks.measure(f"pictures of {first} and {second}", "after", "compare", *files)
+        name = f"pictures of {first} and {second}"
+        files = (f"{kit}/{first}.npz", f"{kit}/{second}.npz")
+        checks.measure(name, "after", "compare", *files)
 
 
 def check_steps(checks: Checks) -> None:
@@ -100,10 +103,10 @@ def check_steps(checks: Checks) -> None:
         for tree in TREES[:: -1 if number % 2 else 1]:
             found = checks.measure(f"step, {tree}, round {number + 1}", tree, "step")
             times[tree].append(found.get("whole", float("nan")))
-    medians = {tree: statistics.median(one) for tree, one in times.items()}
+    medians = {tree: statistics.median(seconds) for tree, seconds in times.items()}
     ratios = {f"before / {tree}": medians["before"] / medians[tree] for tree in TREES[1:]}
     checks.keep("step", {**medians, **ratios})
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -11,12 +11,13 @@ import statistics
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -30,6 +31,8 @@ from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits import get_episode
 
+app = typer.Typer(pretty_exceptions_enable=False)
+
 Drawn = Mapping[str, NDArray[Any]]
 
 INDEXES = (0, 3)
@@ -41,12 +44,14 @@ CLEAR = 8
 """Levels of 255 by which a pixel differs clearly."""
 
 
+@app.command()
 def draw(file: str) -> dict[str, Any]:
     """Store pictures of scenes and demonstrations, states after some steps, and steps of events."""
     drawn: dict[str, NDArray[Any]] = {}
     for task in all_tasks():
         for index in INDEXES:
-            drawn |= {f"{task} {index} {key}": one for key, one in _draw_episode(task, index)}
+            for key, array in _draw_episode(task, index):
+                drawn[f"{task} {index} {key}"] = array
     np.savez_compressed(file, **drawn)  # type: ignore[arg-type]  # its stub wants one more keyword
     return {"arrays": len(drawn)}
 
@@ -72,6 +77,7 @@ def _draw_episode(task: str, index: int) -> Iterator[tuple[str, NDArray[Any]]]:
     yield "events", np.array([event.step for event in session.events])
 
 
+@app.command()
 def compare(first: str, second: str) -> dict[str, Any]:
     """Compare the arrays of two files."""
     with np.load(first) as one, np.load(second) as other:
@@ -82,22 +88,24 @@ def difference(first: Drawn, second: Drawn) -> dict[str, Any]:
     """Return how pictures differ, in levels of 255, and which motions are not equal to the bit."""
     if first.keys() != second.keys():
         return {"only in one": sorted(first.keys() ^ second.keys())}
-    levels = [
-        np.abs(first[key].astype(np.int16) - second[key]).max(axis=-1).ravel()
-        for key in first
-        if first[key].dtype == np.uint8
-    ]
+    levels = []
+    others = []
+    for key, array in first.items():
+        if array.dtype == np.uint8:
+            levels.append(np.abs(array.astype(np.int16) - second[key]).max(axis=-1).ravel())
+        elif not np.array_equal(array, second[key]):
+            others.append(key)
     pixels = np.concatenate(levels)
-    others = [key for key in first if first[key].dtype != np.uint8]
     return {
         "pixels": len(pixels),
         "differ": float(np.mean(pixels > 0)),
         "differ clearly": float(np.mean(pixels > CLEAR)),
         "largest": int(pixels.max()),
-        "other motion": [key for key in others if not np.array_equal(first[key], second[key])],
+        "other motion": others,
     }
 
 
+@app.command()
 def step() -> dict[str, float]:
     """Time an eager step for which both cameras draw, whole and in its parts."""
     workload = stretch("VideoPlaceButton", 0, first=130)
@@ -130,6 +138,7 @@ def step() -> dict[str, float]:
     return {"whole": whole, **{name: statistics.median(one) for name, one in durations.items()}}
 
 
+@app.command()
 def workers(count: str, cameras: str, chunk: str) -> dict[str, float]:
     """Return the control steps a second of workers that share one policy's process."""
     kinds = {("2", "1"): BothPictures, ("1", "1"): FrontPicture, ("1", "16"): WavingPolicy}
@@ -137,8 +146,4 @@ def workers(count: str, cameras: str, chunk: str) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    what, *words = sys.argv[1:]
-    commands: dict[str, Callable[..., object]] = {
-        one.__name__: one for one in (draw, compare, step, workers)
-    }
-    sys.stdout.write(json.dumps(commands[what](*words)) + "\n")
+    print(json.dumps(app(standalone_mode=False)))

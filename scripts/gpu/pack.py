@@ -11,7 +11,6 @@ machine to compare with. Packages that the machine has (--there) are left out.
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import shutil
 import subprocess
@@ -20,11 +19,13 @@ import tarfile
 import tempfile
 from pathlib import Path
 
+import typer
 from packaging.utils import canonicalize_name, parse_wheel_filename
 
 from roboirg.simulation.model_files import find_model_files
 
-ROOT = Path(__file__).parents[2]
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
 EXTRAS = "sim,remote"
 GLIBC = (17, 24, 27, 28, 31, 34)
 """Minor versions of glibc 2 for which wheels are named; pip matches each exactly."""
@@ -36,31 +37,31 @@ LOADER = (
 MIB = 1024**2
 
 
-def main() -> None:
-    """Pack everything, and print the sizes."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("out", type=Path, help="folder for the parts, emptied first")
-    parser.add_argument("--python", default="3.12", help="version of Python there")
-    parser.add_argument("--there", default="", help="packages that the machine has, with commas")
-    parser.add_argument("--before", default="HEAD~1", help="commit to compare with")
-    parser.add_argument("--part-mib", type=int, default=40, help="largest size of a part")
-    options = parser.parse_args()
+def main(
+    out: Path, python: str = "3.12", there: str = "", before: str = "HEAD~1", part_mib: int = 40
+) -> None:
+    """Pack everything, and print the sizes.
+
+    Args:
+        out: folder for the parts, emptied first.
+        python: version of Python there.
+        there: packages that the machine has, with commas.
+        before: commit to compare with.
+        part_mib: largest size of a part.
+    """
     with tempfile.TemporaryDirectory() as folder:
         kit = Path(folder)
-        (kit / "python").write_text(options.python)
-        for name, commit in (("before", options.before), ("after", "HEAD")):
-            _unpack_tree(commit, kit / "trees" / name)
-        _download_wheels(kit / "wheels", options.python, options.there.split(","))
+        (kit / "python").write_text(python)
+        _unpack_tree(before, kit / "trees" / "before")
+        _unpack_tree("HEAD", kit / "trees" / "after")
+        _download_wheels(kit / "wheels", python, there.split(","))
         _unpack_loader(kit / "loader")
         shutil.copytree(find_model_files(), kit / "models")
-        _run(
-            *(sys.executable, str(Path(__file__).with_name("measure.py")), "draw"),
-            str(kit / "expected.npz"),
-        )
-        shutil.copy(Path(__file__).with_name("check"), kit)
-        shutil.rmtree(options.out, ignore_errors=True)
-        parts = write_parts(kit, options.out, options.part_mib * MIB)
-    shutil.copy(Path(__file__).with_name("install"), options.out)
+        _run(sys.executable, f"{HERE}/measure.py", "draw", f"{kit}/expected.npz")
+        shutil.copy(HERE / "check", kit)
+        shutil.rmtree(out, ignore_errors=True)
+        parts = write_parts(kit, out, part_mib * MIB)
+    shutil.copy(HERE / "install", out)
     for part in parts:
         print(f"{part}: {part.stat().st_size / MIB:.1f} MiB")
 
@@ -123,4 +124,4 @@ def _run(*words: str, cwd: str | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)
