@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
 
 from roboirg.analysis.measures.measure import ALL_TASKS
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.failures import FAILURE_KINDS
+from roboirg.core.policy_ref import RESOLVE
 from roboirg.language.settings import EXPLICIT
+from roboirg.stats.intervals import TaskRates, mean_rates, share_interval
 from roboirg_learn.listener.study_report import trained_rate
 
 IMPLICIT = ("direct", "reasoning", "contextual", "spatial")
 MEAN = "implicit"
 """In the place of a setting: the mean over those of `IMPLICIT` that a task has."""
 SUCCESS = "success"
+SHARE = "share of the gap"
+"""How much of the gap to explicit words a rewriter closes for the reader of these behind it."""
 OVER = " over "
 """Stands before the reference of a difference: ``success over true goal``."""
 REFERENCES = {
@@ -38,10 +44,11 @@ class Measure(NamedTuple):
         scope: a suite, or all tasks, over which it is a mean.
         memory: of the body, or what needs none.
         reader: what tells it the goal.
-        setting: of the words, or `MEAN`.
-        number: ``success``, a kind of failure, or one of these over one of `REFERENCES`.
+        setting: of the words, with what is chosen (``direct (resolved)``), or `MEAN`.
+        number: ``success``, a kind of failure, one of these over one of `REFERENCES`, or `SHARE`.
         value: from -1 to 1.
-        low: of the 95 % interval over scenes and trainings; not a number if there is none.
+        low: of the 95 % interval over scenes and trainings, for `SHARE` over scenes; not a number
+            if there is none.
         high: of the interval.
         by_seed: the value of each training, with blanks between them.
     """
@@ -58,29 +65,31 @@ class Measure(NamedTuple):
 
 
 def measure_frame(frame: pd.DataFrame) -> list[Measure]:
-    """Return what the trials of a frame give, without resolved forms and chosen stages.
+    """Return what the trials of a frame give.
 
     A trial that stands there several times, as parts of the study may share it, counts once.
 
     Raises:
         RoboIRGError: a policy lacks trials that another one has in the same setting.
     """
-    usual = frame[frame["instruction_options"] == frame["setting"]].sort_values(EPISODE)
-    usual = usual.drop_duplicates(["policy", "setting", *EPISODE, "outcome"])
-    played = usual.groupby(["setting", "policy", "policy_seed"]).size()
+    trials = frame.assign(setting=frame["instruction_options"]).sort_values(EPISODE)
+    trials = trials.drop_duplicates(["policy", "setting", *EPISODE, "outcome"])
+    played = trials.groupby(["setting", "policy", "policy_seed"]).size()
     if (played.groupby("setting").nunique() > 1).any():
         raise RoboIRGError(f"Trials are missing; hear and play them:\n{played.to_string()}")
-    usual[["memory", "reader"]] = usual["policy"].str.split("-", n=1, expand=True)
-    has_succeeded = usual["outcome"] == "success"
-    ends = usual["failure_kind"].astype(object).fillna("undecided").mask(has_succeeded, SUCCESS)
+    trials[["memory", "reader"]] = trials["policy"].str.split("-", n=1, expand=True)
+    has_succeeded = trials["outcome"] == "success"
+    ends = trials["failure_kind"].astype(object).fillna("undecided").mask(has_succeeded, SUCCESS)
     measures = []
     for end in (SUCCESS, *FAILURE_KINDS):
-        counted = usual.assign(number=end, value=(ends == end).astype(float))
+        counted = trials.assign(number=end, value=(ends == end).astype(float))
         compared = _compared(counted[[*ABOUT, *EPISODE, "value"]])
-        for about, trials in compared.groupby(ABOUT, sort=False):
-            measures.append(_measured(ALL_TASKS, about, trials))
-            for suite, some in trials.groupby("suite", sort=False):
+        for about, same in compared.groupby(ABOUT, sort=False):
+            measures.append(_measured(ALL_TASKS, about, same))
+            for suite, some in same.groupby("suite", sort=False):
                 measures.append(_measured(suite, about, some))
+        if end == SUCCESS:
+            measures += _shares(compared[compared["number"] == SUCCESS])
     return measures
 
 
@@ -117,3 +126,27 @@ def _measured(scope: str, about: tuple[str, str, str, str], trials: pd.DataFrame
         numbers = [2 * number - 1 for number in numbers]
     value, low, high, *by_seed = [round(number, 6) for number in numbers]
     return Measure(scope, *about, value, low, high, " ".join(map(str, by_seed)))
+
+
+def _shares(trials: pd.DataFrame) -> Iterator[Measure]:
+    """Yield the shares of gaps that rewriters close in all tasks, where the gap is clear.
+
+    Args:
+        trials: and their means over settings, by whether they succeeded.
+    """
+    scene = ["memory", "task", "policy_seed", "episode"]
+    values = trials.pivot(index=scene, columns=["reader", "setting"], values="value")
+    for reader, setting in values:
+        if not reader.startswith(RESOLVE):
+            continue
+        columns = [(reader, setting), ("explicit", setting), ("explicit", EXPLICIT)]
+        for memory, same in values[columns].dropna().groupby("memory"):
+            tasks = []
+            for _, rates in same.groupby("task"):
+                weights = np.full(len(rates), 1 / len(rates))
+                tasks.append(TaskRates(rates.to_numpy(), weights, np.full(3, True)))
+            interval = share_interval(tasks)
+            if interval is not None:
+                rewritten, said, explicit = mean_rates(tasks)
+                share = (rewritten - said) / (explicit - said)
+                yield Measure(ALL_TASKS, memory, reader, setting, SHARE, share, *interval)

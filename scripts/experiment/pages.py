@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 from written_parts import table, with_part
 
-from experiment.measures import MEAN, OVER
+from experiment.measures import MEAN, OVER, SHARE
 from roboirg.analysis.measures.measure import ALL_TASKS
 from roboirg.stats.rates import NOT_APPLICABLE, points, whole_percent
 
@@ -22,44 +22,40 @@ FACTS = "facts.json"
 SETTINGS = ("explicit", "direct", "reasoning", "contextual", "spatial")
 ORDER = {
     "memory": ["none", "ttt", "framesamp", "subgoal", "keyframes", "recurrent"],
-    "reader": ["published", "explicit", "all", "resolve"],
+    "reader": ["published", "explicit", "resolve-surface", "all", "truth"],
     "setting": [*SETTINGS, MEAN],
+    "number": [],
 }
 """What comes first in tables; other values follow as they come."""
 
 
 class Part(NamedTuple):
-    """A table of a page, for all tasks and, behind its name, for each suite.
+    """A table of a page, for all tasks and, behind its name, for each suite; a row is a policy.
 
     Attributes:
         shown: which numbers, a query of pandas.
-        rows: what its rows are named by.
         columns: what its columns are named by.
     """
 
     shown: str
-    rows: list[str]
-    columns: str
+    columns: str = "setting"
 
 
 _POLICY = ["memory", "reader"]
 PARTS = {
     "results": Part(
-        "number == 'success' and setting in @SETTINGS and reader in ('explicit', 'all', '–')",
-        [*_POLICY, "trainings"],
-        "setting",
+        "number == 'success' and setting in @SETTINGS and reader in ('explicit', 'all', '–')"
     ),
     "paper": Part(
-        "number == 'success' and setting in @SETTINGS and reader in ('published', 'explicit')",
-        ["setting", "memory"],
-        "reader",
+        "number == 'success' and setting in @SETTINGS and reader in ('published', 'explicit')"
     ),
-    "rates": Part("number == 'success' and reader != 'published'", _POLICY, "setting"),
-    "differences": Part(
-        "number.str.startswith('success over') and setting == @MEAN", _POLICY, "number"
-    ),
+    "rates": Part("number == 'success' and reader != 'published' and ~setting.str.endswith(')')"),
+    "forms": Part("number == 'success' and setting.str.endswith(')')"),
+    "shares": Part("number == @SHARE"),
+    "differences": Part("number.str.startswith('success over') and setting == @MEAN", "number"),
     "gap": Part(
-        "number.str.endswith('over explicit words') and setting == @MEAN", _POLICY, "number"
+        "number.str.endswith('over explicit words') and setting == @MEAN and reader != 'truth'",
+        "number",
     ),
 }
 """By name of the part: ``results`` of all tasks, ``results counting`` of a suite."""
@@ -79,12 +75,9 @@ def write_pages(results: Path) -> None:
 def read_numbers(path: Path) -> pd.DataFrame:
     """Return numbers, `Measure` by `Measure`, in the order of tables.
 
-    Two columns are new: `trainings`, how many there are, and `text`, what pages show.
+    A column is new: `text`, what pages show.
     """
-    numbers = pd.read_csv(path, dtype={"by_seed": str})
-    by_seed = numbers["by_seed"].str.split()
-    trainings = by_seed.str.len().map("{:.0f}".format, na_action="ignore")
-    numbers["trainings"] = trainings.fillna(NOT_APPLICABLE)
+    numbers = pd.read_csv(path)
     numbers["text"] = [_text(line) for line in numbers.to_dict("records")]
     for name, first in ORDER.items():
         numbers[name] = pd.Categorical(numbers[name], dict.fromkeys([*first, *numbers[name]]))
@@ -100,11 +93,12 @@ def _text(line: Mapping[str, Any]) -> str:
     between = "–"
     if OVER in line["number"]:
         show = points
+    if OVER in line["number"] or line["number"] == SHARE:
         between = " to "
     text = show(line["value"])
-    if pd.isna(line["low"]):
-        return text
-    return f"{text}<br>{show(line['low'])}{between}{show(line['high'])}"
+    if not pd.isna(line["low"]):
+        text += f"<br>{show(line['low'])}{between}{show(line['high'])}"
+    return text.replace("-", "−")
 
 
 def with_numbers(page: str, numbers: pd.DataFrame, facts: Mapping[str, str]) -> str:
@@ -133,7 +127,7 @@ def _table(name: str, numbers: pd.DataFrame, facts: Mapping[str, str]) -> str:
     part = PARTS[kind]
     scope = suite or ALL_TASKS
     shown = numbers[numbers["scope"] == scope].query(part.shown)
-    wide = shown.pivot(index=part.rows, columns=part.columns, values="text")
+    wide = shown.pivot(index=_POLICY, columns=part.columns, values="text")
     wide = wide.sort_index().fillna(NOT_APPLICABLE)
     cells = wide.reset_index().to_numpy().tolist()
-    return table([*part.rows, *wide.columns], cells, wide.columns)
+    return table([*_POLICY, *wide.columns], cells, wide.columns)

@@ -51,9 +51,9 @@ def write_results(study: Study) -> None:
     first_row = study.rows()[0]
     jobs = [trial.job for trial in study.trials() if trial.row == first_row]
     measures = measure_frame(frame[frame["split"] == study.split])
-    numbers = pd.concat([pd.DataFrame(measures), _without_plays(jobs)])
+    numbers = pd.concat([pd.DataFrame(measures), _without_plays(jobs)]).round(6)
     numbers.to_csv(study.results / NUMBERS, index=False)
-    facts = json.dumps(_facts(study, jobs), indent=1)
+    facts = json.dumps(_facts(study, jobs), indent=1, sort_keys=True)
     write_atomically(study.results / FACTS, facts + "\n")
     write_pages(study.results)
 
@@ -78,7 +78,7 @@ def _without_plays(jobs: Sequence[Job]) -> pd.DataFrame:
     of_all = of_tasks.assign(scope=ALL_TASKS)
     of_suites = of_tasks.assign(scope=of_tasks["task"].map(suite))
     alike = pd.concat([of_all, of_suites]).groupby(["scope", *ABOUT[:3]], sort=False)
-    return alike["value"].mean().round(6).reset_index().assign(number=SUCCESS)
+    return alike["value"].mean().reset_index().assign(number=SUCCESS)
 
 
 def _facts(study: Study, jobs: Sequence[Job]) -> dict[str, str]:

@@ -1,13 +1,17 @@
 """From a frame of trials to numbers, and from numbers to pages."""
 
+import json
+
 import pandas as pd
 import pytest
-from experiment.measures import Measure, measure_frame
-from experiment.pages import read_numbers, with_numbers
+from experiment.measures import SHARE, Measure, measure_frame
+from experiment.pages import FACTS, NUMBERS, PAGES, read_numbers, with_numbers
+from house_rooms import ROOT
 
 import roboirg
 from roboirg.core.errors import RoboIRGError
 
+RESULTS = ROOT / "results"
 TASKS = {"PickXtimes": "counting", "VideoUnmask": "permanence"}
 
 
@@ -109,6 +113,28 @@ def test_with_one_training_intervals_are_those_of_measure(frame):
     assert (gap.low, gap.high) == pytest.approx(expected.gap.interval, abs=1e-6)
 
 
+def test_a_rewriter_closes_the_share_of_the_gap_that_it_gains():
+    """The reader of explicit words loses ten of twenty successes in direct words, and five behind a
+    rewriter."""
+    rows = trials("ttt-explicit", "explicit", "PickXtimes", 0, 20 * "S")
+    rows += trials("ttt-explicit", "direct", "PickXtimes", 0, 10 * "SG")
+    rows += trials("ttt-resolve-surface", "direct", "PickXtimes", 0, 5 * "SGSS")
+
+    measures = {measure[3:5]: measure for measure in measure_frame(pd.DataFrame(rows))}
+
+    assert measures["direct", SHARE].value == pytest.approx(0.5)
+
+
+def test_resolved_forms_are_settings_of_their_own(frame):
+    """They count in no number of the setting."""
+    direct = frame[frame["setting"] == "direct"]
+    resolved = direct.assign(instruction_options="direct (resolved)")
+
+    joined = pd.concat([frame, resolved])
+
+    assert set(measure_frame(frame)) < set(measure_frame(joined))
+
+
 def test_trials_that_two_parts_of_a_study_share_count_once(frame):
     """Both parts have played explicit words."""
     explicit = frame[frame["setting"] == "explicit"]
@@ -145,11 +171,34 @@ def test_tables_and_slots_of_a_page_have_the_numbers_of_the_file(tmp_path):
 
     assert written == (
         "<!-- results -->\n\n"
-        "| memory | reader | trainings | direct |\n"
-        "| --- | --- | --- | ---: |\n"
-        "| recurrent | all | 2 | 78<br>74–82 |\n"
-        "| *guess* | – | – | 43 |\n\n"
+        "| memory | reader | direct |\n"
+        "| --- | --- | ---: |\n"
+        "| recurrent | all | 78<br>74–82 |\n"
+        "| *guess* | – | 43 |\n\n"
         "<!-- end of results -->\n\nIt reaches <!-- all tasks, recurrent, all, direct, success -->"
         "78<!-- --> %, <!-- all tasks, recurrent, all, direct, success over true goal -->"
         "−2<!-- --> points.\n"
     )
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_has_the_numbers_of_the_experiment(page):
+    """To write them again changes nothing, and nothing waits for them."""
+    text = (ROOT / page).read_text()
+    facts = json.loads((RESULTS / FACTS).read_text())
+
+    assert with_numbers(text, read_numbers(RESULTS / NUMBERS), facts) == text
+    assert "TODO" not in text
+
+
+def test_numbers_are_means_over_tasks_of_success_in_the_shipped_trials():
+    """Here in plain pandas, of the usual forms; trials that parts share count once."""
+    frames = pd.concat(map(pd.read_csv, RESULTS.glob("*.csv.xz")))
+    usual = frames.query("instruction_options == setting")
+    trial = usual.groupby(["policy", "setting", "task", "policy_seed", "episode"])["success"].max()
+    by_task = trial.groupby(["policy", "setting", "task"]).mean()
+    numbers = read_numbers(RESULTS / NUMBERS).query("number == 'success' and scope == 'all tasks'")
+    values = numbers.set_index(["memory", "reader", "setting"])["value"]
+
+    for (policy, setting), rate in by_task.groupby(["policy", "setting"]).mean().items():
+        assert values[*policy.split("-", 1), setting] == pytest.approx(rate, abs=1e-6)

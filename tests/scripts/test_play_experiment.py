@@ -176,8 +176,8 @@ def test_results_of_a_study_go_into_the_page_next_to_their_folder(study):
     write_results(study)
 
     written = page.read_text()
-    assert "| recurrent | all | 1 | 100 |" in written
-    assert "| *guess* | – | – | 100 |" in written
+    assert "| recurrent | all | 100 |" in written
+    assert "| *guess* | – | 100 |" in written
     assert "| looks at `val` | 2 |" in written
     assert re.search(r"\| parameters of `recurrent` \| detector [\d,]+, body [\d,]+ \|", written)
     assert re.search(r"\| unknown to the reader of `all`, % \| explicit \d+ \|", written)
