@@ -1,17 +1,13 @@
 """From a frame of trials to numbers, and from numbers to pages."""
 
-import json
-
 import pandas as pd
 import pytest
 from experiment.measures import SHARE, Measure, measure_frame
-from experiment.pages import FACTS, NUMBERS, PAGES, read_numbers, with_numbers
-from house_rooms import ROOT
+from experiment.pages import read_numbers, with_numbers
 
 import roboirg
 from roboirg.core.errors import RoboIRGError
 
-RESULTS = ROOT / "results"
 TASKS = {"PickXtimes": "counting", "VideoUnmask": "permanence"}
 
 
@@ -179,26 +175,3 @@ def test_tables_and_slots_of_a_page_have_the_numbers_of_the_file(tmp_path):
         "78<!-- --> %, <!-- all tasks, recurrent, all, direct, success over true goal -->"
         "−2<!-- --> points.\n"
     )
-
-
-@pytest.mark.parametrize("page", PAGES)
-def test_a_page_has_the_numbers_of_the_experiment(page):
-    """To write them again changes nothing, and nothing waits for them."""
-    text = (ROOT / page).read_text()
-    facts = json.loads((RESULTS / FACTS).read_text())
-
-    assert with_numbers(text, read_numbers(RESULTS / NUMBERS), facts) == text
-    assert "TODO" not in text
-
-
-def test_numbers_are_means_over_tasks_of_success_in_the_shipped_trials():
-    """Here in plain pandas, of the usual forms; trials that parts share count once."""
-    frames = pd.concat(map(pd.read_csv, RESULTS.glob("*.csv.xz")))
-    usual = frames.query("instruction_options == setting")
-    trial = usual.groupby(["policy", "setting", "task", "policy_seed", "episode"])["success"].max()
-    by_task = trial.groupby(["policy", "setting", "task"]).mean()
-    numbers = read_numbers(RESULTS / NUMBERS).query("number == 'success' and scope == 'all tasks'")
-    values = numbers.set_index(["memory", "reader", "setting"])["value"]
-
-    for (policy, setting), rate in by_task.groupby(["policy", "setting"]).mean().items():
-        assert values[*policy.split("-", 1), setting] == pytest.approx(rate, abs=1e-6)
