@@ -40,8 +40,9 @@ SCENES = 400
 """Random scenes of each task that are tested."""
 
 _BY_SETTING = """\
-Language version {version}, percent of the slots that count, on random scenes (in brackets: on the \
-test split), all tasks together:
+Language version {version}, percent of slots (parts of the goal, such as `color`) that are right, \
+on random scenes (in brackets: on the test split), all tasks together. The slots count that have \
+to be seen; if there are none, those that the command leaves out.
 
 {table}
 
@@ -158,10 +159,10 @@ def _claims(floors: Floors) -> str:
             above.append(f"{where}: {excess_text(excess, len(tested))}")
     names = ", ".join(f"`{name}`" for name in counting)
     return (
-        f"Words alone are at most {100 * MARGIN:.0f} points above chance in "
-        f"{names or 'no setting'}, over all tasks. Above this threshold, on random scenes or on "
-        f"the test split, after Bonferroni adjustment for the {counted(len(tested), 'slot')} of "
-        f"their tasks: {'; '.join(above) or 'none'}."
+        f"`text-only` is at most {100 * MARGIN:.0f} points above chance in "
+        f"{names or 'no setting'}, over all tasks. Single slots in which it is surely above this "
+        "threshold, on random scenes or on the test split (intervals Bonferroni-adjusted for "
+        f"{counted(len(tested), 'slot')}): {'; '.join(above) or 'none'}."
     )
 
 

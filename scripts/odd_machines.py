@@ -149,7 +149,7 @@ MACHINES = (
     ),
     Machine("POSIX locale", "", encoding("utf-8"), "LC_ALL=POSIX"),
     Machine(
-        "C locale, which Python keeps",
+        "C locale, which Python does not change to UTF-8",
         "",
         encoding("ascii"),
         "LC_ALL=C PYTHONCOERCECLOCALE=0 PYTHONUTF8=0",

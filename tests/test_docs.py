@@ -226,7 +226,7 @@ def tasks_with_rates(row):
 def test_percentages_in_readme_are_those_of_the_published_table(best_published):
     """README quotes means over tasks of the best published model."""
     assert f"succeeds in {best_published['explicit'].average:.0f} %" in README
-    assert f"{best_published['reasoning'].average:.0f} % is left with reasoning" in README
+    assert f"{best_published['reasoning'].average:.0f} % in reasoning" in README
 
 
 def test_readme_rightly_says_that_a_third_is_lost_with_direct_and_over_half_with_others(
