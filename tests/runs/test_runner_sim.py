@@ -5,10 +5,10 @@ import subprocess
 import sys
 
 import pytest
+from page_text import call
 from run_fakes import all_comparable
-from typer.testing import CliRunner
 
-from roboirg.main import app
+from roboirg.core.errors import RenderDeviceError
 from roboirg.records.episode_log import log_path
 from roboirg.records.store import read_records
 from roboirg.runs.plan.stored_plans import read_plan
@@ -41,10 +41,6 @@ def run_in_a_process(*words, cwd, **environment):
         text=True,
         check=False,
     )
-
-
-def run_here(*words):
-    return CliRunner().invoke(app, ["run", *map(str, words)])
 
 
 @pytest.fixture(scope="module")
@@ -89,18 +85,18 @@ def test_what_a_policy_prints_goes_to_its_log_and_not_to_the_terminal(run_of_lou
 
 
 def run_with_videos(folder, episodes):
-    """Run some episodes, of nine steps each, and keep videos of all; return how it ended."""
-    return run_here(
-        "--policy", "random", "--tasks", "PickXtimes", "--settings", "explicit", "--max-steps", "9",
-        "--video", "all", "--out", folder, "--episodes", episodes, "--workers", "1",
+    """Run some episodes, of nine steps each, and keep videos of all."""
+    call(
+        "run", "--policy", "random", "--tasks", "PickXtimes", "--settings", "explicit",
+        "--max-steps", "9", "--video", "all", "--out", folder, "--episodes", episodes,
+        "--workers", "1",
     )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def folder_of_one_episode(tmp_path_factory):
     folder = tmp_path_factory.mktemp("one episode")
-    run = run_with_videos(folder, episodes=1)
-    assert run.exit_code == 0, run.output
+    run_with_videos(folder, episodes=1)
     return folder
 
 
@@ -121,20 +117,19 @@ def test_a_render_device_that_is_not_there_ends_the_run_and_keeps_what_was_playe
     played = read_records(folder_of_one_episode)
     monkeypatch.setenv("ROBOIRG_RENDER_DEVICE", "cuda:63")
 
-    run = run_with_videos(folder_of_one_episode, episodes=2)
+    with pytest.raises(RenderDeviceError, match=r"^The render device 'cuda:63'"):
+        run_with_videos(folder_of_one_episode, episodes=2)
 
-    assert str(run.exception).startswith("The render device 'cuda:63'")
     assert read_records(folder_of_one_episode) == played
     assert read_plan(folder_of_one_episode) is not None
 
 
 def run_two_policies(folder, workers):
     """Run two policies for 40 steps each, and return the plan and the records, without times."""
-    run = run_here(
-        "--policy", "random,forgetful", "--tasks", "VideoUnmask", "--settings", "direct",
+    call(
+        "run", "--policy", "random,forgetful", "--tasks", "VideoUnmask", "--settings", "direct",
         "--episodes", "1", "--max-steps", "40", "--workers", workers, "--out", folder,
     )  # fmt: skip
-    assert run.exit_code == 0, run.output
     return read_plan(folder), all_comparable(folder)
 
 
