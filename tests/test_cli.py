@@ -18,7 +18,6 @@ from made_records import make_record
 from page_text import store
 from plan_files import plan_file
 
-from roboirg import main as cli
 from roboirg.apps.show import playthrough
 from roboirg.apps.show.episode_strip import StripMoment
 from roboirg.cli import progress_bar
@@ -32,23 +31,6 @@ from roboirg.util.console_width import progress_console
 RUN_RANDOM = ("run", "--policy", "random", "--tasks", "PickXtimes")
 RUN_TEN_EPISODES = (*RUN_RANDOM, "--episodes", "2", "--workers", "0", "--out")
 """Two episodes of PickXtimes in each of five settings; a folder follows."""
-
-
-@pytest.fixture
-def roboirg(monkeypatch, capsys):
-    """The command, in this process: from its words to its exit status, output and errors."""
-
-    def call(*words):
-        monkeypatch.setattr(sys, "argv", ["roboirg", *map(str, words)])
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as left:
-            code = left.code if isinstance(left.code, int) else 0
-        result = capsys.readouterr()
-        return SimpleNamespace(code=code, out=result.out, err=result.err)
-
-    return call
 
 
 class CannedPlayer:
