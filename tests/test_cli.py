@@ -17,6 +17,7 @@ import pytest
 from made_records import make_record
 from page_text import store
 from plan_files import plan_file
+from python_process import print_of_python, run_python
 
 from roboirg.apps.show import playthrough
 from roboirg.apps.show.episode_strip import StripMoment
@@ -302,7 +303,7 @@ def test_help_imports_no_large_library():
         "heavy = {'numpy', 'pydantic', 'sapien', 'gymnasium', 'jinja2', 'av'} & set(sys.modules)\n"
         "assert not heavy, heavy"
     )
-    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    print_of_python("-c", code)
 
 
 PRINT_WHEN_CTRL_C_IS_HANDLED = """
@@ -367,12 +368,7 @@ __main__.main()
 
 def test_ctrl_c_within_a_class_definition_prints_one_sentence():
     """Python 3.11 makes a RuntimeError of it, as happened while a library was imported."""
-    ended = subprocess.run(
-        [sys.executable, "-c", INTERRUPT_IN_A_CLASS_BODY],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    ended = run_python("-c", INTERRUPT_IN_A_CLASS_BODY)
     assert (ended.returncode, ended.stderr) == (130, "roboirg: stopped.\n")
 
 

@@ -1,11 +1,8 @@
 """The runner with the real world: what the fakes cannot show."""
 
-import os
-import subprocess
-import sys
-
 import pytest
 from page_text import call
+from python_process import run_python
 from run_fakes import all_comparable
 
 from roboirg.core.errors import RenderDeviceError
@@ -32,26 +29,16 @@ class Loud:
 """
 
 
-def run_in_a_process(*words, cwd, **environment):
-    return subprocess.run(
-        [sys.executable, "-m", "roboirg", *map(str, words)],
-        cwd=cwd,
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-
-
 @pytest.fixture(scope="module")
 def run_of_loud_policy(tmp_path_factory):
     """The process of a run of one episode by `CODE_OF_A_POLICY_THAT_PRINTS`, and its folder."""
     folder = tmp_path_factory.mktemp("loud")
     (folder / "mine.py").write_text(CODE_OF_A_POLICY_THAT_PRINTS)
     words = ("--policy", "mine:Loud", "--tasks", "PickXtimes", "--settings", "direct")
-    process = run_in_a_process(
-        "run", *words, "--episodes", "1", "--out", "o", "--workers", "1", cwd=folder
-    )
+    process = run_python(
+        "-m", "roboirg", "run", *words, "--episodes", "1", "--out", "o", "--workers", "1",
+        cwd=folder,
+    )  # fmt: skip
     return process, folder / "o"
 
 
