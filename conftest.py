@@ -14,7 +14,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -170,6 +170,30 @@ def open_page(browser: Any) -> OpenPage:
         assert wrong == []
 
     return open_address
+
+
+class EndedCommand(NamedTuple):
+    """Exit code of a command, and what it printed as output and as errors."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def roboirg(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., EndedCommand]:
+    """The command, in this process: from its words to how it ended."""
+    from roboirg import main as cli
+
+    def call(*words: object) -> EndedCommand:
+        monkeypatch.setattr(sys, "argv", ["roboirg", *map(str, words)])
+        with pytest.raises(SystemExit) as left:
+            cli.main()
+        return EndedCommand(int(left.value.code or 0), *capsys.readouterr())
+
+    return call
 
 
 @pytest.fixture

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from plan_files import plan_file
+from python_process import print_of_python
 
 import roboirg
 
@@ -69,13 +67,8 @@ def python_with_the_option(source_with_the_option):
     printed."""
 
     def call(words):
-        done = subprocess.run(
-            [sys.executable, *words.split()],
-            capture_output=True, text=True, check=False, cwd=source_with_the_option,
-            env=os.environ | {"PYTHONPATH": str(source_with_the_option), "COLUMNS": "200"},
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr
-        return done.stdout
+        place = str(source_with_the_option)
+        return print_of_python(*words.split(), cwd=place, PYTHONPATH=place, COLUMNS="200")
 
     return call
 

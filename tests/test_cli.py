@@ -17,8 +17,8 @@ import pytest
 from made_records import make_record
 from page_text import store
 from plan_files import plan_file
+from python_process import print_of_python, run_python
 
-from roboirg import main as cli
 from roboirg.apps.show import playthrough
 from roboirg.apps.show.episode_strip import StripMoment
 from roboirg.cli import progress_bar
@@ -32,23 +32,6 @@ from roboirg.util.console_width import progress_console
 RUN_RANDOM = ("run", "--policy", "random", "--tasks", "PickXtimes")
 RUN_TEN_EPISODES = (*RUN_RANDOM, "--episodes", "2", "--workers", "0", "--out")
 """Two episodes of PickXtimes in each of five settings; a folder follows."""
-
-
-@pytest.fixture
-def roboirg(monkeypatch, capsys):
-    """The command, in this process: from its words to its exit status, output and errors."""
-
-    def call(*words):
-        monkeypatch.setattr(sys, "argv", ["roboirg", *map(str, words)])
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as left:
-            code = left.code if isinstance(left.code, int) else 0
-        result = capsys.readouterr()
-        return SimpleNamespace(code=code, out=result.out, err=result.err)
-
-    return call
 
 
 class CannedPlayer:
@@ -320,7 +303,7 @@ def test_help_imports_no_large_library():
         "heavy = {'numpy', 'pydantic', 'sapien', 'gymnasium', 'jinja2', 'av'} & set(sys.modules)\n"
         "assert not heavy, heavy"
     )
-    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    print_of_python("-c", code)
 
 
 PRINT_WHEN_CTRL_C_IS_HANDLED = """
@@ -385,12 +368,7 @@ __main__.main()
 
 def test_ctrl_c_within_a_class_definition_prints_one_sentence():
     """Python 3.11 makes a RuntimeError of it, as happened while a library was imported."""
-    ended = subprocess.run(
-        [sys.executable, "-c", INTERRUPT_IN_A_CLASS_BODY],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    ended = run_python("-c", INTERRUPT_IN_A_CLASS_BODY)
     assert (ended.returncode, ended.stderr) == (130, "roboirg: stopped.\n")
 
 

@@ -1,14 +1,12 @@
 """Every command in an environment with the core alone: it works, or names the extra it needs."""
 
 import json
-import os
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import pytest
 from all_commands import all_commands, make_run, words_of
+from python_process import print_of_python
 
 from roboirg.main import _MODULES, describe_missing
 
@@ -59,12 +57,11 @@ def results_of_commands(tmp_path_factory):
     folder = tmp_path_factory.mktemp("core")
     words = words_of(str(folder), str(make_run(folder / "run")))
     refused = sorted({module for modules in _MODULES.values() for module in modules})
-    done = subprocess.run(
-        [sys.executable, "-c", RUN_COMMANDS_WITHOUT_EXTRAS, json.dumps(refused), json.dumps(words)],
-        check=True, capture_output=True, text=True, cwd=folder,
-        env=os.environ | {"ROBOIRG_WORKERS": "0"},
+    printed = print_of_python(
+        "-c", RUN_COMMANDS_WITHOUT_EXTRAS, json.dumps(refused), json.dumps(words),
+        cwd=folder, ROBOIRG_WORKERS="0",
     )  # fmt: skip
-    return json.loads(done.stdout)
+    return json.loads(printed)
 
 
 @pytest.mark.parametrize("command", EXTRA_OF_COMMAND)

@@ -1,8 +1,8 @@
 """Instructions in turns: when each utterance is heard, and who can use it."""
 
 import pytest
+from page_text import call
 from plan_files import plan_file
-from typer.testing import CliRunner
 
 import roboirg
 from roboirg import language
@@ -10,7 +10,6 @@ from roboirg.core.delivery import HeardUtterance, SpokenInstruction, utterance_s
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.settings import all_settings
-from roboirg.main import app
 from roboirg.policies import make_policy, play
 from roboirg.records.store import read_records
 from roboirg.tasks import all_tasks
@@ -210,9 +209,7 @@ def run_in_turns(tmp_path_factory):
     plan = plan_file(
         tasks="VideoUnmask", settings="explicit,direct", delivery="turns", episodes=1, video="all"
     )
-    words = ["run", "--plan", plan, "--policy", "listener", "--workers", "0", "--out", str(folder)]
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code == 0, result.output
+    call("run", "--plan", plan, "--policy", "listener", "--workers", "0", "--out", folder)
     return folder
 
 

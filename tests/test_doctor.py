@@ -1,27 +1,19 @@
 """The doctor, on this machine and on machines with something missing."""
 
-import os
 import re
 import signal
 import subprocess
-import sys
 from importlib import metadata
 
 import pytest
+from python_process import run_python
 
 from roboirg.cli import doctor
 from roboirg.cli.doctor import Check
 
 
 def run_module(*arguments, **environment):
-    return subprocess.run(
-        [sys.executable, "-m", "roboirg.cli.doctor", *arguments],
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=600,
-    )
+    return run_python("-m", "roboirg.cli.doctor", *arguments, **environment)
 
 
 @pytest.mark.sim

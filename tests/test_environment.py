@@ -2,10 +2,7 @@
 
 import dataclasses
 import inspect
-import os
 import re
-import subprocess
-import sys
 import warnings
 import weakref
 from typing import NamedTuple
@@ -15,6 +12,7 @@ import numpy as np
 import pytest
 from flat_jobs import job_of
 from gymnasium.utils.env_checker import check_env
+from python_process import run_python
 
 import roboirg
 from roboirg.core.actions import ACTION_SPACES
@@ -480,14 +478,8 @@ def test_make_refuses_wrong_names_and_numbers_before_anything_is_built(options, 
 
 def run_without_vulkan(program):
     """Run a program in a process that finds no driver for drawing."""
-    missing = {"VK_DRIVER_FILES": "/nonexistent", "VK_ICD_FILENAMES": "/nonexistent"}
-    return subprocess.run(
-        [sys.executable, "-c", program],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, **missing},
-    )
+    missing = "/nonexistent"
+    return run_python("-c", program, VK_DRIVER_FILES=missing, VK_ICD_FILENAMES=missing)
 
 
 def test_without_vulkan_an_episode_with_cameras_ends_with_what_to_install():

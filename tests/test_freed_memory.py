@@ -1,9 +1,9 @@
 """Freed memory is used again without new pages."""
 
-import subprocess
 import sys
 
 import pytest
+from python_process import print_of_python
 
 PROGRAM_THAT_COUNTS_NEW_PAGES = """
 import resource, sys
@@ -29,13 +29,7 @@ def page_faults(mode):
     Args:
         mode: "keep" to use freed memory again, "not" to leave it to the system.
     """
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM_THAT_COUNTS_NEW_PAGES, mode],
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    return int(done.stdout)
+    return int(print_of_python("-c", PROGRAM_THAT_COUNTS_NEW_PAGES, mode))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's memory")

@@ -1,14 +1,12 @@
 """The documentation site: built without a warning, no dead link, usable offline."""
 
-import os
-import subprocess
-import sys
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import count_commands
 import pytest
+from python_process import run_python
 
 import roboirg
 
@@ -20,14 +18,10 @@ ROOT = Path(__file__).parents[1]
 @pytest.fixture(scope="module")
 def folder_of_the_site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("site")
-    done = subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", folder],
-        cwd=ROOT,
-        env=os.environ | {"NO_MKDOCS_2_WARNING": "1", "JUPYTER_PLATFORM_DIRS": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_python(
+        "-m", "mkdocs", "build", "--strict", "--site-dir", folder,
+        cwd=ROOT, NO_MKDOCS_2_WARNING="1", JUPYTER_PLATFORM_DIRS="1",
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "WARNING" not in done.stderr, done.stderr
     return folder

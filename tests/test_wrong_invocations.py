@@ -9,8 +9,6 @@ import sys
 import pytest
 from all_commands import all_commands, make_run, words_of
 
-from roboirg import main as cli
-
 WRONG_NAMES = {
     "--tasks": "PickXtime", "--settings": "spatail", "--forms": "implict",
     "--split": "tset", "--episodes": "four", "--policy-seeds": "one",
@@ -82,18 +80,15 @@ def folder_with_a_run(tmp_path_factory):
 
 
 @pytest.fixture
-def refused(folder_with_a_run, monkeypatch, capsys):
+def refused(folder_with_a_run, monkeypatch, roboirg):
     """Call a command that ends with exit code 2, and return what it prints."""
     monkeypatch.chdir(folder_with_a_run)
     monkeypatch.setattr(sys, "path", list(sys.path))
 
     def call(name, words):
-        monkeypatch.setattr(sys, "argv", ["roboirg", *name.split(), *words])
-        with pytest.raises(SystemExit) as left:
-            cli.main()
-        printed = capsys.readouterr()
-        assert left.value.code == 2, printed
-        return printed
+        ended = roboirg(*name.split(), *words)
+        assert ended.code == 2, ended
+        return ended
 
     return call
 

@@ -2,7 +2,7 @@
 
 import pytest
 from made_records import make_record
-from run_fakes import FakePlay, changed, small_plan
+from run_fakes import FakePlay, changed, fake_run, small_plan
 
 from roboirg.analysis.measures.breakdowns import BREAKDOWNS, break_down
 from roboirg.analysis.measures.comparison import compare, compare_settings
@@ -29,7 +29,7 @@ def stopped_run(tmp_path_factory):
     """
     folder = tmp_path_factory.mktemp("stopped")
     plan = changed(small_plan(50), stop=StopRule())
-    run_plan(plan, folder, FakePlay(), InProcess())
+    fake_run(folder, plan)
     return folder
 
 
@@ -45,9 +45,9 @@ def test_episodes_that_need_not_be_played_have_an_outcome_of_their_own(stopped_r
 def test_results_from_after_the_decision_count_nowhere(tmp_path):
     """A full run that is given the rule afterwards has the table of one that stopped."""
     full = small_plan(50)
-    run_plan(full, tmp_path, FakePlay(), InProcess())
+    fake_run(tmp_path, full)
 
-    run_plan(changed(full, stop=StopRule()), tmp_path, FakePlay(), InProcess())
+    fake_run(tmp_path, changed(full, stop=StopRule()))
 
     outcomes = list(Source(tmp_path).frame["outcome"])
     assert outcomes.count("spared") == 2 * (50 - 16)
@@ -139,7 +139,7 @@ def test_a_comparison_prints_of_uneven_tasks_what_the_stopped_run_printed(tmp_pa
 
 def test_a_full_run_is_compared_by_both_kinds_of_p_value(tmp_path):
     """The plan of 16 scenes was fixed before, so the exact test holds, too."""
-    run_plan(small_plan(16), tmp_path, FakePlay(), InProcess())
+    fake_run(tmp_path, small_plan(16))
 
     comparison = compare_settings(Source(tmp_path).frame)
 
@@ -151,13 +151,13 @@ def test_a_full_run_is_compared_by_both_kinds_of_p_value(tmp_path):
 def test_the_results_of_a_stored_policy_are_copied_once_and_become_a_side(tmp_path):
     """The stored policy ``random`` has played; ``oracle`` is the one that is to be compared."""
     stored = changed(small_plan(8), settings="direct")
-    run_plan(stored, tmp_path / "stored", FakePlay(), InProcess())
+    fake_run(tmp_path / "stored", stored)
     plan = changed(small_plan(8, policies=("oracle",)), settings="direct", stop=StopRule())
     folder = tmp_path / "new"
 
     first = against_stored(plan, str(tmp_path / "stored"), folder)
     again = against_stored(plan, f"{tmp_path / 'stored'}:random", folder)
-    run_plan(first, folder, FakePlay(), InProcess())
+    fake_run(folder, first)
 
     assert first == again
     assert first.stop.against == "random"
@@ -167,33 +167,45 @@ def test_the_results_of_a_stored_policy_are_copied_once_and_become_a_side(tmp_pa
     assert len(Source(folder).results) == 16
 
 
-def test_a_stored_policy_of_the_same_name_is_refused(tmp_path):
-    """Its results could not be told from the new ones."""
-    run_plan(small_plan(2), tmp_path / "stored", FakePlay(), InProcess())
-
-    with pytest.raises(InvalidValueError, match="give that another one with --policy NAME=SPEC"):
-        against_stored(small_plan(2), str(tmp_path / "stored"), tmp_path / "new")
+ORACLE_ALONE = small_plan(2, policies=("oracle",))
 
 
-def test_stored_results_under_other_conditions_are_refused(tmp_path):
-    """They were played with fewer steps than the plan allows."""
-    stored = changed(small_plan(2), max_steps=100)
-    run_plan(stored, tmp_path / "stored", FakePlay(), InProcess())
-    plan = small_plan(2, policies=("oracle",))
+@pytest.mark.parametrize(
+    ("stored", "plan", "complaint"),
+    [
+        (small_plan(2), small_plan(2), "give that another one with --policy NAME=SPEC"),
+        (
+            changed(small_plan(2), max_steps=100),
+            ORACLE_ALONE,
+            "no result of an episode of this plan",
+        ),
+        (
+            small_plan(2),
+            small_plan(2, policies=("oracle", "listener")),
+            "this plan has several: oracle, listener",
+        ),
+    ],
+    ids=["the same policy", "fewer steps than the plan allows", "a plan of two policies"],
+)
+def test_a_stored_side_that_cannot_be_compared_with_a_plan_is_refused(
+    tmp_path, stored, plan, complaint
+):
+    """Results of a policy of the same name, for example, could not be told from the new ones."""
+    fake_run(tmp_path / "stored", stored)
 
-    with pytest.raises(InvalidValueError, match="no result of an episode of this plan"):
+    with pytest.raises(InvalidValueError, match=complaint):
         against_stored(plan, str(tmp_path / "stored"), tmp_path / "new")
 
 
 def test_results_that_an_earlier_plan_left_in_the_folder_are_no_trials(tmp_path):
     """The stored policy has seeds 0 and 1 there, and silent controls; the plan has seed 0 alone."""
     earlier = changed(small_plan(8, seeds=2), settings="direct", arms="told,silent")
-    run_plan(earlier, tmp_path, FakePlay(), InProcess())
+    fake_run(tmp_path, earlier)
     plan = changed(
         small_plan(8, policies=("oracle",)), settings="direct", stop=StopRule(against="random")
     )
 
-    run_plan(plan, tmp_path, FakePlay(), InProcess())
+    fake_run(tmp_path, plan)
 
     source = Source(tmp_path)
     counts = {len(jobs) for scenes in source.stopping.trials.values() for jobs in scenes.values()}
@@ -217,7 +229,7 @@ def test_only_scenes_that_the_stored_policy_has_are_played(tmp_path):
     run_plan(again, folder, play, InProcess())
     plan = against_stored(plan, str(tmp_path / "stored"), folder)
 
-    summary = run_plan(plan, folder, FakePlay(), InProcess())
+    summary = fake_run(folder, plan)
 
     assert (summary.played, summary.spared) == (4, 4)
     (compared,) = Source(folder).stopping.compared
@@ -240,18 +252,10 @@ def test_a_merged_run_is_still_marked(stopped_run, tmp_path):
 def test_results_of_a_run_that_played_task_by_task_have_no_bounds(tmp_path):
     """The first 8 of 16 scenes are no random half, so they do not say where the rest lies."""
     plan = small_plan(16)
-    run_plan(small_plan(8), tmp_path, FakePlay(), InProcess())
+    fake_run(tmp_path, small_plan(8))
     write_plan(plan, tmp_path)
 
     (figures,) = compare_settings(Source(tmp_path).frame).anytime
 
     assert figures.interval is None
     assert figures.text.endswith("after 8 of 16 scenes")
-
-
-def test_a_stored_side_is_refused_for_a_plan_of_two_policies(tmp_path):
-    run_plan(small_plan(2), tmp_path / "stored", FakePlay(), InProcess())
-    plan = small_plan(2, policies=("oracle", "listener"))
-
-    with pytest.raises(InvalidValueError, match="this plan has several: oracle, listener"):
-        against_stored(plan, str(tmp_path / "stored"), tmp_path / "new")

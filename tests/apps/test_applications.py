@@ -1,13 +1,11 @@
 """Each application may be left out: its commands and kinds of policies go, and nothing else."""
 
 import json
-import os
 import shutil
-import subprocess
-import sys
 
 import layout
 import pytest
+from python_process import print_of_python
 from selection import slow_but
 
 APPLICATIONS = sorted(path.parent.name for path in (layout.PACKAGE / "apps").glob("*/__init__.py"))
@@ -57,12 +55,7 @@ def start(*words, program=PRINT_COMMANDS, **variables):
     Returns:
         its commands, the kinds of its policies, and what it printed after them.
     """
-    done = subprocess.run(
-        [sys.executable, "-c", program, *words],
-        capture_output=True, text=True, check=False, env=os.environ | variables,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    listed, _, printed = done.stdout.partition("\n")
+    listed, _, printed = print_of_python("-c", program, *words, **variables).partition("\n")
     commands, kinds = json.loads(listed)
     return set(commands), set(kinds), printed
 

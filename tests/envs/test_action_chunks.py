@@ -1,14 +1,13 @@
 """Chunks of actions as one step, also in Gymnasium's vector environment."""
 
 import re
-import subprocess
-import sys
 from functools import partial
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+from python_process import print_of_python
 
 import roboirg
 from roboirg.core.errors import InvalidActionError, InvalidValueError
@@ -137,6 +136,4 @@ def test_the_documents_example_plays_a_chunk_of_16_actions_in_each_environment(t
     script = tmp_path / "example.py"
     script.write_text(example)
 
-    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
-
-    assert done.stdout == "[False False False False] [16 16 16 16]\n", done.stderr
+    assert print_of_python(script) == "[False False False False] [16 16 16 16]\n"

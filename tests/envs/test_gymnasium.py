@@ -1,12 +1,11 @@
 """At home in Gymnasium: reset options, its own vector environments, its wrappers, its registry."""
 
-import subprocess
-import sys
 import warnings
 
 import gymnasium
 import numpy as np
 import pytest
+from python_process import print_of_python
 
 import roboirg
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -113,12 +112,10 @@ def test_a_fork_before_drawing_works():
         "vector.close()\n"
     )
 
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=False
-    )
+    printed = print_of_python("-c", program)
 
     said = [roboirg.make("PickXtimes", episode=index).instruction.text for index in (4, 5)]
-    assert done.stdout.splitlines() == said, done.stderr
+    assert printed.splitlines() == said
 
 
 def test_a_fork_after_drawing_fails_at_once_with_the_reason():

@@ -1,8 +1,6 @@
 """RoboMME's episodes as data: the shipped files are what the rows give, and they replay."""
 
-import contextlib
 import importlib.util
-import io
 import json
 import math
 from collections import Counter
@@ -12,15 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-import typer
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from page_text import call
 from selection import slow_but
 
 from roboirg.core.episode import SPLITS, Scene, SceneObject
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.motions import Point, Swap
-from roboirg.main import app
 from roboirg.tasks import all_tasks, every_task, get_task
 from roboirg.tasks.splits import published_episodes
 from roboirg.tasks.splits.episode_export import write_episodes
@@ -39,14 +36,6 @@ def converter():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-def roboirg(*words):
-    """Call a command in this process and return what it prints."""
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out):
-        typer.main.get_command(app)(list(map(str, words)), standalone_mode=False)
-    return out.getvalue()
 
 
 def test_the_shipped_file_is_what_the_rows_give(converter):
@@ -298,7 +287,7 @@ def test_the_command_exports_a_split(tmp_path):
     tasks of 50 test episodes, and the file has a line for each episode."""
     path = tmp_path / "episodes.jsonl"
 
-    said = roboirg("export", "episodes", "--tasks", "StopCube,real", "--out", path)
+    said = call("export", "episodes", "--tasks", "StopCube,real", "--out", path)
 
     assert said == f"Wrote 150 episodes to {path}.\n"
     rows = [json.loads(line) for line in path.read_text().splitlines()]
@@ -308,4 +297,4 @@ def test_the_command_exports_a_split(tmp_path):
 
 def test_episodes_are_not_exported_to_a_folder(tmp_path):
     with pytest.raises(InvalidValueError, match="is not a file in an existing folder"):
-        roboirg("export", "episodes", "--out", tmp_path)
+        call("export", "episodes", "--out", tmp_path)

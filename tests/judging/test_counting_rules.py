@@ -152,6 +152,9 @@ RED_LYING = Fact("lying", "cube_red")
 RIGHT, LEFT = (Fact("over", "cube_red", f"target_{side}") for side in ("right", "left"))
 PICK_RED = [[RED_LYING], [RED_HELD]]
 RIGHT_THEN_LEFT = [[RED_HELD, RIGHT], [RED_HELD, RIGHT], [RED_HELD], [RED_HELD, LEFT], [RED_HELD]]
+SWINGS = [*RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT]
+SIX_VISITS_OF_BLUE = [[RED_HELD, Fact("over", "cube_blue", "target_right")], [RED_HELD]] * 6
+FALL = [[RED_LYING], [RED_LYING], [RED_HELD]]
 
 
 def judged_swings(*steps):
@@ -159,24 +162,31 @@ def judged_swings(*steps):
     return judged(RED_TWICE, SWING_SCENE, *steps)
 
 
-def test_swing_is_done_after_the_swings_the_put_down_and_the_press():
+@pytest.mark.parametrize(
+    "steps",
+    [
+        SWINGS,
+        [*SIX_VISITS_OF_BLUE, *SWINGS],
+        [*RIGHT_THEN_LEFT, *FALL, *RIGHT_THEN_LEFT],
+        [*SWINGS, [RED_LYING], [RED_HELD]],
+    ],
+    ids=["as planned", "visits of another cube", "a fall in between", "picked up once more"],
+)
+def test_swing_is_done_after_the_swings_the_put_down_and_the_press(steps):
     """The goal is to swing the red cube from the right to the left target, twice. PICK_RED and
-    RIGHT_THEN_LEFT have the facts of the steps of a pick and of one such swing."""
-    judge = judged_swings(
-        *PICK_RED, *RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT, [RED_LYING], [RED_LYING, PRESSED]
-    )
+    RIGHT_THEN_LEFT have the facts of the steps of a pick and of one such swing. A blue cube may be
+    over the right target meanwhile, and the red one may fall, or be picked up after a put-down."""
+    judge = judged_swings(*PICK_RED, *steps, [RED_LYING], [RED_LYING, PRESSED])
+
     assert judge.status is Status.SUCCESS
 
 
 def test_swing_succeeds_if_the_cube_is_put_down_over_the_left_target():
     """The red cube, twice; lying down over a target is no visit too many."""
-    judge = judged_swings(
-        *PICK_RED,
-        *RIGHT_THEN_LEFT,
-        *RIGHT_THEN_LEFT[:-1],
-        [LEFT, RED_LYING],
-        [LEFT, RED_LYING, PRESSED],
-    )
+    down = [[LEFT, RED_LYING], [LEFT, RED_LYING, PRESSED]]
+
+    judge = judged_swings(*PICK_RED, *SWINGS[:-1], *down)
+
     assert judge.status is Status.SUCCESS
 
 
@@ -198,46 +208,13 @@ def test_swing_punishes_a_visit_too_many_before_and_after_the_put_down(side, put
     """The red cube was swung twice from the right to the left target, as is meant: four visits.
     `side` is the fact that it is over one of the targets a fifth time, before or after it was
     put down."""
-    swings = [*PICK_RED, *RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT, *put_down]
+    swings = [*PICK_RED, *SWINGS, *put_down]
 
     judge = judged_swings(*swings, [RED_HELD, side])
 
     assert judged_swings(*swings).status is Status.ONGOING
     assert judge.status is Status.FAILURE
     assert judge.cause.startswith("moved the cube over a target too often")
-
-
-def test_swing_visits_of_other_cubes_do_not_count():
-    """The red cube is to swing twice from right to left. While it is held, a blue cube is over the
-    right target six times, without having been picked up."""
-    visits = [[RED_HELD, Fact("over", "cube_blue", "target_right")], [RED_HELD]] * 6
-    swings = [*RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT]
-
-    judge = judged_swings(*PICK_RED, *visits, *swings, [RED_LYING], [RED_LYING, PRESSED])
-
-    assert judge.status is Status.SUCCESS
-
-
-def test_swing_does_not_punish_dropping_between_the_swings():
-    """The goal is to swing the red cube from the right to the left target, twice. Between the two
-    it falls, lies for two steps and is picked up again, which costs nothing."""
-    dropped = [[RED_LYING], [RED_LYING], [RED_HELD]]
-    swings = [*RIGHT_THEN_LEFT, *dropped, *RIGHT_THEN_LEFT]
-
-    judge = judged_swings(*PICK_RED, *swings, [RED_LYING], [RED_LYING, PRESSED])
-
-    assert judge.status is Status.SUCCESS
-
-
-def test_swing_does_not_punish_picking_the_cube_up_again_after_the_put_down():
-    """The two swings are done and the cube was put down. It is picked up and put down once more,
-    without a visit to a target, before the button is pressed."""
-    swings = [*RIGHT_THEN_LEFT, *RIGHT_THEN_LEFT]
-    again = [[RED_LYING], [RED_HELD], [RED_LYING]]
-
-    judge = judged_swings(*PICK_RED, *swings, *again, [RED_LYING, PRESSED])
-
-    assert judge.status is Status.SUCCESS
 
 
 # StopCube: 120 steps a pass, the third visit, whose middle is at step 300.

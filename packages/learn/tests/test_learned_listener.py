@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from page_text import call
 from plan_files import plan_file
 from typer.testing import CliRunner
 
@@ -416,9 +417,7 @@ def short_study(few_episodes, tmp_path):
     plan = plan_file(tasks="StopCube", training=short)
 
     def run():
-        words = ["learn", "listener", "--study", "--plan", plan, "--out", str(tmp_path)]
-        done = CliRunner().invoke(app, words)
-        assert done.exit_code == 0, done.output
+        call("learn", "listener", "--study", "--plan", plan, "--out", tmp_path)
 
     run()
     return tmp_path, run

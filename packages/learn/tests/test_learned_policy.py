@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from page_text import call
 from plan_files import plan_file
 from typer.testing import CliRunner
 
@@ -471,9 +472,8 @@ def folder_of_policy(tmp_path_factory):
     folder = tmp_path_factory.mktemp("policy")
     plan = plan_file(training=SHORT_TRAINING)
     words = f"learn policy --tasks ButtonUnmask --out {folder} --plan {plan} --workers 0"
-    done = CliRunner().invoke(app, words.split())
-    assert done.exit_code == 0, done.output
-    assert PolicyFiles(folder / BODY, folder / READER).spec in done.output
+    printed = call(*words.split())
+    assert PolicyFiles(folder / BODY, folder / READER).spec in printed
     return folder
 
 
@@ -524,9 +524,8 @@ def test_a_trained_policy_plays_and_its_records_say_what_memory_it_has(folder_of
     spec = PolicyFiles(folder_of_policy / BODY, folder_of_policy / READER).spec
     words = f"run --policy {spec} --tasks ButtonUnmask --settings explicit,direct --episodes 1"
 
-    done = CliRunner().invoke(app, [*words.split(), "--out", str(tmp_path)])
+    call(*words.split(), "--out", tmp_path)
 
-    assert done.exit_code == 0, done.output
     first, second = read_records(next(tmp_path.rglob("records.jsonl")).parent)
     assert first.error is second.error is None
     assert first.policy_metadata["trained"]["body"]["memory"] == "recurrent"
@@ -582,9 +581,8 @@ def test_a_second_policy_in_a_folder_writes_no_file_of_the_first_again(folder_of
     plan = plan_file(training=SHORT_TRAINING)
     words = "learn policy --tasks ButtonUnmask --memory none --settings none --workers 0"
 
-    done = CliRunner().invoke(app, [*words.split(), "--out", str(folder_of_policy), "--plan", plan])
+    call(*words.split(), "--out", folder_of_policy, "--plan", plan)
 
-    assert done.exit_code == 0, done.output
     assert (folder_of_policy / "none-0.body.safetensors").exists()
     assert (folder_of_policy / "none-0.reader.safetensors").exists()
     assert {path: path.stat().st_mtime_ns for path in before} == before
@@ -596,20 +594,9 @@ def trained_reader_file(tmp_path_factory):
     pytest.importorskip("torch")
     out = tmp_path_factory.mktemp("reader") / "new.reader"
     plan = plan_file(training={"scenes": 2, "reader_epochs": 2})
-    words = [
-        "learn",
-        "reader",
-        "--tasks",
-        "StopCube",
-        "--settings",
-        "explicit,direct",
-        "--workers",
-        "0",
-    ]
-    words += ["--body", str(SHIPPED.body), "--out", str(out), "--plan", plan]
-    done = CliRunner().invoke(app, words)
-    assert done.exit_code == 0, done.output
-    assert PolicyFiles(SHIPPED.body, out).spec in done.output
+    words = ["learn", "reader", "--tasks", "StopCube", "--settings", "explicit,direct"]
+    words += ["--workers", "0", "--body", SHIPPED.body, "--out", out, "--plan", plan]
+    assert PolicyFiles(SHIPPED.body, out).spec in call(*words)
     return out, words
 
 
@@ -650,10 +637,9 @@ def test_a_reader_whose_file_is_lost_is_made_again_without_training(trained_read
     version = load_reader(out).version
     out.unlink()
 
-    again = CliRunner().invoke(app, command)
+    printed = call(*command)
 
-    assert again.exit_code == 0, again.output
-    assert "reader: 1 of 2" not in again.output
+    assert "reader: 1 of 2" not in printed
     assert load_reader(out).version == version
 
 

@@ -2,13 +2,11 @@
 
 import math
 import re
-import sys
 
 import pytest
 from plan_files import plan_file
 from pyarrow import parquet
 
-from roboirg import main as cli
 from roboirg.apps.demonstrations import dataset_replay
 from roboirg.apps.demonstrations.dataset_replay import ReplayResult
 from roboirg.language import instruct
@@ -21,20 +19,6 @@ def within(**choices):
 
 
 FEW = ("--tasks", "PickXtimes", "--episodes", "2", "--settings", "explicit,direct")
-
-
-@pytest.fixture
-def roboirg(monkeypatch, capsys):
-    def call(*words):
-        monkeypatch.setattr(sys, "argv", ["roboirg", *map(str, words)])
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as left:
-            code = left.code or 0
-        return code, *capsys.readouterr()
-
-    return call
 
 
 @pytest.mark.parametrize(
