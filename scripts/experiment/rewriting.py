@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 from roboirg.core.delivery import SpokenInstruction
+from roboirg.core.episode import Episode
+from roboirg.core.observations import Pixels
 from roboirg.extension.sight import LOOK_EVERY, shown_to_policy
 from roboirg.policies.by_name.policy_kinds import namer_of
 from roboirg.policies.contract.goal_naming import SaidAndShown
@@ -44,9 +47,15 @@ def rewrite(namer: str, seed: int, job: Job) -> dict[str, Any]:
     picture: Any = None
     shown: dict[str, Any] = {}
     if hasattr(made, "cameras"):
-        picture, shown["front_rgb"] = shown_to_policy(episode, LOOK_EVERY)
+        picture, shown["front_rgb"] = _shown(episode)
     goal = made.name_goal(SaidAndShown(job.task, text, shown, lambda: picture))
     if goal is None:
         return {"heard": text}
     command = explicit_command(episode, goal, KNOWN_WORDS)
     return {"heard": command, "understood": dict(goal.as_mapping())}
+
+
+@functools.lru_cache(maxsize=1)
+def _shown(episode: Episode) -> tuple[Pixels, Sequence[Pixels]]:
+    """Return what a policy sees at first, as `shown_to_policy` does; settings follow each other."""
+    return shown_to_policy(episode, LOOK_EVERY)
