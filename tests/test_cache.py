@@ -183,8 +183,12 @@ def test_a_cache_that_cannot_be_written_is_reported_once_and_does_without(tmp_pa
     assert "is unusable" in caplog.text
 
 
-def test_a_cache_that_is_off_keeps_nothing(monkeypatch):
-    monkeypatch.setenv("ROBOIRG_CACHE", "off")
+@pytest.mark.parametrize(
+    ("variable", "value"), [("ROBOIRG_CACHE", "off"), ("ROBOIRG_CACHE_GIB", "1e-8")]
+)
+def test_a_cache_that_is_off_or_too_small_keeps_nothing(monkeypatch, variable, value):
+    """1e-8 GiB are ten bytes, for which the entry with its head is too large."""
+    monkeypatch.setenv(variable, value)
 
     open_cache("actions").write("a1", b"content")
 
@@ -208,15 +212,6 @@ def test_the_cache_is_in_the_user_s_cache_folder_by_default(tmp_path, monkeypatc
     open_cache("frames").write("a1", b"content")
 
     assert (tmp_path / "roboirgbench" / "frames" / "a1").exists()
-
-
-def test_a_variable_sets_the_size_of_the_cache(monkeypatch):
-    """1e-8 GiB are ten bytes, for which the entry with its head is too large."""
-    monkeypatch.setenv("ROBOIRG_CACHE_GIB", "1e-8")
-
-    open_cache("frames").write("b2", b"content")
-
-    assert open_cache("frames").read("b2") is None
 
 
 @pytest.mark.parametrize("wrong", ["0", "-1", "many", "nan", "inf"])

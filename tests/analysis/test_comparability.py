@@ -150,27 +150,20 @@ def test_a_table_without_published_rates_marks_the_best_rate_alone():
     assert "comparable" not in " ".join(table.notes)
 
 
-def test_a_note_on_differences_names_no_policy_if_all_differ_alike():
-    """Two policies heard our own words (`wordings` is None), not the paper's."""
+@pytest.mark.parametrize(
+    ("options_of_b", "named"),
+    [({"wordings": None}, ""), ({"max_steps": 9}, " (listener, max steps 1300, our own words)")],
+    ids=["alike", "another limit"],
+)
+def test_a_note_on_differences_names_the_policy_unless_all_differ_alike(options_of_b, named):
+    """The listener heard our own words (`wordings` is None), not the paper's. Policy b heard them,
+    too, or the paper's, with another step limit."""
     listener = results_like_the_papers(wordings=None)
-    other = results_like_the_papers(wordings=None, policy="b")
+    other = results_like_the_papers(policy="b", **options_of_b)
 
     table = make_table("main", run_data_of(listener, other), published=True)
 
-    assert "≠ not comparable with the published rate: our own words." in table.notes
-
-
-def test_a_note_on_differences_names_the_policy_that_alone_has_them():
-    """The listener plays in other words, policy b with another step limit."""
-    listener = results_like_the_papers(wordings=None)
-    other = results_like_the_papers(policy="b", max_steps=9)
-
-    table = make_table("main", run_data_of(listener, other), published=True)
-
-    assert (
-        "≠ not comparable with the published rate (listener, max steps 1300, our own words): "
-        "our own words."
-    ) in table.notes
+    assert f"≠ not comparable with the published rate{named}: our own words." in table.notes
 
 
 def test_in_the_terminal_only_explicit_rates_are_marked_as_comparable_or_not():

@@ -37,22 +37,24 @@ def test_left_and_right_are_exchanged_in_a_phrase_and_other_words_stay(phrase, e
     assert exchange_sides(phrase) == exchanged
 
 
-def test_the_mirrored_object_of_the_cube_on_the_far_left_is_the_one_on_the_far_right():
-    """The blue cube stands on the far left, the red one on the far right, the green one between."""
-    episode = get_episode("PickXtimes", "test", 2)
+@pytest.mark.parametrize(
+    ("index", "introduction", "mirrored"),
+    [
+        (2, "Let's start with the cube on the far left.", {"cube_blue": {"cube_red"}}),
+        (7, "Let's start with the cube farthest from the button.", {}),
+    ],
+)
+def test_a_place_on_one_side_has_a_mirrored_object_and_another_place_has_none(
+    index, introduction, mirrored
+):
+    """In episode 2 the blue cube stands on the far left, the red one on the far right, and the
+    green one between. In episode 7, who takes left for right still finds the cube that is farthest
+    from the button."""
+    episode = get_episode("PickXtimes", "test", index)
     said = instruct(episode, "spatial")
 
-    assert said.turns[0] == "Let's start with the cube on the far left."
-    assert mirrored_objects(episode, said) == {"cube_blue": {"cube_red"}}
-
-
-def test_a_place_without_left_or_right_has_no_mirrored_object():
-    """Who takes left for right still finds the cube that is farthest from the button."""
-    episode = get_episode("PickXtimes", "test", 7)
-    said = instruct(episode, "spatial")
-
-    assert said.turns[0] == "Let's start with the cube farthest from the button."
-    assert mirrored_objects(episode, said) == {}
+    assert said.turns[0] == introduction
+    assert mirrored_objects(episode, said) == mirrored
 
 
 def test_an_instruction_without_a_place_has_no_mirrored_object():

@@ -169,15 +169,22 @@ def policy_after_reset(seed=0, options=""):
     return policy
 
 
+def first_batch(checkpoint):
+    """Return what the model of a checkpoint gets in the first step of an episode."""
+    policy_after_reset().act(moment(1))
+
+    (batch,) = checkpoint.model.batches
+    return batch
+
+
 def test_a_checkpoint_gets_pictures_and_state_under_lerobot_s_names(checkpoint):
     """STATE, FRONT and WRIST are LeRobot's names, such as `observation.state`.
 
     A picture has its channels first and values from 0 to 1: turned back, it is the one that was
     seen.
     """
-    policy_after_reset().act(moment(1))
+    batch = first_batch(checkpoint)
 
-    (batch,) = checkpoint.model.batches
     assert set(batch) == {"task", STATE, FRONT, WRIST}
     assert batch["task"] == [INSTRUCTION]
     shown = batch[FRONT][0].permute(1, 2, 0).numpy() * 255
@@ -226,9 +233,8 @@ def test_pictures_are_resized_to_the_square_that_a_checkpoint_declares(checkpoin
     """
     checkpoint.config.input_features = {STATE: None, FRONT: SimpleNamespace(shape=declared)}
 
-    policy_after_reset().act(moment(1))
+    batch = first_batch(checkpoint)
 
-    (batch,) = checkpoint.model.batches
     assert set(batch) == {"task", STATE, FRONT}
     assert batch[FRONT].shape == (1, 3, *size)
 
@@ -241,9 +247,8 @@ def test_a_resized_picture_has_the_means_of_its_pixels(checkpoint):
     """
     checkpoint.config.input_features = {FRONT: SimpleNamespace(shape=(3, 4, 4))}
 
-    policy_after_reset().act(moment(1))
+    batch = first_batch(checkpoint)
 
-    (batch,) = checkpoint.model.batches
     means = moment(1)["front_rgb"].reshape(4, 2, 4, 2, 3).mean(axis=(1, 3))
     assert np.allclose(batch[FRONT][0].permute(1, 2, 0).numpy() * 255, means, atol=0.51)
 

@@ -1,10 +1,10 @@
 """Kinds of policies that other packages add: the recipe of docs/extend.md, as it stands."""
 
-import subprocess
 import sys
 
 import pytest
 from doc_recipe import install
+from python_process import print_of_python
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies import make_policy
@@ -47,6 +47,4 @@ def test_finding_policies_does_not_load_the_reader_of_commands():
     """Only listeners and rewriters need its patterns, whose compiling delays every command."""
     code = "import sys, roboirg.policies; print('roboirg.reader' in sys.modules)"
 
-    printed = subprocess.check_output([sys.executable, "-c", code], text=True)
-
-    assert printed.strip() == "False"
+    assert print_of_python("-c", code) == "False\n"

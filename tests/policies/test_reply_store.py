@@ -67,6 +67,16 @@ def ask_in_episode(server, settings, *words, episode="a", shade=None, **options)
     return replies, Counter(vlm.usage())
 
 
+def ask_twice(settings, replies=("one", "two"), changes=(), **options):
+    """Ask a question, and again with changed options; return what comes the second time.
+
+    The model gives the replies in turn.
+    """
+    with fake_vlm(list(replies)) as server:
+        ask_in_episode(server, settings, "words", **options)
+        return ask_in_episode(server, settings, "words", **{**options, **dict(changes)})
+
+
 def test_replies_stored_for_an_episode_are_used_when_it_is_played_again(settings):
     """Two questions are asked, and both again as after an interruption. No call is paid twice: the
     model, which would say *never* by then, gets two requests.
@@ -114,10 +124,7 @@ def test_a_run_that_measures_the_spread_of_a_model_asks_everything_again(tmp_pat
 
 def test_without_a_store_the_same_question_is_asked_again():
     """No reply is stored if there are no settings of a store (None)."""
-    with fake_vlm(["one", "two"]) as server:
-        ask_in_episode(server, None, "first")
-
-        replies, _ = ask_in_episode(server, None, "first")
+    replies, _ = ask_twice(settings=None)
 
     assert replies == ["two"]
 
@@ -126,10 +133,7 @@ def test_a_stored_reply_is_not_used_for_another_picture(settings):
     """The same words with a picture of another shade are another question, so the model is asked
     and says *two*. As pictures may differ in a bit on another machine, this is counted.
     """
-    with fake_vlm(["one", "two"]) as server:
-        ask_in_episode(server, settings, "words", shade=1)
-
-        replies, counts = ask_in_episode(server, settings, "words", shade=2)
+    replies, counts = ask_twice(settings, changes={"shade": 2}, shade=1)
 
     assert replies == ["two"]
     assert counts["anew"] == 1
@@ -146,10 +150,7 @@ def test_a_stored_reply_is_used_unless_an_option_changes_that_would_change_it(
     """Stored is the reply *one*; who asks the model anew gets *two*. Another temperature may
     change a reply; how long to wait and what it costs does not.
     """
-    with fake_vlm(["one", "two"]) as server:
-        ask_in_episode(server, settings, "words")
-
-        replies, _ = ask_in_episode(server, settings, "words", **changes)
+    replies, _ = ask_twice(settings, changes=changes)
 
     assert replies == [reply]
 
@@ -229,10 +230,7 @@ def test_a_reply_of_unknown_cost_stops_a_run_with_a_budget(tmp_path, reply):
 @OF_UNKNOWN_COST
 def test_a_reply_of_unknown_cost_is_stored(settings, reply):
     """Asked the same question again, a run takes the stored reply, *one*; what it cost is NaN."""
-    with fake_vlm([reply, "two"]) as server:
-        ask_in_episode(server, settings, "0", **PRICES)
-
-        replies, counts = ask_in_episode(server, settings, "0", **PRICES)
+    replies, counts = ask_twice(settings, [reply, "two"], **PRICES)
 
     assert replies == ["one"]
     assert counts["stored"] == 1
@@ -259,10 +257,7 @@ def test_a_reply_with_an_invalid_character_is_stored_and_paid_once(settings):
     """Half a surrogate pair cannot be written as UTF-8, so it is stored as an escape. PRICES make
     a reply cost 10 dollars: asked twice, the question has cost that once.
     """
-    with fake_vlm(["\ud800 fine"]) as server:
-        ask_in_episode(server, settings, "words", **PRICES)
-
-        replies, counts = ask_in_episode(server, settings, "words", **PRICES)
+    replies, counts = ask_twice(settings, ["\ud800 fine"], **PRICES)
 
     assert replies == [r"\ud800 fine"]
     assert counts["stored"] == 1

@@ -264,6 +264,18 @@ def test_planners_with_scripted_hands_can_be_named_on_the_command_line(spec):
     assert policy.metadata["policy"] == {"hands": "scripted"}
 
 
+def play_stateless(replies):
+    """Play 60 steps of VideoUnmask by a planner whose model gives these replies in turn.
+
+    Returns the policy, and the words of each request that the model got.
+    """
+    with fake_vlm(replies) as server:
+        policy = make_policy(f"planner:stateless?base_url={server.url}/v1&model=x", 0)
+        env = roboirg.make("VideoUnmask", max_steps=60, **PolicyNeeds.of(policy).env_options)
+        play(env, policy)
+    return policy, [words_of(request) for request in server.requests]
+
+
 @pytest.mark.sim
 def test_the_stateless_planner_asks_with_a_list_of_ended_subgoals():
     """The planner asks its model whenever a subgoal has ended, and lists how the earlier ones did.
@@ -271,12 +283,10 @@ def test_the_stateless_planner_asks_with_a_list_of_ended_subgoals():
     The model names *sing*, which the hands refuse at once (step 0); *remain static*, which means 16
     steps; the same for 5 steps, till step 21; and then says *done*.
     """
-    with fake_vlm(["sing", "remain static", "Remain static for 5 steps.", "done"]) as server:
-        policy = make_policy(f"planner:stateless?base_url={server.url}/v1&model=x", 0)
-        env = roboirg.make("VideoUnmask", max_steps=60, **PolicyNeeds.of(policy).env_options)
-        play(env, policy)
+    replies = ["sing", "remain static", "Remain static for 5 steps.", "done"]
 
-    first, second, third, fourth = map(words_of, server.requests)
+    _, (first, second, third, fourth) = play_stateless(replies)
+
     assert "nothing has been done" in first
     assert "1. sing: refused, these words are no subgoal that the hands know (step 0)" in second
     assert "2. remain static: done (step 16)" in third
@@ -288,12 +298,11 @@ def test_a_stateless_planner_whose_model_says_done_asks_no_more():
     """The first reply is not readable, so the question is asked again; the second names a subgoal
     below a thought; the third says *done*. The episode goes on for 60 steps all the same.
     """
-    with fake_vlm(["?<", "First.\n\nRemain static for 5 steps.\n", "done"]) as server:
-        policy = make_policy(f"planner:stateless?base_url={server.url}/v1&model=x", 0)
-        env = roboirg.make("VideoUnmask", max_steps=60, **PolicyNeeds.of(policy).env_options)
-        play(env, policy)
+    thought = "First.\n\nRemain static for 5 steps.\n"
 
-    assert len(server.requests) == 3
+    policy, requests = play_stateless(["?<", thought, "done"])
+
+    assert len(requests) == 3
     assert policy.usage()["finished"] == 1
 
 

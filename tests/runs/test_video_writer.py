@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 import pytest
+from video_frames import frames_of
 
 from roboirg.records.film import FRAME_STEPS
 from roboirg.runs.play.video_writer import (
@@ -33,11 +34,10 @@ def unfinished_video_of_21_frames(folder, point=(40, 200)):
     return video
 
 
-def frames_of(video):
-    """Finish a video and return its frames, arrays of rows, columns and colors."""
+def finished_frames(video):
+    """Finish a video and return its frames, an array of frames, rows, columns and colors."""
     video.finish()
-    with av.open(str(video.path)) as container:
-        return [frame.to_ndarray(format="rgb24").astype(int) for frame in container.decode(video=0)]
+    return np.stack(frames_of(video.path)).astype(int)
 
 
 def test_a_video_appears_only_when_it_is_complete(tmp_path):
@@ -83,7 +83,7 @@ def test_a_video_shows_the_front_camera_at_the_left_and_the_wrist_camera_at_the_
 
     Compression changes colors a little, here by less than 7 of 256 levels.
     """
-    last_frame = frames_of(unfinished_video_of_21_frames(tmp_path))[-1]
+    last_frame = finished_frames(unfinished_video_of_21_frames(tmp_path))[-1]
 
     assert last_frame[128, 128] == pytest.approx([90, 90, 90], abs=7)
     assert last_frame[128, 384] == pytest.approx([200, 200, 200], abs=7)
@@ -96,7 +96,7 @@ def test_a_frame_of_the_demonstration_has_a_colored_border(tmp_path, row, column
 
     Compression changes colors, most of all of thin lines: here by less than 40 of 256 levels.
     """
-    first_frame = frames_of(unfinished_video_of_21_frames(tmp_path))[0]
+    first_frame = finished_frames(unfinished_video_of_21_frames(tmp_path))[0]
 
     assert first_frame[row, column] == pytest.approx([255, 176, 32], abs=40)
 
@@ -105,7 +105,7 @@ def test_a_ring_is_drawn_around_the_place_to_which_the_policy_points(tmp_path):
     """The policy points at row 40 and column 200 of the front picture, which is grey 90. The ring
     has a radius of 6 pixels, so it passes through the pixel 6 rows below. It is yellow: red is 255,
     of which compression leaves about 240, and not 90."""
-    last_frame = frames_of(unfinished_video_of_21_frames(tmp_path, point=(40, 200)))[-1]
+    last_frame = finished_frames(unfinished_video_of_21_frames(tmp_path, point=(40, 200)))[-1]
 
     red, _green, _blue = last_frame[40 + 6, 200]
     assert red == pytest.approx(240, abs=49)

@@ -3,13 +3,13 @@
 import io
 import json
 
-import av
 import numpy as np
 import pandas as pd
 import pytest
 import synthetic_trajectories as synthetic
 from PIL import Image
 from pyarrow import parquet
+from video_frames import frames_of
 
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.language import instruct
@@ -30,11 +30,6 @@ def read_lines(path):
 
 def read_rows(path):
     return parquet.read_table(path).to_pylist()
-
-
-def frames_of(path):
-    with av.open(str(path)) as container:
-        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
 def decoded(entry):

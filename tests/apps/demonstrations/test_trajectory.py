@@ -3,10 +3,10 @@
 import io
 import zipfile
 
-import av
 import numpy as np
 import pytest
 import synthetic_trajectories as synthetic
+from video_frames import frames_of
 
 from roboirg.apps.demonstrations.picture_coding import VideoEncoder
 from roboirg.apps.demonstrations.trajectory import (
@@ -21,11 +21,6 @@ from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import PICTURE_SIZE
 from roboirg.tasks.splits.splits import get_episode
-
-
-def frames_of(content):
-    with av.open(io.BytesIO(content)) as container:
-        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
 @pytest.fixture
@@ -101,6 +96,6 @@ def test_a_video_shows_what_was_encoded(coding, largest_mean_difference):
     for picture in pictures:
         encoder.add(picture)
 
-    shown = np.stack(frames_of(encoder.finish()))
+    shown = np.stack(frames_of(io.BytesIO(encoder.finish())))
 
     assert np.abs(shown.astype(int) - pictures).mean() <= largest_mean_difference
