@@ -13,7 +13,7 @@ from roboirg.cli.doctor import Check
 
 
 def run_module(*arguments, **environment):
-    return run_python("-m", "roboirg.cli.doctor", *arguments, **environment)
+    return run_python("-m", "roboirg.cli.doctor", *arguments, timeout=600, **environment)
 
 
 @pytest.mark.sim

@@ -22,7 +22,8 @@ MEAN = "implicit"
 """In the place of a setting: the mean over those of `IMPLICIT` that a task has."""
 SUCCESS = "success"
 SHARE = "share of the gap"
-"""How much of the gap to explicit words a rewriter closes for the reader of these behind it."""
+"""How much of the gap to explicit words a rewriter closes, for the reader of explicit words that
+stands behind it."""
 OVER = " over "
 """Stands before the reference of a difference: ``success over true goal``."""
 REFERENCES = {
@@ -65,7 +66,7 @@ class Measure(NamedTuple):
 
 
 def measure_frame(frame: pd.DataFrame) -> list[Measure]:
-    """Return what the trials of a frame give.
+    """Return all measures of the trials of a frame; a resolved form is a setting of its own.
 
     A trial that stands there several times, as parts of the study may share it, counts once.
 
@@ -132,7 +133,7 @@ def _shares(trials: pd.DataFrame) -> Iterator[Measure]:
     """Yield the shares of gaps that rewriters close in all tasks, where the gap is clear.
 
     Args:
-        trials: and their means over settings, by whether they succeeded.
+        trials: `value` is 1 if one succeeded, else 0; with their means over settings as `MEAN`.
     """
     scene = ["memory", "task", "policy_seed", "episode"]
     values = trials.pivot(index=scene, columns=["reader", "setting"], values="value")
@@ -142,7 +143,8 @@ def _shares(trials: pd.DataFrame) -> Iterator[Measure]:
         columns = [(reader, setting), ("explicit", setting), ("explicit", EXPLICIT)]
         for memory, same in values[columns].dropna().groupby("memory"):
             tasks = []
-            for _, rates in same.groupby("task"):
+            # Trainings of an episode are no episodes of their own, so their mean counts.
+            for _, rates in same.groupby(["task", "episode"]).mean().groupby("task"):
                 weights = np.full(len(rates), 1 / len(rates))
                 tasks.append(TaskRates(rates.to_numpy(), weights, np.full(3, True)))
             interval = share_interval(tasks)

@@ -94,8 +94,8 @@ def play_missing(study: Study) -> None:
 def play_wanted(every: Sequence[Wanted], job: Job) -> Record:
     """Play a job as a run does, with a body that is given its goal; return the record.
 
-    Runs in worker processes. If the body does what was done before in the scene, the record is that
-    of then.
+    Runs in worker processes. If the body does what another one did in the scene before, nothing is
+    simulated: the record is that one's, with its times.
 
     Args:
         every: what is played.
@@ -106,14 +106,15 @@ def play_wanted(every: Sequence[Wanted], job: Job) -> Record:
     scene = known_scene(replace(job, policy_seed=0))
     path = wanted.trial.row.body
     body = scene.with_eyes(body_of(path), detector_of(path))
-    known = scene.rehearse(_acting(body, wanted.heard))
-    if known is not None:
-        return replace(known, policy_seed=job.policy_seed)
     policy = WatchedPolicy(_acting(body, wanted.heard))
     prepared = PreparedJob(job)
     record = begin_record(prepared)
+    guard = CallGuard(record.timings, None)
     try:
-        guard = CallGuard(record.timings, None)
+        with guard.policy("policy's act()", "policy_act"):
+            known = scene.rehearse(_acting(body, wanted.heard))
+        if known is not None:
+            return replace(known, policy_seed=job.policy_seed)
         loop = play_with(policy, prepared, job_needs(policy, job), record, guard)
     except EpisodeError as error:
         record.record_error(error.kind, error.cause, error.details)

@@ -1,7 +1,8 @@
-"""What is known of a scene: what was to be seen there after the actions that were played.
+"""Skips the simulation of plays that repeat an earlier one.
 
-Bodies of one training see with the same detector, so that those with the same goal mostly do the
-same, to the last bit. Then the world would answer the same, and need not be simulated.
+Bodies of one training see with the same detector, and with the same goal they mostly do the same,
+to the last bit. For the scene that is played, a tree keeps what was observed after which answers. A
+policy that answers alike all the way gets the record of the earlier play.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, cast
 
+import numpy as np
 from numpy.typing import NDArray
 
+from roboirg.core.errors import RoboIRGError
 from roboirg.extension.policies import Demonstration, Observation
 from roboirg.policies.contract.policy_calls import policy_subgoal
 from roboirg.records.record import Job, Record
@@ -21,8 +24,8 @@ from roboirg_learn.policy.learned_policy import LearnedPolicy
 from roboirg_learn.policy.object_detector import LabeledPicture, ObjectDetector
 from roboirg_learn.policy.trained_body import Pictures, TrainedBody
 
-SCENES = 2
-"""Most scenes of which a worker keeps what is known."""
+SEEN = ("front_rgb", "joint_positions", "end_effector", "gripper")
+"""What must be equal in two observations after the same answers."""
 
 
 class Answer(NamedTuple):
@@ -30,6 +33,10 @@ class Answer(NamedTuple):
 
     actions: bytes
     subgoal: str | None
+
+
+BEGINNING = Answer(b"", None)
+"""Stands before the first moment."""
 
 
 @dataclass
@@ -46,7 +53,7 @@ class Moment:
 
 
 class WatchedPolicy:
-    """A policy of which it is kept what it is given, and what it answers.
+    """Wraps a policy and keeps its observations and answers; all words come before the first.
 
     Attributes:
         start: instruction and video, after `reset`.
@@ -73,42 +80,47 @@ class WatchedPolicy:
 
 
 class KnownScene:
-    """Plays of one scene with one verdict, as a tree of the answers that were given."""
+    """The plays of one job, whatever its policy, as a tree of the answers that were given."""
 
     def __init__(self) -> None:
         self._start: tuple[str, Demonstration] | None = None
-        self._first: Moment | None = None
+        self._plays: dict[Answer, Moment | Record] = {}
         self._found: dict[bytes, list[LabeledPicture]] = {}
 
     def rehearse(self, policy: LearnedPolicy) -> Record | None:
         """Return the record of an earlier play in which the same was done; None if there is none.
 
         Args:
-            policy: is asked about the observations of that play, and has to be made anew for more.
+            policy: a new one, which cannot play afterwards, as it has seen what it was asked about.
         """
         if self._start is None:
             return None
         policy.reset(*self._start)
-        moment: Moment | Record | None = self._first
+        moment = self._plays.get(BEGINNING)
         while isinstance(moment, Moment):
             answer = _answer(policy, policy.act(moment.observation))
             moment = moment.after.get(answer)
         return moment
 
     def keep(self, policy: WatchedPolicy, record: Record) -> None:
-        """Keep a play and its record, which must not be changed any more."""
+        """Keep a play that was simulated, and its record, which must not be changed any more.
+
+        Raises:
+            RoboIRGError: what was observed is not what was observed after the same answers before.
+        """
         self._start = policy.start
-        moment: Moment | None = self._first
-        answered: Answer | None = None
+        after = self._plays
+        answered = BEGINNING
         for observation, answer in policy.asked:
-            if moment is None:
-                self._first = moment = Moment(observation)
-            elif answered is not None:
-                after = moment.after.setdefault(answered, Moment(observation))
-                moment = cast("Moment", after)
+            moment = after.setdefault(answered, Moment(observation))
+            if isinstance(moment, Record) or not _are_equal(moment.observation, observation):
+                raise RoboIRGError(
+                    f"{record.slug}: after the same actions the world is not the same as before, "
+                    "so no play can stand for another one."
+                )
+            after = moment.after
             answered = answer
-        if moment is not None and answered is not None:
-            moment.after[answered] = record
+        after[answered] = record
 
     def with_eyes(self, body: TrainedBody, detector: str) -> TrainedBody:
         """Return a body that does not look twice at pictures of the scene.
@@ -121,9 +133,12 @@ class KnownScene:
         return replace(body, detector=cast("ObjectDetector", eyes))
 
 
-@functools.lru_cache(maxsize=SCENES)
+@functools.lru_cache(maxsize=1)
 def known_scene(_job: Job) -> KnownScene:
-    """Return what this process knows of the scene of a job."""
+    """Return what this process knows of a job, the key of the cache, whose plays come together.
+
+    A play of 1,300 steps takes some 30 MB.
+    """
     return KnownScene()
 
 
@@ -148,6 +163,13 @@ class _Eyes(NamedTuple):
         if key not in self.found:
             self.found[key] = self.detector.find(pictures)
         return self.found[key]
+
+
+def _are_equal(first: Observation, second: Observation) -> bool:
+    """Return whether two observations agree in what is `SEEN`."""
+    seen: Any = first
+    again: Any = second
+    return all(np.array_equal(seen[name], again[name]) for name in SEEN)
 
 
 def _answer(policy: LearnedPolicy, actions: NDArray[Any]) -> Answer:

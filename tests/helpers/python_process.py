@@ -5,8 +5,11 @@ import subprocess
 import sys
 
 
-def run_python(*words, cwd=None, **environment):
-    """Return how Python ended, with what it printed as text; variables are added to ours."""
+def run_python(*words, cwd=None, timeout=None, **environment):
+    """Return how Python ended, with what it printed as text; variables are added to ours.
+
+    It may take `timeout` seconds, as long as it wants if that is None.
+    """
     return subprocess.run(
         [sys.executable, *map(str, words)],
         cwd=cwd,
@@ -14,6 +17,7 @@ def run_python(*words, cwd=None, **environment):
         capture_output=True,
         text=True,
         check=False,
+        timeout=timeout,
     )
 
 

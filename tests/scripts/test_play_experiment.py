@@ -15,6 +15,7 @@ from msgspec.structs import replace
 from selection import slow_but
 
 from roboirg.core.environment_options import EnvironmentOptions
+from roboirg.core.errors import RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.records.record_codec import StoreError
 
@@ -357,21 +358,40 @@ def test_a_policy_gets_the_record_of_an_earlier_one_that_did_the_same_and_no_oth
     """Each policy answers some numbers, one after the other, and may name a subgoal with them. Two
     have played in the scene; what others begin like them, but do not end so, has no record yet."""
     pytest.importorskip("torch")
-    from experiment.rehearsing import KnownScene, WatchedPolicy
+    from experiment.rehearsing import KnownScene
 
     scene = KnownScene()
-    for record, answers in {"first": [1, 2], "second": [1, 3, 4]}.items():
-        policy = WatchedPolicy(answering(answers))
-        policy.reset("", {})
-        for observation in range(len(answers)):
-            policy.act(observation)
-        scene.keep(policy, record)
+    scene.keep(asked([1, 2]), "first")
+    scene.keep(asked([1, 3, 4]), "second")
 
     assert scene.rehearse(answering([1, 2])) == "first"
     assert scene.rehearse(answering([1, 3, 4])) == "second"
     for answers in ([2], [1, 4], [1, 3, 5]):
         assert scene.rehearse(answering(answers)) is None
     assert scene.rehearse(answering([1, 2], subgoal="press the button")) is None
+
+
+def test_a_world_that_answers_the_same_actions_differently_is_refused():
+    """No play could stand for another one there."""
+    pytest.importorskip("torch")
+    from experiment.rehearsing import KnownScene
+
+    scene = KnownScene()
+    scene.keep(asked([1, 2]), SimpleNamespace(slug="a"))
+
+    with pytest.raises(RoboIRGError, match="the world is not the same as before"):
+        scene.keep(asked([1, 3], first_seen=7), SimpleNamespace(slug="b"))
+
+
+def asked(answers, first_seen=0):
+    """Return a watched policy that has given some answers, each to the next number as observed."""
+    from experiment.rehearsing import SEEN, WatchedPolicy
+
+    policy = WatchedPolicy(answering(answers))
+    policy.reset("", {})
+    for number in range(first_seen, first_seen + len(answers)):
+        policy.act(dict.fromkeys(SEEN, number))
+    return policy
 
 
 def answering(answers, subgoal=None):
